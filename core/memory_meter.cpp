@@ -1,0 +1,23 @@
+#include "core/memory_meter.h"
+
+#include <atomic>
+
+namespace arboretum {
+namespace {
+std::atomic<std::size_t> current_bytes{0};
+std::atomic<std::size_t> peak_bytes{0};
+}  // namespace
+
+void MemoryMeter::add(std::size_t bytes) noexcept {
+  const std::size_t now = current_bytes.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+  std::size_t peak = peak_bytes.load(std::memory_order_relaxed);
+  while (now > peak && !peak_bytes.compare_exchange_weak(peak, now, std::memory_order_relaxed)) {
+  }
+}
+
+void MemoryMeter::remove(std::size_t bytes) noexcept { current_bytes.fetch_sub(bytes, std::memory_order_relaxed); }
+std::size_t MemoryMeter::current() noexcept { return current_bytes.load(std::memory_order_relaxed); }
+std::size_t MemoryMeter::peak() noexcept { return peak_bytes.load(std::memory_order_relaxed); }
+void MemoryMeter::reset_peak() noexcept { peak_bytes.store(current(), std::memory_order_relaxed); }
+
+}  // namespace arboretum

@@ -1,0 +1,55 @@
+// MemoryMeter: counts the bytes that builders and structures hold, so that peak build memory is measured, not guessed.
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <vector>
+
+namespace arboretum {
+
+/// Process-wide running total and peak of the bytes allocated through Arena and MeteredVector. Thread-safe.
+/// A builder's peak is peak() - current() as it was at reset_peak(); builds are measured one at a time.
+class MemoryMeter {
+ public:
+  static void add(std::size_t bytes) noexcept;
+  static void remove(std::size_t bytes) noexcept;
+  [[nodiscard]] static std::size_t current() noexcept;
+  [[nodiscard]] static std::size_t peak() noexcept;
+  /// Sets the peak to the current total.
+  static void reset_peak() noexcept;
+};
+
+/// Allocates from the global heap and reports to MemoryMeter. Elements are default-initialised (left as they are for
+/// trivial types), since builders overwrite whole arrays.
+template <class T>
+struct MeteredAllocator {
+  using value_type = T;
+  MeteredAllocator() = default;
+  template <class U>
+  MeteredAllocator(const MeteredAllocator<U>&) noexcept {}
+  static constexpr std::align_val_t kAlignment{alignof(T) > 64 ? alignof(T) : 64};
+  T* allocate(std::size_t n) {
+    T* p = static_cast<T*>(::operator new(n * sizeof(T), kAlignment));
+    MemoryMeter::add(n * sizeof(T));
+    return p;
+  }
+  void deallocate(T* p, std::size_t n) noexcept {
+    ::operator delete(p, kAlignment);
+    MemoryMeter::remove(n * sizeof(T));
+  }
+  template <class U>
+  void construct(U* p) noexcept(noexcept(::new (p) U)) {
+    ::new (static_cast<void*>(p)) U;
+  }
+  template <class U, class... Args>
+  void construct(U* p, Args&&... args) {
+    ::new (static_cast<void*>(p)) U(static_cast<Args&&>(args)...);
+  }
+  template <class U>
+  bool operator==(const MeteredAllocator<U>&) const noexcept { return true; }
+};
+
+template <class T>
+using MeteredVector = std::vector<T, MeteredAllocator<T>>;
+
+}  // namespace arboretum

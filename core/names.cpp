@@ -1,0 +1,40 @@
+#include "core/names.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace arboretum {
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = i;
+  for (std::size_t j = 0; j <= b.size(); ++j) d[0][j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+    }
+  }
+  return d[a.size()][b.size()];
+}
+
+std::string nearest_name(std::string_view name, std::span<const std::string> candidates) {
+  std::string best;
+  std::size_t best_distance = ~std::size_t{0};
+  for (const std::string& candidate : candidates) {
+    if (const std::size_t distance = edit_distance(name, candidate); distance < best_distance) {
+      best_distance = distance, best = candidate;
+    }
+  }
+  return best;
+}
+
+std::string unknown_name_message(std::string_view kind, std::string_view name, std::span<const std::string> candidates) {
+  std::string message = "unknown " + std::string(kind) + " '" + std::string(name) + "'";
+  if (candidates.empty()) return message;
+  message += "; did you mean '" + nearest_name(name, candidates) + "'? (valid:";
+  for (const std::string& candidate : candidates) message += " " + candidate;
+  return message + ")";
+}
+
+}  // namespace arboretum

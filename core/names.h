@@ -1,0 +1,18 @@
+// Nearest valid name to a misspelt one, for error messages.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace arboretum {
+
+/// Edit distance with adjacent transpositions (restricted Damerau-Levenshtein).
+[[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
+/// The candidate with the smallest edit distance to `name`; empty when there are no candidates.
+[[nodiscard]] std::string nearest_name(std::string_view name, std::span<const std::string> candidates);
+/// "unknown <kind> 'naem'; did you mean 'name'? (valid: a, b, c)": one line for UserError.
+[[nodiscard]] std::string unknown_name_message(std::string_view kind, std::string_view name,
+                                               std::span<const std::string> candidates);
+
+}  // namespace arboretum

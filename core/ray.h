@@ -1,0 +1,43 @@
+// Ray, Hit and the conventions that every kernel keeps.
+//
+// A triangle is closed, so is the interval [tnear, tfar]; a coplanar or zero-area triangle is missed; among hits at
+// an equal t the lowest primitive id wins. A ray with a NaN, an infinite origin or direction, a zero direction or
+// tnear > tfar hits nothing. tnear >= 0.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "core/vec3.h"
+
+namespace arboretum {
+
+/// 32 bytes: half a cache line. The direction need not be normalised; t is in units of its length.
+struct alignas(16) Ray {
+  Vec3f origin;
+  float tnear = 0.0f;
+  Vec3f direction;
+  float tfar = std::numeric_limits<float>::infinity();
+};
+static_assert(sizeof(Ray) == 32);
+
+inline constexpr std::uint32_t kNoPrimitive = 0xffffffffu;
+
+/// 16 bytes. u weighs the triangle's second vertex, v its third. A miss: primitive == kNoPrimitive, t == infinity.
+struct alignas(16) Hit {
+  float t = std::numeric_limits<float>::infinity();
+  float u = 0.0f;
+  float v = 0.0f;
+  std::uint32_t primitive = kNoPrimitive;
+
+  [[nodiscard]] bool is_hit() const noexcept { return primitive != kNoPrimitive; }
+};
+static_assert(sizeof(Hit) == 16);
+
+/// Whether the ray's numbers mean a ray at all; kernels report a miss for one that is not valid.
+[[nodiscard]] inline bool is_valid(const Ray& ray) noexcept {
+  return is_finite(ray.origin) && is_finite(ray.direction) &&
+         (ray.direction.x != 0.0f || ray.direction.y != 0.0f || ray.direction.z != 0.0f) && ray.tnear <= ray.tfar;
+}
+
+}  // namespace arboretum

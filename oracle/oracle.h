@@ -1,0 +1,61 @@
+// Oracle: the exact answer of every ray, and the check of given answers against it.
+//
+// Inputs are float32 bit patterns, taken as exact numbers; every decision (hit or miss, which is nearest, which tie) is
+// exact: a floating-point filter first, then exact arithmetic where it cannot decide. The search goes through the
+// oracle's own tree, which shares no code with the structures under test and never leaves out a triangle that the
+// exact ray touches.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/mesh.h"
+#include "core/ray.h"
+
+namespace arboretum {
+
+/// The exact answer of one closest-hit ray. `hit`: t, u, v rounded from the exact values to float32, and the lowest id of
+/// those at the exact nearest t. `t` as a double has a relative error of at most 2^-50.
+struct ExactHit {
+  Hit hit;
+  double t = 0.0;
+  bool tie = false;  ///< more than one primitive shares the exact nearest t
+};
+
+/// Wrong answers of a batch, as the contract defines them, and the error of t where the surface is right.
+struct AnswerCheck {
+  std::uint64_t rays = 0, hits = 0;  ///< `hits`: of the answers given
+  std::uint64_t missed_hits = 0;     ///< exact hit, reported miss
+  std::uint64_t false_hits = 0;      ///< exact miss, reported hit
+  std::uint64_t wrong_surface = 0;   ///< both hit, t apart by more than 2^-12 relative
+  std::uint64_t wrong_primitive = 0; ///< not one of those at the exact nearest t; no part of wrong_answers()
+  std::uint64_t cracks = 0;          ///< misses, or hits of something behind, through a closed surface and not past its silhouette
+  double t_error_ulp_median = 0, t_error_ulp_p99 = 0, t_error_ulp_max = 0;
+  [[nodiscard]] std::uint64_t wrong_answers() const noexcept { return missed_hits + false_hits + wrong_surface; }
+};
+
+class Oracle {
+ public:
+  /// Builds the search tree with all TBB threads allowed to the caller. The mesh must outlive the oracle.
+  explicit Oracle(const TriangleMesh& mesh);
+  ~Oracle();
+  Oracle(Oracle&&) noexcept;
+  Oracle& operator=(Oracle&&) noexcept;
+
+  [[nodiscard]] std::vector<ExactHit> closest_hit(std::span<const Ray> rays) const;
+  /// 1 where anything lies within the closed interval, else 0.
+  [[nodiscard]] std::vector<std::uint8_t> any_hit(std::span<const Ray> rays) const;
+
+  [[nodiscard]] AnswerCheck check_closest_hit(std::span<const Ray> rays, std::span<const ExactHit> truth,
+                                              std::span<const Hit> answers) const;
+  [[nodiscard]] AnswerCheck check_any_hit(std::span<const Ray> rays, std::span<const std::uint8_t> truth,
+                                          std::span<const std::uint8_t> answers) const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace arboretum

@@ -1,0 +1,111 @@
+// Accel: what every acceleration structure is to the rest of the project.
+//
+// A structure lives in structures/<folder>/. It builds itself from a mesh, shows its nodes and leaves to a visitor (so
+// that statistics are computed once, in one place, for all), and says what it can be built with. How rays go through
+// it is written in structures/<folder>/*_kernels.h, once for all instruction sets (traversal/kernel_table.h).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/bounds.h"
+#include "core/isa.h"
+#include "core/mesh.h"
+
+namespace arboretum {
+
+/// Parameters of a builder; a builder reads those that concern it. Part of the cell when they are swept.
+struct BuilderParameters {
+  unsigned bins = 32;             ///< binned SAH: bins an axis, 4 .. 64
+  float traversal_cost = 1.0f;    ///< cost of a node visit, in units of one block test
+  float intersection_cost = 1.0f; ///< cost of testing one leaf block
+  unsigned max_leaf_blocks = 4;   ///< leaf blocks in a leaf at most, 1 .. 7
+  std::string collapse = "optimal"; ///< binary to N-wide: `greedy` (largest area first) or `optimal` (dynamic programming)
+  friend bool operator==(const BuilderParameters&, const BuilderParameters&) = default;
+};
+
+struct BuildSettings {
+  std::string builder = "binned_sah";
+  std::string leaf = "triangle4";
+  Isa isa = Isa::scalar;  ///< instruction set of the builder's own kernels; the result does not depend on it, but where StructureInfo says so
+  unsigned threads = 1;
+  BuilderParameters parameters;
+};
+
+/// What a build took. `seconds` is wall time from mesh to a structure ready for rays.
+struct BuildReport {
+  double seconds = 0.0;
+  double cpu_seconds = 0.0;      ///< of all threads
+  std::size_t peak_bytes = 0;    ///< most memory held at once while building, the structure included, the mesh not
+  std::vector<std::pair<std::string, double>> phases;  ///< name, wall seconds
+};
+
+/// An inner node as a visitor sees it. `child_bounds` has one box for each child that exists.
+struct NodeView {
+  Bounds3f bounds;
+  std::span<const Bounds3f> child_bounds;
+  unsigned depth = 0;  ///< the root's is 0
+  std::size_t bytes = 0;
+};
+
+/// A leaf as a visitor sees it: `primitives` may name a primitive that other leaves name too.
+struct LeafView {
+  Bounds3f bounds;
+  std::span<const std::uint32_t> primitives;
+  unsigned depth = 0;
+  unsigned blocks = 0;       ///< leaf blocks
+  unsigned block_width = 1;  ///< triangles that one block can hold
+  std::size_t bytes = 0;
+};
+
+class StructureVisitor {
+ public:
+  virtual ~StructureVisitor() = default;
+  virtual void node(const NodeView& node) = 0;
+  virtual void leaf(const LeafView& leaf) = 0;
+};
+
+/// What a structure is called and what it takes. Names are the keys of the configuration.
+struct StructureInfo {
+  std::string_view name;
+  std::string_view summary;                 ///< one line for `list`
+  std::vector<std::string_view> builders;   ///< the first is the default
+  std::vector<std::string_view> leaves;
+  bool build_depends_on_isa = false;        ///< built anew for each ISA (embree: the device is set to it)
+  bool build_depends_on_threads = false;    ///< built anew for each thread count
+};
+
+class Accel {
+ public:
+  virtual ~Accel() = default;
+  [[nodiscard]] virtual const StructureInfo& info() const noexcept = 0;
+  /// Builds from `mesh`, replacing what was there. The mesh must outlive the structure.
+  /// Throws UserError when a setting is not one that info() names, or when the mesh is too large for the structure.
+  virtual void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) = 0;
+  /// Shows every node and leaf, parents before children, depth first: what follows a node with a greater depth is below
+  /// it. Returns false where the structure cannot be looked into (embree).
+  [[nodiscard]] virtual bool visit(StructureVisitor& visitor) const = 0;
+  /// Bytes that tracing needs, the mesh's own arrays not counted.
+  [[nodiscard]] virtual std::size_t bytes() const noexcept = 0;
+};
+
+/// One structure of the list in structures/all.h.
+struct StructureEntry {
+  StructureInfo info;
+  std::unique_ptr<Accel> (*create)();
+};
+
+/// Every structure of this build, in the order of structures/all.h.
+[[nodiscard]] std::span<const StructureEntry> all_structures();
+/// nullptr where there is none of that name.
+[[nodiscard]] const StructureEntry* find_structure(std::string_view name);
+/// Creates and builds, filling in the report's seconds and peak.
+[[nodiscard]] std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh,
+                                                     const BuildSettings& settings, BuildReport& report);
+
+}  // namespace arboretum

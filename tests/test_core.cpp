@@ -1,0 +1,81 @@
+#include <cstdlib>
+#include <limits>
+
+#include "core/arena.h"
+#include "core/bounds.h"
+#include "core/isa.h"
+#include "core/memory_meter.h"
+#include "core/names.h"
+#include "core/random.h"
+#include "core/ray.h"
+#include "tests/catch.h"
+
+using namespace arboretum;
+
+TEST_CASE("isa names go there and back") {
+  for (Isa isa : kAllIsas) CHECK(parse_isa(to_string(isa)) == isa);
+  CHECK(parse_isa("avx") == Isa::avx2);
+  CHECK_FALSE(parse_isa("avx3").has_value());
+  CHECK(is_available(Isa::scalar));
+  for (Isa isa : available_isas()) CHECK(cpu_supports(isa));
+}
+
+TEST_CASE("an empty box has no area and contains nothing") {
+  Bounds3f box;
+  CHECK(box.empty());
+  CHECK(box.area() == 0.0);
+  box.extend(Vec3f{1, 2, 3});
+  CHECK_FALSE(box.empty());
+  CHECK(box.area() == 0.0);
+  box.extend(Vec3f{2, 4, 6});
+  CHECK(box.area() == 2.0 * (1 * 2 + 2 * 3 + 3 * 1));
+}
+
+TEST_CASE("a ray is valid only with finite numbers, a direction and a non-empty interval") {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  CHECK(is_valid(Ray{{0, 0, 0}, 0, {0, 0, 1}, inf}));
+  CHECK(is_valid(Ray{{0, 0, 0}, 1, {0, 0, 1}, 1}));
+  CHECK_FALSE(is_valid(Ray{{0, 0, 0}, 2, {0, 0, 1}, 1}));
+  CHECK_FALSE(is_valid(Ray{{0, 0, 0}, 0, {0, 0, -0.0f}, inf}));
+  CHECK_FALSE(is_valid(Ray{{nan, 0, 0}, 0, {0, 0, 1}, inf}));
+  CHECK_FALSE(is_valid(Ray{{0, 0, 0}, 0, {0, inf, 1}, inf}));
+  CHECK_FALSE(is_valid(Ray{{0, 0, 0}, nan, {0, 0, 1}, inf}));
+}
+
+TEST_CASE("the memory meter sees what arenas and vectors hold, and their peak") {
+  const std::size_t before = MemoryMeter::current();
+  MemoryMeter::reset_peak();
+  {
+    Arena arena(1 << 20);
+    CHECK(reinterpret_cast<std::uintptr_t>(arena.data()) % 64 == 0);
+    MeteredVector<float> values(1000);
+    CHECK(MemoryMeter::current() == before + (1 << 20) + 4000);
+    Arena moved = std::move(arena);
+    CHECK(arena.data() == nullptr);
+    CHECK(moved.bytes() == 1 << 20);
+  }
+  CHECK(MemoryMeter::current() == before);
+  CHECK(MemoryMeter::peak() == before + (1 << 20) + 4000);
+}
+
+TEST_CASE("the nearest name to a misspelt one") {
+  const std::vector<std::string> names{"bvh2", "bvh4", "bvh8", "bvh16", "kdtree", "embree"};
+  CHECK(nearest_name("kd-tree", names) == "kdtree");
+  CHECK(nearest_name("ebmree", names) == "embree");
+  CHECK(edit_distance("ab", "ba") == 1);
+  CHECK(edit_distance("", "abc") == 3);
+  CHECK_THAT(unknown_name_message("structure", "bhv8", names), Catch::Contains("did you mean 'bvh8'?"));
+}
+
+TEST_CASE("random numbers depend on seed, index and dimension alone, and fill [0, 1)") {
+  CHECK(random_float(1, 2, 3) == random_float(1, 2, 3));
+  CHECK(random_bits(1, 2, 3) != random_bits(1, 3, 2));
+  CHECK(random_bits(1, 2, 3) != random_bits(2, 2, 3));
+  double sum = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const float r = random_float(7, i, 0);
+    REQUIRE((r >= 0.0f && r < 1.0f));
+    sum += r;
+  }
+  CHECK(sum / 100000 == Approx(0.5).margin(0.005));
+}

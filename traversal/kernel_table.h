@@ -1,0 +1,66 @@
+// The kernel table: every way of tracing rays that this build can do, one row a combination.
+//
+// Rows are made by the compiler from type lists and a concept (traversal/kernel_rows.h), one translation unit for each
+// structure and instruction set. A function pointer takes a whole batch of rays: below it all is templates.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/isa.h"
+#include "core/ray.h"
+
+namespace arboretum {
+
+class Accel;
+
+/// Work done by a batch; filled by the counting kernels alone (the timed ones carry no counters).
+struct Counters {
+  std::uint64_t rays = 0;
+  std::uint64_t nodes = 0;          ///< inner nodes visited
+  std::uint64_t boxes = 0;          ///< child boxes tested (those that exist)
+  std::uint64_t boxes_hit = 0;
+  std::uint64_t leaves = 0;         ///< leaves visited
+  std::uint64_t blocks = 0;         ///< leaf blocks tested
+  std::uint64_t triangles = 0;      ///< ray/triangle tests, empty lanes not counted
+  std::uint64_t lanes = 0;          ///< SIMD lanes spent on boxes and triangles
+  std::uint64_t lanes_active = 0;   ///< of them, those that held a box or triangle that exists
+  Counters& operator+=(const Counters& o) noexcept;
+};
+
+/// hits[i] answers rays[i]; both spans have the same size. The structure must be of the row's structure and leaf.
+using ClosestHitFunction = void (*)(const Accel&, std::span<const Ray> rays, std::span<Hit> hits, Counters*);
+/// occluded[i] becomes 1 when anything lies within [tnear, tfar] of rays[i], else 0.
+using AnyHitFunction = void (*)(const Accel&, std::span<const Ray> rays, std::span<std::uint8_t> occluded, Counters*);
+
+struct KernelRow {
+  std::string_view structure, leaf, intersector, box, traversal;
+  Isa isa = Isa::scalar;
+  ClosestHitFunction closest_hit = nullptr;  ///< timed; ignores its Counters*
+  AnyHitFunction any_hit = nullptr;          ///< timed; ignores its Counters*
+  ClosestHitFunction count_closest_hit = nullptr;  ///< same answers, adds to the Counters; nullptr where none
+  AnyHitFunction count_any_hit = nullptr;
+};
+
+/// Every row of this build, those of ISAs that this machine lacks included (do not call them).
+[[nodiscard]] std::span<const KernelRow> kernel_table();
+/// nullptr where there is none.
+[[nodiscard]] const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
+                                           std::string_view box, std::string_view traversal, Isa isa);
+/// The leaf that a cell uses when the configuration names none; empty when the structure has no kernel for the rest.
+[[nodiscard]] std::string_view default_leaf(std::string_view structure, std::string_view intersector, Isa isa);
+/// One line: why there is no such row ("pluecker needs vertices: leaf triangle4v", ...). Empty when there is one.
+[[nodiscard]] std::string why_no_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
+                                        std::string_view box, std::string_view traversal, Isa isa);
+
+/// Every value that an axis has in the table, in the order of first appearance.
+struct AxisValues {
+  std::vector<std::string_view> structures, leaves, intersectors, boxes, traversals;
+};
+[[nodiscard]] const AxisValues& axis_values();
+
+}  // namespace arboretum
