@@ -78,6 +78,7 @@ struct StructureInfo {
   std::vector<std::string_view> leaves;
   bool build_depends_on_isa = false;        ///< built anew for each ISA (embree: the device is set to it)
   bool build_depends_on_threads = false;    ///< built anew for each thread count
+  bool uses_parameters = true;              ///< false where the builders read none of BuilderParameters: sweeping them makes no new cells
 };
 
 class Accel {
