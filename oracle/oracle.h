@@ -16,6 +16,8 @@
 
 namespace arboretum {
 
+struct DecisionCounts;  // oracle/exact_predicate.h
+
 /// The exact answer of one closest-hit ray. `hit`: t, u, v rounded from the exact values to float32, and the lowest id of
 /// those at the exact nearest t. `t` as a double has a relative error of at most 2^-50.
 struct ExactHit {
@@ -30,8 +32,12 @@ struct AnswerCheck {
   std::uint64_t missed_hits = 0;     ///< exact hit, reported miss
   std::uint64_t false_hits = 0;      ///< exact miss, reported hit
   std::uint64_t wrong_surface = 0;   ///< both hit, t apart by more than 2^-12 relative
-  std::uint64_t wrong_primitive = 0; ///< not one of those at the exact nearest t; no part of wrong_answers()
-  std::uint64_t cracks = 0;          ///< misses, or hits of something behind, through a closed surface and not past its silhouette
+  /// Both hit, but the primitive is not one of those at the exact nearest t, be the surface right or wrong; no part of
+  /// wrong_answers().
+  std::uint64_t wrong_primitive = 0;
+  /// Misses, or hits of something behind, through a closed surface and not past its silhouette. 0 for any hit.
+  std::uint64_t cracks = 0;
+  /// |t - exact t| in units of the last place of the exact t's float32, over the rays with the right surface or primitive.
   double t_error_ulp_median = 0, t_error_ulp_p99 = 0, t_error_ulp_max = 0;
   [[nodiscard]] std::uint64_t wrong_answers() const noexcept { return missed_hits + false_hits + wrong_surface; }
 };
@@ -44,10 +50,13 @@ class Oracle {
   Oracle(Oracle&&) noexcept;
   Oracle& operator=(Oracle&&) noexcept;
 
-  [[nodiscard]] std::vector<ExactHit> closest_hit(std::span<const Ray> rays) const;
+  /// Both use all TBB threads allowed to the caller; the answers do not depend on their number. `counts`, where given,
+  /// is added to: how many decisions each level of the predicate took.
+  [[nodiscard]] std::vector<ExactHit> closest_hit(std::span<const Ray> rays, DecisionCounts* counts = nullptr) const;
   /// 1 where anything lies within the closed interval, else 0.
-  [[nodiscard]] std::vector<std::uint8_t> any_hit(std::span<const Ray> rays) const;
+  [[nodiscard]] std::vector<std::uint8_t> any_hit(std::span<const Ray> rays, DecisionCounts* counts = nullptr) const;
 
+  /// `truth` as closest_hit or any_hit gave it for the same rays. Throws std::invalid_argument where the sizes differ.
   [[nodiscard]] AnswerCheck check_closest_hit(std::span<const Ray> rays, std::span<const ExactHit> truth,
                                               std::span<const Hit> answers) const;
   [[nodiscard]] AnswerCheck check_any_hit(std::span<const Ray> rays, std::span<const std::uint8_t> truth,

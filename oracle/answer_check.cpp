@@ -1,0 +1,127 @@
+#include "oracle/answer_check.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "oracle/exact_predicate.h"
+
+namespace arboretum {
+namespace {
+
+struct Tally {
+  AnswerCheck check;
+  std::vector<float> t_errors;  // ulp
+};
+
+void expect_one_size(std::size_t rays, std::size_t truth, std::size_t answers) {
+  if (rays != truth || rays != answers) {
+    throw std::invalid_argument("oracle: as many exact and given answers as rays are needed");
+  }
+}
+
+bool is_at_nearest_t(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth, std::uint32_t primitive) {
+  if (primitive == truth.hit.primitive) return true;
+  if (primitive >= mesh.size() || !truth.tie) return false;
+  const Corners given = mesh.corners(primitive);
+  if (!is_finite(given[0]) || !is_finite(given[1]) || !is_finite(given[2])) return false;
+  ExactPredicate predicate(ray);
+  Enclosure t;
+  return predicate.meets(given, t) && predicate.compare_t(given, mesh.corners(truth.hit.primitive)) == 0;
+}
+
+double ulp_of(float x) {
+  const float next = std::nextafter(x, std::numeric_limits<float>::infinity());
+  return double(next) - double(x);
+}
+
+void check_one(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth, const Hit& answer,
+               const std::function<const SurfaceAdjacency&()>& adjacency, Tally& tally) {
+  AnswerCheck& check = tally.check;
+  if (answer.is_hit()) ++check.hits;
+  if (!truth.hit.is_hit()) {
+    if (answer.is_hit()) ++check.false_hits;
+    return;
+  }
+  bool something_behind = false;
+  if (!answer.is_hit()) {
+    ++check.missed_hits;
+    something_behind = true;
+  } else {
+    const double difference = double(answer.t) - truth.t, tolerance = kSurfaceTolerance * std::fabs(truth.t);
+    const bool right_surface = std::fabs(difference) <= tolerance;  // false for a NaN
+    const bool right_primitive = is_at_nearest_t(mesh, ray, truth, answer.primitive);
+    if (!right_surface) ++check.wrong_surface;
+    if (!right_primitive) ++check.wrong_primitive;
+    something_behind = difference > tolerance && !right_primitive;
+    if ((right_surface || right_primitive) && std::isfinite(truth.hit.t)) {
+      const double error = std::fabs(difference) / ulp_of(truth.hit.t);
+      tally.t_errors.push_back(std::isnan(error) ? std::numeric_limits<float>::infinity() : static_cast<float>(error));
+    }
+  }
+  if (something_behind && adjacency().passes_through(ray, truth.hit.primitive, truth.hit.u, truth.hit.v)) {
+    ++check.cracks;
+  }
+}
+
+/// The smallest value that at least a share `p` of them does not exceed.
+double quantile(std::vector<float>& values, double p) {
+  const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size())));
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(rank, 1) - 1);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+}  // namespace
+
+AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> rays, std::span<const ExactHit> truth,
+                               std::span<const Hit> answers,
+                               const std::function<const SurfaceAdjacency&()>& adjacency) {
+  expect_one_size(rays.size(), truth.size(), answers.size());
+  tbb::enumerable_thread_specific<Tally> tallies;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), 4096), [&](const auto& range) {
+    Tally& tally = tallies.local();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      check_one(mesh, rays[i], truth[i], answers[i], adjacency, tally);
+    }
+  });
+  AnswerCheck sum;
+  std::vector<float> errors;
+  for (const Tally& tally : tallies) {
+    sum.hits += tally.check.hits;
+    sum.missed_hits += tally.check.missed_hits;
+    sum.false_hits += tally.check.false_hits;
+    sum.wrong_surface += tally.check.wrong_surface;
+    sum.wrong_primitive += tally.check.wrong_primitive;
+    sum.cracks += tally.check.cracks;
+    errors.insert(errors.end(), tally.t_errors.begin(), tally.t_errors.end());
+  }
+  sum.rays = rays.size();
+  if (!errors.empty()) {
+    sum.t_error_ulp_median = quantile(errors, 0.5);
+    sum.t_error_ulp_p99 = quantile(errors, 0.99);
+    sum.t_error_ulp_max = *std::max_element(errors.begin(), errors.end());
+  }
+  return sum;
+}
+
+AnswerCheck check_any_hits(std::span<const Ray> rays, std::span<const std::uint8_t> truth,
+                           std::span<const std::uint8_t> answers) {
+  expect_one_size(rays.size(), truth.size(), answers.size());
+  AnswerCheck sum;
+  sum.rays = rays.size();
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (answers[i] != 0) ++sum.hits;
+    if (truth[i] != 0 && answers[i] == 0) ++sum.missed_hits;
+    if (truth[i] == 0 && answers[i] != 0) ++sum.false_hits;
+  }
+  return sum;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,23 @@
+// The comparison of given answers with the exact ones, ray by ray.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "oracle/oracle.h"
+#include "oracle/surface_adjacency.h"
+
+namespace arboretum {
+
+/// Relative difference of t beyond which a hit is on the wrong surface.
+inline constexpr double kSurfaceTolerance = 0x1p-12;
+
+/// `adjacency` is called, from any thread, only when an answer could be a crack.
+[[nodiscard]] AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> rays,
+                                             std::span<const ExactHit> truth, std::span<const Hit> answers,
+                                             const std::function<const SurfaceAdjacency&()>& adjacency);
+[[nodiscard]] AnswerCheck check_any_hits(std::span<const Ray> rays, std::span<const std::uint8_t> truth,
+                                         std::span<const std::uint8_t> answers);
+
+}  // namespace arboretum

@@ -1,0 +1,210 @@
+// Error bounds. u = 2^-53. Every operand is a float32, a multiple of 2^-149 below 2^128 in size; so every value of degree
+// three here is 0 or between 2^-447 and 2^390, a quotient of two such between 2^-840 and 2^840, and the low parts of
+// double-doubles are multiples of the same grids: nothing under- or overflows and relative bounds hold throughout.
+//
+// det[p, q, r] in doubles: p and q are differences of float32 numbers (one rounding each), then there are five roundings on
+// the longest way (determinant.h): each of the six products carries at most seven factors (1 + e), |e| <= u. With
+// |p|, |q|, |r| the largest components the products sum to at most 6 |p||q||r|, so the error is below
+// 6 * 7.01 u |p||q||r|. r itself may be such a difference: eight factors, 6 * 8.01 u = 48.1 u. kDoubleBound = 56 u leaves room for the
+// roundings of |p|, |q|, |r| and of the bound itself.
+//
+// In double-doubles the differences are exact, five operations remain, each within 10 * 2^-106: 6 * 5.01 * 10 * 2^-106 < 2^-97.
+#include "oracle/exact_predicate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace arboretum {
+namespace {
+
+constexpr double kDoubleBound = 56 * 0x1p-53;
+constexpr double kDoubleDoubleBound = 0x1p-96;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Triple<double> widen(Vec3f p) { return {p.x, p.y, p.z}; }
+
+Triple<double> operator-(const Triple<double>& a, const Triple<double>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+/// Exact.
+Triple<DoubleDouble> difference(const Triple<double>& a, const Triple<double>& b) {
+  return {two_sum(a[0], -b[0]), two_sum(a[1], -b[1]), two_sum(a[2], -b[2])};
+}
+
+double size_of(const Triple<double>& a) { return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])}); }
+double size_of(const Triple<DoubleDouble>& a) {
+  return std::max({std::fabs(a[0].hi), std::fabs(a[1].hi), std::fabs(a[2].hi)});
+}
+
+int sign_beyond(double value, double bound) { return value > bound ? 1 : value < -bound ? -1 : 0; }
+
+double down(double x) { return std::nextafter(x, -kInfinity); }
+double up(double x) { return std::nextafter(x, kInfinity); }
+
+/// Half the width of an interval around numerator / denominator, given the errors of both, rounding of the quotient not
+/// counted: (n + dn) / (d + dd) - n / d = (dn - (n / d) dd) / (d + dd). Infinite where the denominator may be near 0.
+double quotient_error(double quotient, double numerator_error, double denominator, double denominator_error) {
+  const double size = std::fabs(denominator);
+  if (!(size > 2 * denominator_error)) return kInfinity;
+  return (numerator_error + std::fabs(quotient) * denominator_error) / (size - denominator_error) * (1 + 0x1p-48);
+}
+
+}  // namespace
+
+/// A quotient in double-double: the exact value is within `radius` of it.
+struct ExactPredicate::Approximate {
+  DoubleDouble value;
+  double radius = kInfinity;
+
+  static Approximate quotient(DoubleDouble n, double n_error, DoubleDouble d, double d_error) {
+    Approximate r;
+    if (!(std::fabs(d.hi) > 4 * d_error)) return r;
+    r.value = n / d;
+    r.radius = quotient_error(r.value.hi, n_error, d.hi, d_error * 1.5) + std::fabs(r.value.hi) * 0x1p-96;
+    return r;
+  }
+  [[nodiscard]] bool usable() const { return radius < kInfinity; }
+  [[nodiscard]] Enclosure enclosure() const {
+    return {down(value.hi + (value.lo - radius)), up(value.hi + (value.lo + radius))};
+  }
+};
+
+ExactPredicate::ExactPredicate(const Ray& ray) noexcept
+    : ray_(ray),
+      origin_(widen(ray.origin)),
+      direction_(widen(ray.direction)),
+      tnear_(ray.tnear),
+      tfar_(ray.tfar),
+      direction_size_(size_of(direction_)) {}
+
+bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
+  const Triple<double> a = widen(corners[0]) - origin_, b = widen(corners[1]) - origin_,
+                       c = widen(corners[2]) - origin_;
+  const double size_a = size_of(a), size_b = size_of(b), size_c = size_of(c);
+  const double scale = kDoubleBound * direction_size_;
+  int sign[3] = {sign_beyond(determinant(a, b, direction_), scale * size_a * size_b),
+                 sign_beyond(determinant(b, c, direction_), scale * size_b * size_c),
+                 sign_beyond(determinant(c, a, direction_), scale * size_c * size_a)};
+  const auto mixed = [&sign] {
+    return std::min({sign[0], sign[1], sign[2]}) < 0 && std::max({sign[0], sign[1], sign[2]}) > 0;
+  };
+  ++counts_.in_double;
+  if (mixed()) return false;
+  if (sign[0] == 0 || sign[1] == 0 || sign[2] == 0) {
+    Triple<DoubleDouble> p[3];
+    for (int k = 0; k < 3; ++k) p[k] = difference(widen(corners[static_cast<std::size_t>(k)]), origin_);
+    bool all_certain = true;
+    for (int k = 0; k < 3; ++k) {
+      if (sign[k] != 0) continue;
+      bool certain = false;
+      sign[k] = edge_sign_in_double_double(p[k], p[(k + 1) % 3], direction_size_, certain);
+      all_certain = all_certain && certain;
+    }
+    ++counts_.in_double_double;
+    if (mixed()) return false;
+    if (!all_certain) {
+      ++counts_.in_integers;
+      const std::array<int, 3> exact = exact_edge_signs(ray_, corners);
+      std::copy(exact.begin(), exact.end(), sign);
+      if (mixed() || (sign[0] == 0 && sign[1] == 0 && sign[2] == 0)) return false;
+    }
+  }
+  return within_interval(corners, t);
+}
+
+int ExactPredicate::edge_sign_in_double_double(const Triple<DoubleDouble>& p, const Triple<DoubleDouble>& q,
+                                               double scale, bool& certain) const {
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
+  const int sign = sign_beyond(determinant(p, q, d).hi, kDoubleDoubleBound * scale * size_of(p) * size_of(q));
+  certain = sign != 0;
+  return sign;
+}
+
+ExactPredicate::Approximate ExactPredicate::approximate_t(const Corners& corners) const {
+  const Triple<double> pa = widen(corners[0]);
+  const Triple<DoubleDouble> a = difference(pa, origin_), e1 = difference(widen(corners[1]), pa),
+                             e2 = difference(widen(corners[2]), pa);
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
+  const Triple<DoubleDouble> normal = cross(e1, e2);
+  const double scale = kDoubleDoubleBound * size_of(e1) * size_of(e2);
+  return Approximate::quotient(dot(normal, a), scale * size_of(a), dot(normal, d), scale * direction_size_);
+}
+
+bool ExactPredicate::within_interval(const Corners& corners, Enclosure& t) {
+  const auto decided = [&](const Enclosure& e, bool& inside) {
+    if (e.upper < tnear_ || e.lower > tfar_) return inside = false, true;
+    if (e.lower >= tnear_ && e.upper <= tfar_) return inside = true, true;
+    return false;
+  };
+  bool inside = false;
+  {
+    const Triple<double> pa = widen(corners[0]), a = pa - origin_, e1 = widen(corners[1]) - pa,
+                         e2 = widen(corners[2]) - pa, normal = cross(e1, e2);
+    const double scale = kDoubleBound * size_of(e1) * size_of(e2), denominator = dot(normal, direction_);
+    const double quotient = dot(normal, a) / denominator;
+    // The last term covers the rounding of the quotient and of the two interval ends.
+    const double radius = quotient_error(quotient, scale * size_of(a), denominator, scale * direction_size_) +
+                          std::fabs(quotient) * 0x1p-51;
+    if (radius < kInfinity) {
+      t = {quotient - radius, quotient + radius};
+      if (decided(t, inside)) return ++counts_.in_double, inside;
+    }
+  }
+  const Approximate approximate = approximate_t(corners);
+  if (approximate.usable()) {
+    t = approximate.enclosure();
+    if (decided(t, inside)) return ++counts_.in_double_double, inside;
+  }
+  ++counts_.in_integers;
+  const ExactFraction exact = exact_point(ray_, corners).t;
+  const double rounded = to_double(exact);
+  t = rounded == 0.0 ? Enclosure{0.0, 0.0} : Enclosure{down(rounded), up(rounded)};
+  const auto not_below = [&](double limit) { return std::isinf(limit) ? limit < 0 : compare(exact, limit) >= 0; };
+  const auto not_above = [&](double limit) { return std::isinf(limit) ? limit > 0 : compare(exact, limit) <= 0; };
+  return not_below(tnear_) && not_above(tfar_);
+}
+
+int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
+  if (first == second) return 0;
+  const Approximate p = approximate_t(first), q = approximate_t(second);
+  if (p.usable() && q.usable()) {
+    const DoubleDouble difference = p.value - q.value;
+    const double bound = (p.radius + q.radius) * (1 + 0x1p-50) + (std::fabs(p.value.hi) + std::fabs(q.value.hi)) * 0x1p-100;
+    if (const int sign = sign_beyond(difference.hi, bound)) return ++counts_.in_double_double, sign;
+  }
+  ++counts_.in_integers;
+  return compare(exact_point(ray_, first).t, exact_point(ray_, second).t);
+}
+
+RoundedPoint ExactPredicate::round(const Corners& corners) {
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
+  const Triple<double> pa = widen(corners[0]), pb = widen(corners[1]), pc = widen(corners[2]);
+  const Triple<DoubleDouble> a = difference(pa, origin_), b = difference(pb, origin_), c = difference(pc, origin_),
+                             e1 = difference(pb, pa), e2 = difference(pc, pa), normal = cross(e1, e2);
+  const double scale = kDoubleDoubleBound * size_of(e1) * size_of(e2);
+  const DoubleDouble denominator = dot(normal, d);
+  const double denominator_error = scale * direction_size_;
+  const double edge_scale = kDoubleDoubleBound * direction_size_ * size_of(a);
+  const Approximate point[3] = {
+      Approximate::quotient(dot(normal, a), scale * size_of(a), denominator, denominator_error),
+      Approximate::quotient(determinant(c, a, d), edge_scale * size_of(c), denominator, denominator_error),
+      Approximate::quotient(determinant(a, b, d), edge_scale * size_of(b), denominator, denominator_error)};
+  float rounded[3];
+  bool certain = std::fabs(point[0].value.hi) * 0x1p-54 >= point[0].radius;
+  for (int k = 0; k < 3 && certain; ++k) {
+    if (!point[k].usable()) { certain = false; break; }
+    const Enclosure e = point[k].enclosure();
+    constexpr double kMax = std::numeric_limits<float>::max();
+    certain = std::fabs(e.lower) <= kMax && std::fabs(e.upper) <= kMax &&
+              static_cast<float>(e.lower) == static_cast<float>(e.upper);
+    rounded[k] = certain ? static_cast<float>(e.lower) : 0.0f;
+  }
+  if (certain) return ++counts_.in_double_double, RoundedPoint{point[0].value.hi, rounded[0], rounded[1], rounded[2]};
+  ++counts_.in_integers;
+  const ExactPoint exact = exact_point(ray_, corners);
+  return {to_double(exact.t), round_to_float(exact.t), round_to_float(exact.u), round_to_float(exact.v)};
+}
+
+}  // namespace arboretum
