@@ -1,0 +1,66 @@
+"""Horizontal bars, one a built structure, one panel a scene: what sah_cost and build_time have in common."""
+
+from results import NoData, axis_sort_key, ordered, undetermined_axes
+from style import colour, hatch, panels
+
+
+def bar_panels(results, value_of, axis_label, note_of, label_axes):
+    """`value_of(cell)` gives (median, low, high) or None; `note_of(cell)` the text at a bar's end.
+
+    `label_axes` are the axes that may tell bars of a scene apart; those that the ones before settle are not written.
+    Cells that are alike in them and in value are one bar.
+    """
+    cells = [c for c in results.structures if value_of(c)]
+    if not cells:
+        raise NoData("no structure has this figure")
+    varied = [a for a in undetermined_axes(cells, ("scene", "structure", *label_axes)) if a in label_axes]
+    scenes = ordered((c["scene"] for c in cells), "scene")
+    bars = {scene: scene_bars([c for c in cells if c["scene"] == scene], value_of, varied) for scene in scenes}
+
+    columns = min(2, len(scenes))
+    rows = -(-len(scenes) // columns)
+    tallest = max(len(b) for b in bars.values())
+    figure, axes = panels(rows, columns, 5.6, 0.9 + 0.26 * tallest)
+    figure.get_layout_engine().set(w_pad=0.15)
+    for index, axis in enumerate(axes.flat):
+        if index >= len(scenes):
+            axis.set_visible(False)
+            continue
+        draw_panel(axis, bars[scenes[index]], value_of, note_of, varied)
+        axis.set_title(scenes[index])
+        axis.set_xlabel(axis_label)
+    return figure
+
+
+def scene_bars(cells, value_of, varied):
+    """The cells of a scene in drawing order, doubles left out (a SAH cost that is the same on every ISA)."""
+    seen, kept = set(), []
+    for cell in cells:
+        key = (cell["structure"], *(cell[a] for a in varied if a != "isa"), round(value_of(cell)[0], 12))
+        if key not in seen:
+            seen.add(key)
+            kept.append(cell)
+    order = {s: i for i, s in enumerate(ordered((c["structure"] for c in cells), "structure"))}
+    return sorted(kept, key=lambda c: (order[c["structure"]], [axis_sort_key(a)(c[a]) for a in varied]))
+
+
+def draw_panel(axis, cells, value_of, note_of, varied):
+    for place, cell in enumerate(cells):
+        median, low, high = value_of(cell)
+        axis.barh(place, median, 0.74, color=colour(cell["structure"]), hatch=hatch(cell["structure"]),
+                  edgecolor="white", linewidth=0.5, xerr=None if low == high else [[median - low], [high - median]],
+                  error_kw={"elinewidth": 0.9, "ecolor": "#222222"})
+        axis.annotate(note_of(cell), (high, place), (5, 0), textcoords="offset points", va="center", fontsize=8.5)
+    axis.set_yticks(range(len(cells)), [" ".join([c["structure"]] + [label(a, c[a]) for a in varied if c[a]]) for c in cells])
+    axis.set_ylim(len(cells) - 0.4, -0.6)
+    axis.set_xlim(0, 1.02 * max(value_of(c)[2] for c in cells) or 1.0)
+    axis.grid(axis="y", visible=False)
+
+
+def short(value):
+    """Three digits or all before the point, without an exponent for what a build takes."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:#.3g}"
+
+
+def label(axis, key):
+    return f"{key} thread{'' if key == '1' else 's'}" if axis == "threads" else key

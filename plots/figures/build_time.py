@@ -1,0 +1,19 @@
+"""Build time, from mesh to a structure ready for rays: one panel a scene."""
+
+from figures.bars import bar_panels, short
+
+TITLE = "Build time"
+CAPTION = ("Wall time from mesh to a structure ready for rays, with the 95 % confidence interval of the median where a build "
+           "was repeated; beside it, triangles a second. Lower is better.")
+
+
+def draw(results):
+    def value(cell):
+        found = cell.estimate("build_seconds")
+        return found and (1e3 * found.median, 1e3 * found.low, 1e3 * found.high)
+
+    def note(cell):
+        rate = cell.value("triangles_per_second")
+        return f"{short(value(cell)[0])} ms" + (f", {rate / 1e6:.2f} Mtri/s" if rate else "")
+
+    return bar_panels(results, value, "build time, ms", note, ("builder", "threads", "isa", "leaf"))

@@ -1,0 +1,20 @@
+"""How a cell is traced, in a few words: those axes of builder to threads that tell cells of these results apart."""
+
+from results import axis_sort_key, swept_axes
+
+
+class Modes:
+    """`label(cell)` is short and the same for cells that are traced alike; `labels` has all of them, in order."""
+
+    def __init__(self, cells):
+        swept = swept_axes(cells)
+        varied = [a for a in ("intersector", "box", "traversal", "threads") if len({c[a] for c in cells}) > 1]
+        self.axes = [a for a in ("builder", "leaf") if a in swept] + varied
+        found = {}
+        for cell in cells:
+            found.setdefault(self.label(cell), [axis_sort_key(a)(cell[a]) for a in self.axes])
+        self.labels = sorted(found, key=found.get)
+
+    def label(self, cell):
+        parts = [cell[a] + (" threads" if a == "threads" else "") for a in self.axes]
+        return ", ".join(p for p in parts if p) or "one mode"

@@ -1,0 +1,15 @@
+"""SAH cost of what was built: one panel a scene."""
+
+from figures.bars import bar_panels
+
+TITLE = "SAH cost"
+CAPTION = ("Expected cost of a ray through the root's box, in units of a leaf block test. Lower is better. Structures that "
+           "cannot be looked into, as embree, have none.")
+
+
+def draw(results):
+    def value(cell):
+        cost = cell.value("sah_cost")
+        return None if cost is None else (cost, cost, cost)
+
+    return bar_panels(results, value, "SAH cost", lambda c: f"{value(c)[0]:.1f}", ("builder", "leaf", "isa"))

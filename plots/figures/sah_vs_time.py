@@ -1,0 +1,76 @@
+"""How well the SAH cost foretells the measured time: one panel a workload and instruction set."""
+
+import numpy as np
+
+from results import NoData, ordered
+from style import colour, legends_right, marker_legend, marker_map, panels, structure_legend
+
+TITLE = "SAH cost against measured time"
+CAPTION = ("A point is a structure on a scene, traced in its fastest mode. The line is the least-squares fit through a panel's "
+           "points, R² its share of the variance explained. Structures of different branching factor differ in what a "
+           "step costs, so a low R² across structures is a finding, not a fault.")
+
+
+def draw(results):
+    metric, _ = results.throughput()
+    points = fastest_points(results, metric)
+    if not points:
+        raise NoData("no traced cell has a SAH cost")
+    workloads = ordered((c["workload"] for c, _, _ in points), "workload")
+    isas = ordered((c["isa"] for c, _, _ in points), "isa")
+    scenes = ordered((c["scene"] for c, _, _ in points), "scene")
+    structures = ordered((c["structure"] for c, _, _ in points), "structure")
+    markers = marker_map(scenes)
+
+    figure, axes = panels(len(workloads), len(isas), 3.3, 2.9, sharex=True, sharey="row")
+    for row, workload in enumerate(workloads):
+        for column, isa in enumerate(isas):
+            here = [p for p in points if p[0]["workload"] == workload and p[0]["isa"] == isa]
+            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}")
+        axes[row][0].set_ylabel("time, ns a ray")
+        axes[row][0].set_ylim(0, 1.08 * max(p[2] for p in points if p[0]["workload"] == workload))
+    axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))
+    for axis in axes[-1]:
+        axis.set_xlabel("SAH cost")
+    legends_right(figure, [("structure", structure_legend(structures)), ("scene", marker_legend(markers))])
+    return figure
+
+
+def fastest_points(results, metric):
+    """(cell, SAH cost, ns a ray) of the fastest mode of each structure as built, scene, workload and ISA."""
+    best = {}
+    for cell in results.traces:
+        rate, cost = cell.value(metric), results.structure_value(cell, "sah_cost")
+        if not rate or cost is None:
+            continue
+        key = tuple(cell[a] for a in ("scene", "structure", "builder", "leaf", "isa", "workload", "threads"))
+        if key not in best or 1e9 / rate < best[key][2]:
+            best[key] = (cell, cost, 1e9 / rate)
+    return list(best.values())
+
+
+def panel(axis, points, markers, title):
+    for cell, cost, nanoseconds in points:
+        axis.plot(cost, nanoseconds, markers[cell["scene"]], color=colour(cell["structure"]), markersize=7,
+                  markeredgecolor="white", markeredgewidth=0.7)
+    fit = linear_fit([p[1] for p in points], [p[2] for p in points])
+    if fit:
+        slope, offset, r2 = fit
+        ends = np.array([min(p[1] for p in points), max(p[1] for p in points)])
+        axis.plot(ends, slope * ends + offset, "-", color="#777777", linewidth=1, zorder=1)
+        title += f"   R² = {r2:.2f} (n = {len(points)})"
+    elif points:
+        title += f"   (n = {len(points)}, no fit)"
+    else:
+        axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
+    axis.set_title(title)
+
+
+def linear_fit(x, y):
+    """(slope, offset, R²) by least squares; None below three points or where a coordinate does not vary."""
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if x.size < 3 or np.ptp(x) == 0 or np.ptp(y) == 0:
+        return None
+    slope, offset = np.polyfit(x, y, 1)
+    residual = y - (slope * x + offset)
+    return slope, offset, 1.0 - float(residual @ residual) / float(((y - y.mean()) ** 2).sum())

@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Draws the figures and the report of a result folder: plot.py RESULTS [--only name,...]. Measures nothing.
+
+Exit status: 0 done, 2 the folder cannot be read or a figure is unknown.
+"""
+
+import argparse
+import difflib
+import importlib
+import os
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+SYSTEM_PYTHON = "/usr/bin/python3"
+
+
+def need_matplotlib():
+    """A python3 earlier on the PATH may lack matplotlib where the system's own has it: then that one goes on."""
+    try:
+        import matplotlib  # noqa: F401
+        import numpy  # noqa: F401
+    except ImportError as error:
+        if os.path.realpath(sys.executable) != os.path.realpath(SYSTEM_PYTHON) and os.access(SYSTEM_PYTHON, os.X_OK):
+            os.execv(SYSTEM_PYTHON, [SYSTEM_PYTHON, *sys.argv])
+        fail(f"{error}; install it with: sudo apt-get install -y python3-matplotlib python3-numpy")
+
+
+def fail(message):
+    print(f"error: {message}", file=sys.stderr)
+    sys.exit(2)
+
+
+def chosen(only, known):
+    names = [name.strip() for name in only.split(",") if name.strip()] if only else list(known)
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1, 0.0)[0]
+            fail(f"no figure is called '{name}'; the nearest is '{near}' (all: {', '.join(known)})")
+    return names
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("results", metavar="RESULTS", help="a folder that `run` wrote")
+    parser.add_argument("--only", metavar="name,...", help="these figures alone")
+    parser.add_argument("--no-report", action="store_true", help="the figures, without report.html")
+    arguments = parser.parse_args()
+    need_matplotlib()
+
+    import figures
+    import report
+    import style
+    from results import NoData, ResultError, load
+
+    names = chosen(arguments.only, figures.ALL)
+    try:
+        results = load(arguments.results)
+        drawn = []
+        for name in names:
+            module = importlib.import_module(f"figures.{name}")
+            try:
+                style.save(module.draw(results), results.folder, name)
+            except NoData as reason:
+                print(f"{name}: left out, {reason}")
+                drawn.append((name, module, str(reason)))
+                continue
+            print(f"{results.folder / name}.png .svg")
+            drawn.append((name, module, None))
+        if not arguments.no_report:
+            print(report.write(results, drawn))
+    except ResultError as error:
+        fail(str(error))
+    except OSError as error:
+        fail(f"{error.filename or arguments.results}: {error.strerror}; the figures could not be written")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""report.html: one page that needs nothing beside it, with the figures, the tables, what was skipped, and how to repeat it."""
+
+import base64
+import json
+import shlex
+from html import escape
+from pathlib import Path
+from string import Template
+
+import tables
+
+
+def write(results, drawn):
+    """`drawn`: (name, module, why left out or None). Returns the page's path."""
+    metric, _ = results.throughput()
+    wrong = sum(max(c.values("wrong_answers"), default=0) for c in results.traces)
+    parts = [f"<h1>{escape(results.name)}</h1>", f'<p class="soft">{escape(subtitle(results))}</p>']
+    parts.append('<nav><a href="#fastest-structures">Fastest</a><a href="#figures">Figures</a>'
+                 '<a href="#all-cells">All cells</a><a href="#built">Structures</a><a href="#skipped">Skipped</a>'
+                 '<a href="#machine">Machine</a><a href="#again">Reproduce</a></nav>')
+    if not results.complete:
+        parts.append('<p class="bad">The run was cut off: these are the cells that had ended. '
+                     "<code>--resume</code> measures the rest.</p>")
+    parts += [f'<p class="bad">Warning: {escape(text)}</p>' for text in warnings(results.context)]
+    parts.append(f"<p>{len(results.traces)} cells measured, {len(results.skipped)} skipped, "
+                 f"{'no wrong answer' if wrong == 0 else f'{wrong:,.0f} wrong answers, counted cell by cell below'}.</p>")
+    parts.append('<h2 id="fastest-structures">Fastest structure</h2>' + tables.best_table(results))
+    parts.append('<h2 id="figures">Figures</h2>' + "\n".join(figure(results.folder, *each) for each in drawn))
+    parts.append('<h2 id="all-cells">All cells</h2>' + tables.throughput_table(results))
+    parts.append('<h2 id="built">Structures as built</h2>' + tables.structure_table(results))
+    parts.append('<h2 id="skipped">Skipped cells</h2>' + tables.skipped_list(results.skipped))
+    parts.append('<h2 id="machine">Machine and build</h2>' + tables.facts_table(facts(results.context)))
+    parts.append('<h2 id="again">How to reproduce</h2>' + reproduce(results))
+    template = Template((Path(__file__).parent / "report_template.html").read_text(encoding="utf-8"))
+    page = template.substitute(title=escape(f"{results.name}: Arboretum report"), body="\n".join(parts))
+    path = results.folder / "report.html"
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+def subtitle(results):
+    found = [results.context.get(key) for key in ("date", "cpu", "cpu_model", "host_name")]
+    return ", ".join(str(v) for v in found if v)
+
+
+def warnings(context):
+    found = context.get("warnings") or context.get("warning") or []
+    return [str(w) for w in (found if isinstance(found, list) else [found])]
+
+
+def figure(folder, name, module, reason):
+    head = f'<h3 id="{escape(name)}">{escape(module.TITLE)}</h3>'
+    if reason:
+        return f'{head}<p class="soft">Not drawn: {escape(reason)}.</p>'
+    picture = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode("ascii")
+    return (f'{head}<figure><img alt="{escape(module.TITLE)}" src="data:image/svg+xml;base64,{picture}">'
+            f"<figcaption>{escape(module.CAPTION)}</figcaption></figure>")
+
+
+def facts(context):
+    """The context, flattened to lines that a person reads; long texts come with the reproduction."""
+    found = []
+    for key, value in context.items():
+        if key in ("experiment", "warnings", "warning"):
+            continue
+        if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
+            value = "; ".join(", ".join(f"{k} {v}" for k, v in item.items()) for item in value)
+        elif isinstance(value, (dict, list)):
+            value = json.dumps(value)
+        found.append((key.replace("_", " "), value))
+    return found
+
+
+def reproduce(results):
+    context = results.context
+    parts = []
+    command = context.get("command") or context.get("command_line")
+    if isinstance(command, list):
+        command = shlex.join(str(c) for c in command)
+    revision = context.get("git_revision") or context.get("revision")
+    lines = [f"git checkout {revision}"] if revision else []
+    lines.append(str(command) if command else "./arboretum run effective.yaml")
+    parts.append(f"<pre>{escape(chr(10).join(lines))}</pre>")
+    if str(context.get("git_dirty", context.get("dirty", ""))).lower() in ("true", "1", "yes"):
+        parts.append('<p class="bad">The tree had changes that no revision holds: these figures cannot be repeated exactly.</p>')
+    for key in ("config_hash", "configuration_hash"):
+        if context.get(key):
+            parts.append(f"<p>Hash of the configuration: <code>{escape(str(context[key]))}</code></p>")
+    if results.effective_yaml:
+        parts.append("<p>The effective configuration, every default filled in (<code>effective.yaml</code>):</p>"
+                     f"<pre>{escape(results.effective_yaml)}</pre>")
+    return "\n".join(parts)

@@ -1,0 +1,265 @@
+"""Reads a result folder: results.json, else cells.jsonl (a run that was cut off). Knows no figure and no style.
+
+A *row* is one repetition as it stands in the file. A *cell* gathers the rows of one combination of the axes. Throughput
+is summed up by the median and a bootstrap confidence interval, so that one disturbed repetition does not count.
+"""
+
+import json
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
+STRUCTURE_AXES = ("scene", "structure", "builder", "leaf", "isa", "threads")  # what a build depends on at most
+ISA_ORDER = ("scalar", "sse", "avx2", "avx512")
+WORKLOAD_ORDER = ("primary", "shadow", "ambient_occlusion", "reflection", "diffuse", "random", "whitted", "path")
+METRICS = ("trace", "build", "quality", "accuracy")
+SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
+
+
+class ResultError(Exception):
+    """One line for the user: what, where, the mend."""
+
+
+class NoData(Exception):
+    """Why a figure cannot be drawn from these results."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Median with a 95 % confidence interval; `low` and `high` equal the median below three samples."""
+
+    median: float
+    low: float
+    high: float
+    samples: int
+
+
+@dataclass
+class Cell:
+    """One combination of the axes: `axes` holds the keys, `rows` every repetition of every metric."""
+
+    axes: dict
+    rows: list = field(default_factory=list)
+
+    def values(self, name):
+        """The finite numbers that the rows hold under `name`."""
+        found = (row.get(name) for row in self.rows)
+        return [float(v) for v in found if is_number(v)]
+
+    def value(self, name):
+        """The median of `name` over the rows; None where no row has it."""
+        values = self.values(name)
+        return float(np.median(values)) if values else None
+
+    def estimate(self, name):
+        values = self.values(name)
+        return estimate(values) if values else None
+
+    def per_million(self, name):
+        """A count of answers per million rays; None where the cell was not checked."""
+        rates = [1e6 * row[name] / row["rays"] for row in self.rows
+                 if is_number(row.get(name)) and is_number(row.get("rays")) and row["rays"] > 0]
+        return max(rates) if rates else None
+
+    def __getitem__(self, axis):
+        return self.axes.get(axis, "")
+
+
+@dataclass
+class Results:
+    folder: Path
+    context: dict
+    traces: list      # cells that have a throughput
+    structures: list  # cells (scene, structure, builder, leaf, isa, threads) with build or quality figures
+    skipped: list     # (cell name, reason)
+    effective_yaml: str
+    complete: bool    # False: read from cells.jsonl
+    _structure_index: dict = field(default_factory=dict)
+
+    @property
+    def name(self):
+        return str(self.context.get("experiment") or self.folder.resolve().name)
+
+    def throughput(self):
+        """Which figure stands for speed, and its label: thread CPU time as long as every cell has one thread."""
+        single = all(cell["threads"] in ("", "1") and cell.values("rays_per_cpu_second") for cell in self.traces)
+        if self.traces and single:
+            return "rays_per_cpu_second", "Mray/s, thread CPU time"
+        return "rays_per_second", "Mray/s, wall time"
+
+    def structure_value(self, cell, name):
+        """A figure of the structure that `cell` traces: the cell's own, else that of the build it shares."""
+        own = cell.value(name)
+        if own is not None:
+            return own
+        if name not in self._structure_index:
+            index = self._structure_index[name] = {}
+            for other in self.structures:
+                value = other.value(name)
+                for length in range(4, len(STRUCTURE_AXES) + 1) if value is not None else ():
+                    index.setdefault(tuple(other[a] for a in STRUCTURE_AXES[:length]), value)
+        keys = [cell[a] for a in STRUCTURE_AXES]
+        found = (self._structure_index[name].get(tuple(keys[:length])) for length in range(len(keys), 3, -1))
+        return next((value for value in found if value is not None), None)
+
+
+def is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def estimate(values, resamples=2000):
+    """Median and percentile-bootstrap interval. The generator's seed is fixed: the same file gives the same figure."""
+    samples = np.asarray(values, dtype=float)
+    median = float(np.median(samples))
+    if samples.size < 3:
+        return Estimate(median, median, median, samples.size)
+    picks = np.random.default_rng(1).integers(0, samples.size, (resamples, samples.size))
+    low, high = np.percentile(np.median(samples[picks], axis=1), (2.5, 97.5))
+    return Estimate(median, float(low), float(high), samples.size)
+
+
+def axis_sort_key(axis):
+    """Orders an axis's keys: ISAs by age, workloads as the manual lists them, others by their text with numbers as
+    numbers (bvh4 before bvh16)."""
+    fixed = {"isa": ISA_ORDER, "workload": WORKLOAD_ORDER}.get(axis, ())
+
+    def key(value):
+        text = str(value)
+        if text in fixed:
+            return [(0, fixed.index(text), "")]
+        parts = re.split(r"(\d+)", text)
+        return [(1, int(p), "") if p.isdigit() else (2, 0, p) for p in parts if p]
+    return key
+
+
+def ordered(values, axis):
+    """Distinct values of an axis, in a fixed order, embree last."""
+    key = axis_sort_key(axis)
+    return sorted(set(values), key=lambda v: (str(v) == "embree", key(v)))
+
+
+def swept_axes(cells):
+    """The axes of which at least two cells differ in nothing else."""
+    found = set()
+    for axis in AXES:
+        seen = {}
+        for cell in cells:
+            rest = tuple(cell[a] for a in AXES if a != axis)
+            seen.setdefault(rest, set()).add(cell[axis])
+        if any(len(values) > 1 for values in seen.values()):
+            found.add(axis)
+    return found
+
+
+def undetermined_axes(cells, axes):
+    """Those of `axes` that the ones before them do not settle: what must be said to tell the cells apart."""
+    kept = []
+    for axis in axes:
+        seen = {}
+        for cell in cells:
+            seen.setdefault(tuple(cell[a] for a in kept), set()).add(cell[axis])
+        if any(len(values) > 1 for values in seen.values()):
+            kept.append(axis)
+    return kept
+
+
+def load(folder):
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ResultError(f"{folder}: no such folder; give the folder that `run` wrote")
+    rows, context, skipped, complete = read_rows(folder)
+    yaml_file = folder / "effective.yaml"
+    effective = yaml_file.read_text(encoding="utf-8", errors="replace") if yaml_file.is_file() else ""
+    traces, structures = gather(rows)
+    return Results(folder, context, traces, structures, skipped, effective, complete)
+
+
+def read_rows(folder):
+    whole, lines = folder / "results.json", folder / "cells.jsonl"
+    if whole.is_file():
+        try:
+            document = json.loads(whole.read_text(encoding="utf-8"))
+            context, entries = dict(document.get("context") or {}), list(document.get("benchmarks") or [])
+        except (ValueError, AttributeError, TypeError) as error:
+            raise ResultError(f"{whole}: not the JSON that `run` writes ({error}); measure again, or remove it to "
+                              f"read cells.jsonl instead") from error
+        skipped = read_skipped(document.get("skipped") or context.pop("skipped", None))
+        return choose_rows(entries), context, skipped, True
+    if lines.is_file():
+        entries, context = [], {}
+        for line in lines.read_text(encoding="utf-8", errors="replace").splitlines():
+            try:
+                cell = json.loads(line)
+            except ValueError:
+                continue  # the line under way when the run was cut off
+            if not isinstance(cell, dict):
+                continue
+            context = cell.get("context") or context
+            common = {k: v for k, v in cell.items() if k not in ("repetitions", "benchmarks", "context")}
+            repetitions = cell.get("repetitions") or cell.get("benchmarks")
+            for row in repetitions if isinstance(repetitions, list) else [{}]:
+                entries.append({**common, **row} if isinstance(row, dict) else dict(common))
+        return choose_rows(entries), context, [], False
+    raise ResultError(f"{folder}: neither results.json nor cells.jsonl here; give the folder that `run` wrote")
+
+
+def read_skipped(skipped):
+    """[{name, reason}] or {name: reason} -> [(name, reason)]."""
+    if isinstance(skipped, dict):
+        return [(str(name), str(reason)) for name, reason in skipped.items()]
+    found = []
+    for item in skipped or []:
+        if isinstance(item, dict):
+            found.append((str(item.get("name") or item.get("cell") or "?"), str(item.get("reason") or "no reason given")))
+        else:
+            found.append((str(item), "no reason given"))
+    return found
+
+
+def choose_rows(entries):
+    """The repetitions; a cell of which only aggregates were kept gives its median."""
+    entries = [e for e in entries if isinstance(e, dict) and not e.get("error_occurred")]
+    rows = [e for e in entries if e.get("run_type", "iteration") != "aggregate"]
+    known = {e.get("run_name") or e.get("name") for e in rows}
+    rows += [e for e in entries if e.get("run_type") == "aggregate" and e.get("aggregate_name") == "median"
+             and e.get("run_name") not in known]
+    return rows
+
+
+def axes_of(row):
+    """The axes of a row: its own fields, else the parts of its name."""
+    parts = str(row.get("run_name") or row.get("name") or "").split("/")
+    named = {}
+    if parts and parts[0] in METRICS and len(parts) > len(AXES):
+        named = dict(zip(AXES, parts[1:]))
+    axes = {axis: row.get(axis, named.get(axis, "")) for axis in AXES}
+    if isinstance(row.get("threads"), float):
+        axes["threads"] = int(row["threads"])
+    return {axis: "" if value == "-" else str(value).removeprefix("threads:") for axis, value in axes.items()}
+
+
+def gather(rows):
+    traces, structures = {}, {}
+    for row in rows:
+        axes = axes_of(row)
+        if is_number(row.get("rays_per_second")) or is_number(row.get("rays_per_cpu_second")):
+            traces.setdefault(tuple(axes.values()), Cell(axes)).rows.append(row)
+    def add_structures(names, known=frozenset()):
+        for row in rows:
+            axes = axes_of(row)
+            part = {axis: axes[axis] for axis in STRUCTURE_AXES}
+            key = tuple(part.values())
+            if key[:4] not in known and any(is_number(row.get(name)) for name in names):
+                structures.setdefault(key, Cell(part)).rows.append(row)
+
+    add_structures(["build_seconds"])  # what a build tells about itself goes before what traces repeat of it
+    add_structures(["sah_cost", "bytes"], {key[:4] for key in structures})
+    for row in rows:  # accuracy that was measured apart belongs to the cell of the same axes
+        cell = traces.get(tuple(axes_of(row).values()))
+        if cell is not None and not any(row is r for r in cell.rows) and is_number(row.get("wrong_answers")):
+            cell.rows.append(row)
+    return list(traces.values()), list(structures.values())

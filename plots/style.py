@@ -1,0 +1,78 @@
+"""One look for all figures: a colour a structure (the same in every figure), a marker a mode, units, saving.
+
+Colours are Paul Tol's `muted` scheme, which readers with any colour vision can tell apart; embree is dark grey and
+hatched, so that it stays apart in print too.
+"""
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
+from matplotlib.patches import Patch  # noqa: E402
+
+from results import ordered  # noqa: E402
+
+COLOURS = {
+    "kdtree": "#CC6677", "bvh2": "#88CCEE", "bvh4": "#44AA99", "bvh8": "#332288", "bvh16": "#882255",
+    "bvh4_aos": "#AA4499", "grid": "#999933", "octree": "#117733", "brute_force": "#DDCC77", "embree": "#555555",
+}
+SPARE_COLOURS = ("#6699CC", "#EE8866", "#997700", "#004488", "#994455", "#77AADD")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
+DPI = 160
+
+plt.rcParams.update({
+    "figure.facecolor": "white", "savefig.facecolor": "white", "axes.facecolor": "white",
+    "font.size": 10, "axes.titlesize": 10.5, "axes.labelsize": 10, "xtick.labelsize": 9.5, "ytick.labelsize": 9.5,
+    "legend.fontsize": 9, "legend.frameon": False, "axes.spines.top": False, "axes.spines.right": False,
+    "axes.grid": True, "grid.color": "#DDDDDD", "grid.linewidth": 0.7, "axes.axisbelow": True,
+    "svg.hashsalt": "arboretum", "hatch.linewidth": 0.6, "errorbar.capsize": 2.0,
+})
+
+
+def colour(structure):
+    """The structure's own colour; one that is new here gets a spare one by its name, the same in every figure."""
+    return COLOURS.get(structure) or SPARE_COLOURS[sum(map(ord, structure)) % len(SPARE_COLOURS)]
+
+
+def hatch(structure):
+    return "///" if structure == "embree" else None
+
+
+def structure_legend(structures):
+    """Legend handles, one a structure."""
+    return [Patch(facecolor=colour(s), edgecolor="white", hatch=hatch(s), label=s)
+            for s in ordered(structures, "structure")]
+
+
+def marker_map(keys):
+    """A marker for each key, in the order given; they repeat after the tenth."""
+    return {key: MARKERS[i % len(MARKERS)] for i, key in enumerate(keys)}
+
+
+def marker_legend(markers):
+    return [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="none", markersize=6, label=str(k))
+            for k, m in markers.items()]
+
+
+def legends_right(figure, legends):
+    """(title, handles) one below the other at the figure's right edge, outside all data; save() keeps them whole."""
+    height, top = figure.get_size_inches()[1], 0.98
+    for title, handles in legends:
+        figure.legend(handles=handles, title=title, loc="upper left", bbox_to_anchor=(1.0, top), alignment="left")
+        top -= (0.20 * len(handles) + 0.45) / height
+
+
+def panels(rows, columns, width, height, **options):
+    """A grid of axes, always two-dimensional. Sizes in inches, one panel's each."""
+    figure, axes = plt.subplots(rows, columns, figsize=(width * columns, height * rows), squeeze=False,
+                                layout="constrained", **options)
+    return figure, axes
+
+
+def save(figure, folder, name):
+    """Writes name.png and name.svg; the same data gives the same bytes."""
+    figure.savefig(folder / f"{name}.png", dpi=DPI, bbox_inches="tight", metadata={"Software": None})
+    figure.savefig(folder / f"{name}.svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
+    plt.close(figure)

@@ -1,0 +1,172 @@
+"""The tables of the report as HTML: every text is escaped, every throughput stands beside its wrong answers."""
+
+from html import escape
+
+from results import STRUCTURE_AXES, axis_sort_key, ordered
+
+PER_MILLION = (("wrong_answers", "wrong"), ("missed_hits", "missed"), ("false_hits", "false"),
+               ("wrong_surface", "wrong surface"), ("wrong_primitive", "wrong primitive"), ("cracks", "cracks"))
+
+
+def number(value, form="{:.3g}"):
+    """A table cell that sorts by the value itself; empty where there is none."""
+    if value is None:
+        return '<td class="number"></td>'
+    return f'<td class="number" data-v="{value!r}">{escape(form.format(value))}</td>'
+
+
+def text(value, key=False):
+    return f'<td{" class=key" if key else ""}>{escape(str(value))}</td>'
+
+
+def table(identity, heads, rows):
+    """`heads`: (label, numeric); `rows`: (html cells, css class). Sortable, with a filter above."""
+    head = "".join(f'<th scope="col"{" class=number" if numeric else ""}><button type="button">{escape(label)}</button></th>'
+                   for label, numeric in heads)
+    body = "\n".join(f'<tr{f" class={css}" if css else ""}>{"".join(cells)}</tr>' for cells, css in rows)
+    search = (f'<input type="search" data-table="{identity}" placeholder="filter, e.g. bvh8 avx2 diffuse" '
+              'aria-label="filter the rows">') if len(rows) > 15 else ""
+    return (f'{search}<div class="scroll"><table class="sortable" id="{identity}"><thead><tr>{head}'
+            f"</tr></thead><tbody>\n{body}\n</tbody></table></div>")
+
+
+def sorted_cells(cells, axes):
+    order = {a: {v: i for i, v in enumerate(ordered((c[a] for c in cells), a))} for a in axes}
+    return sorted(cells, key=lambda c: [order[a][c[a]] for a in axes])
+
+
+def embree_rates(results, metric):
+    """The fastest embree cell of each scene, workload, ISA and thread count: what ratios are to."""
+    best = {}
+    for cell in results.traces:
+        if cell["structure"] == "embree" and cell.value(metric):
+            key = beside(cell)
+            best[key] = max(best.get(key, 0.0), cell.value(metric))
+    return best
+
+
+def beside(cell):
+    return tuple(cell[a] for a in ("scene", "workload", "isa", "threads"))
+
+
+def shown_axes(cells, axes, always=("scene", "structure")):
+    """Axes worth a column: those that vary, and `always`."""
+    return [a for a in axes if a in always or len({c[a] for c in cells}) > 1]
+
+
+def constant_axes(cells, axes):
+    """'threads: 1, box: fast' for the axes that every cell shares."""
+    return ", ".join(f"{a}: {cells[0][a]}" for a in axes if len({c[a] for c in cells}) == 1 and cells[0][a])
+
+
+THROUGHPUT_AXES = ("scene", "workload", "isa", "structure", "builder", "leaf", "intersector", "box", "traversal", "threads")
+
+
+def throughput_table(results):
+    metric, unit = results.throughput()
+    cells = sorted_cells([c for c in results.traces if c.value(metric)], THROUGHPUT_AXES)
+    if not cells:
+        return "<p>No cell has a throughput.</p>"
+    axes = shown_axes(cells, THROUGHPUT_AXES)
+    reference = embree_rates(results, metric)
+    counts = [(name, label) for name, label in PER_MILLION if any(c.per_million(name) is not None for c in cells)]
+    extra = [(name, label) for name, label in (("nodes_per_ray", "nodes/ray"), ("triangles_per_ray", "tri/ray"),
+                                               ("simd_utilization", "lane use"), ("t_error_ulp_p99", "t error p99, ulp"))
+             if any(c.value(name) is not None for c in cells)]
+    best = {}
+    for cell in cells:
+        best[beside(cell)] = max(best.get(beside(cell), 0.0), cell.value(metric))
+
+    heads = [(a, False) for a in axes] + [("Mray/s", True), ("95 % interval", False), ("wrong per million", True)]
+    heads += [("× embree", True)] if reference else []
+    heads += [("ns/ray", True)] + [(f"{label} per million", True) for name, label in counts if name != "wrong_answers"]
+    heads += [(label, True) for _, label in extra]
+    rows = []
+    for cell in cells:
+        rate = cell.estimate(metric)
+        out = [text(cell[a], key=a == "structure") for a in axes]
+        out += [number(rate.median / 1e6, "{:.2f}"), text(f"{rate.low / 1e6:.2f} – {rate.high / 1e6:.2f}")]
+        out.append(number(cell.per_million("wrong_answers"), "{:.4g}")
+                   if cell.per_million("wrong_answers") is not None else text("not checked"))
+        if reference:
+            base = reference.get(beside(cell))
+            out.append(number(rate.median / base if base else None, "{:.2f}"))
+        out.append(number(1e9 / rate.median, "{:.1f}"))
+        out += [number(cell.per_million(name), "{:.4g}") for name, _ in counts if name != "wrong_answers"]
+        out += [number(cell.value(name)) for name, _ in extra]
+        rows.append((out, "best" if rate.median == best[beside(cell)] else ""))
+    note = constant_axes(cells, [a for a in THROUGHPUT_AXES if a not in axes])
+    return (f'<p class="soft">Throughput: {escape(unit)}, the median of the repetitions. Wrong answers are missed hits, false '
+            f"hits and wrong surfaces against exact arithmetic; “wrong primitive” counts apart. The fastest "
+            f"structure of a scene, workload and ISA is green. {escape('Same for all: ' + note + '.' if note else '')}</p>"
+            + table("throughput", heads, rows))
+
+
+STRUCTURE_COLUMNS = (("build_seconds", "build, ms", 1e3), ("triangles_per_second", "Mtri/s", 1e-6), ("sah_cost", "SAH cost", 1),
+                     ("epo", "EPO", 1), ("nodes", "nodes", 1), ("leaves", "leaves", 1), ("depth", "depth", 1),
+                     ("bytes_per_triangle", "bytes/triangle", 1), ("bytes", "MiB", 2.0**-20),
+                     ("peak_build_bytes", "peak while building, MiB", 2.0**-20))
+
+
+def structure_table(results):
+    if not results.structures:
+        return "<p>No structure has build or quality figures.</p>"
+    cells = sorted_cells(results.structures, STRUCTURE_AXES)
+    axes = shown_axes(cells, STRUCTURE_AXES)
+    columns = [c for c in STRUCTURE_COLUMNS if any(cell.value(c[0]) is not None for cell in cells)]
+    heads = [(a, False) for a in axes] + [(label, True) for _, label, _ in columns]
+    rows = []
+    for cell in cells:
+        values = [(cell.value(name), scale) for name, _, scale in columns]
+        numbers = [number(None if v is None else v * s, "{:,.0f}" if v is not None and v * s >= 1000 else "{:.4g}")
+                   for v, s in values]
+        rows.append(([text(cell[a], key=a == "structure") for a in axes] + numbers, ""))
+    return table("structures", heads, rows)
+
+
+def best_table(results):
+    """One row a scene, workload and ISA: the fastest structure of ours, and how it stands to embree."""
+    metric, _ = results.throughput()
+    reference, best = embree_rates(results, metric), {}
+    for cell in results.traces:
+        rate = cell.value(metric)
+        if rate and cell["structure"] != "embree" and (beside(cell) not in best or rate > best[beside(cell)].value(metric)):
+            best[beside(cell)] = cell
+    if not best:
+        return "<p>No cell has a throughput.</p>"
+    heads = [("scene", False), ("workload", False), ("ISA", False), ("threads", False), ("fastest structure", False),
+             ("Mray/s", True), ("wrong per million", True)]
+    heads += ([("× embree", True)] if reference else []) + [("how", False)]
+    rows = []
+    order = [axis_sort_key(a) for a in ("scene", "workload", "isa", "threads")]
+    for key in sorted(best, key=lambda k: [o(v) for o, v in zip(order, k)]):
+        cell = best[key]
+        wrong = cell.per_million("wrong_answers")
+        out = [text(v) for v in key] + [text(cell["structure"])]
+        out.append(number(cell.value(metric) / 1e6, "{:.2f}"))
+        out.append(number(wrong, "{:.4g}") if wrong is not None else text("not checked"))
+        if reference:
+            out.append(number(cell.value(metric) / reference[key] if reference.get(key) else None, "{:.2f}"))
+        out.append(text(" / ".join(cell[a] for a in ("builder", "leaf", "intersector", "box", "traversal") if cell[a])))
+        rows.append((out, ""))
+    return table("fastest", heads, rows)
+
+
+def skipped_list(skipped):
+    """The skipped cells by reason, the most frequent first; each reason opens to its cells."""
+    if not skipped:
+        return "<p>None: every combination of the sweep was measured.</p>"
+    reasons = {}
+    for name, reason in skipped:
+        reasons.setdefault(reason, []).append(name)
+    parts = []
+    for reason, names in sorted(reasons.items(), key=lambda item: (-len(item[1]), item[0])):
+        cells = "".join(f"<li>{escape(name)}</li>" for name in names)
+        parts.append(f"<details><summary>{escape(reason)} <span class=soft>({len(names)} cell{'s' if len(names) != 1 else ''})"
+                     f"</span></summary><ul>{cells}</ul></details>")
+    return "\n".join(parts)
+
+
+def facts_table(facts):
+    rows = "".join(f'<tr><th scope="row">{escape(str(k))}</th><td>{escape(str(v))}</td></tr>' for k, v in facts)
+    return f'<table class="facts">{rows}</table>'

@@ -1,0 +1,225 @@
+"""Tests of plots/: numbers, figures from whole, thin and broken results, and a report that escapes what it shows."""
+
+import json
+import subprocess
+import sys
+import tempfile
+import unittest
+from html.parser import HTMLParser
+from pathlib import Path
+
+PLOTS = Path(__file__).resolve().parent.parent / "plots"
+sys.path.insert(0, str(PLOTS))
+sys.dont_write_bytecode = True
+
+from figures import ALL  # noqa: E402
+from figures.accuracy_vs_time import pareto_front  # noqa: E402
+from figures.modes import Modes  # noqa: E402
+from figures.sah_vs_time import linear_fit  # noqa: E402
+from results import Cell, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
+
+AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
+
+
+def trace(structure="bvh8", isa="avx2", intersector="watertight", rate=10e6, repetition=0, **more):
+    axes = dict(zip(AXES, ("bunny", structure, "medium" if structure == "embree" else "binned_sah", "triangle8", intersector,
+                           "padded", "single", isa, "diffuse", 1)))
+    name = "trace/" + "/".join(str(axes[a]) for a in AXES[:-1]) + "/threads:1"
+    return {"name": name, "run_name": name, "run_type": "iteration", "repetition_index": repetition, "time_unit": "ms",
+            "real_time": 1.0, "cpu_time": 1.0, "rays": 1000, "rays_per_second": rate, "rays_per_cpu_second": rate,
+            "wrong_answers": 1, **axes, **more}
+
+
+def build(structure="bvh8", **more):
+    name = f"build/bunny/{structure}/binned_sah/triangle8/-/-/-/avx2/-/threads:1"
+    figures = {} if structure == "embree" else {"sah_cost": 31.5, "nodes": 10}
+    return {"name": name, "run_type": "iteration", "build_seconds": 0.02, "triangles_per_second": 3e6, "bytes": 1000,
+            **figures, **more}
+
+
+def whole():
+    rows = [trace(s, i, x, 1e6 * (3 + k) + r, r) for k, s in enumerate(("bvh2", "bvh4", "bvh8", "embree", "a_new_one"))
+            for i in ("sse", "avx2") for x in ("moller_trumbore", "watertight") for r in range(5)]
+    return rows + [build(s, sah_cost=30.0 + k) if s != "embree" else build(s)
+                   for k, s in enumerate(("bvh2", "bvh4", "bvh8", "embree"))]
+
+
+SPACE = tempfile.TemporaryDirectory(prefix="arboretum-plots-")
+
+
+def tearDownModule():
+    SPACE.cleanup()
+
+
+class Folder:
+    """A result folder of its own, gone when the tests have ended."""
+
+    def __init__(self, rows=None, context=None, skipped=None, files=None):
+        self.path = Path(tempfile.mkdtemp(dir=SPACE.name))
+        if rows is not None:
+            document = {"context": context or {}, "benchmarks": rows, "skipped": skipped or []}
+            (self.path / "results.json").write_text(json.dumps(document))
+        for name, content in (files or {}).items():
+            (self.path / name).write_text(content)
+
+    def plot(self, *words):
+        return subprocess.run([sys.executable, str(PLOTS / "plot.py"), str(self.path), *words], capture_output=True, text=True,
+                              timeout=300)
+
+
+class Strict(HTMLParser):
+    """Fails on a tag that is closed without having been opened, and keeps the text."""
+
+    EMPTY = {"meta", "img", "input", "br"}
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.text, self.tags = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open[-1] != tag:
+            raise AssertionError(f"</{tag}> closes {self.open[-1:]}")
+        self.open.pop()
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+class Numbers(unittest.TestCase):
+    def test_estimate(self):
+        for values, median in (([5.0], 5.0), ([1.0, 3.0], 2.0), ([1.0, 2.0, 900.0], 2.0)):
+            found = estimate(values)
+            self.assertEqual(found.median, median)
+            self.assertLessEqual(found.low, median)
+            self.assertGreaterEqual(found.high, median)
+        self.assertEqual(estimate([5.0]).low, 5.0)
+        self.assertEqual(estimate([3.0, 1.0, 2.0, 7.0]), estimate([3.0, 1.0, 2.0, 7.0]))
+
+    def test_linear_fit(self):
+        slope, offset, r2 = linear_fit([1, 2, 3, 4], [3, 5, 7, 9])
+        self.assertAlmostEqual(slope, 2)
+        self.assertAlmostEqual(offset, 1)
+        self.assertAlmostEqual(r2, 1)
+        self.assertLess(linear_fit([1, 2, 3, 4], [1, 9, 1, 9])[2], 0.5)
+        for x, y in (([1, 2], [1, 2]), ([2, 2, 2], [1, 2, 3]), ([1, 2, 3], [5, 5, 5])):
+            self.assertIsNone(linear_fit(x, y))
+
+    def test_pareto_front(self):
+        self.assertEqual(pareto_front([(3, 0), (1, 9), (2, 9), (2, 4), (4, 0)]), [(1, 9), (2, 4), (3, 0)])
+        self.assertEqual(pareto_front([]), [])
+
+    def test_order(self):
+        self.assertEqual(ordered(["bvh16", "embree", "bvh4", "octree"], "structure"), ["bvh4", "bvh16", "octree", "embree"])
+        self.assertEqual(ordered(["avx512", "sse", "scalar", "avx2"], "isa"), ["scalar", "sse", "avx2", "avx512"])
+        self.assertEqual(ordered(["diffuse", "primary"], "workload"), ["primary", "diffuse"])
+
+    def test_axes_from_the_name(self):
+        axes = axes_of({"name": "trace/bunny/bvh8/binned_sah/triangle8/watertight/padded/single/avx2/diffuse/threads:2"})
+        self.assertEqual((axes["scene"], axes["isa"], axes["workload"], axes["threads"]), ("bunny", "avx2", "diffuse", "2"))
+        self.assertEqual(axes_of({"name": build()["name"]})["workload"], "")
+
+    def test_what_tells_cells_apart(self):
+        cells = [Cell({"structure": s, "builder": b, "isa": i}) for s, b in (("bvh8", "x"), ("embree", "y")) for i in "ab"]
+        self.assertEqual(swept_axes(cells), {"isa"})
+        self.assertEqual(undetermined_axes(cells, ("structure", "builder", "isa")), ["structure", "isa"])
+        self.assertEqual(Modes(cells).labels, ["one mode"])
+
+
+class Loading(unittest.TestCase):
+    def test_repetitions_are_one_cell(self):
+        folder = Folder([trace(rate=r, repetition=k) for k, r in enumerate((1e6, 2e6, 9e6))] + [build()])
+        results = load(folder.path)
+        self.assertEqual(len(results.traces), 1)
+        self.assertEqual(results.traces[0].value("rays_per_second"), 2e6)
+        self.assertEqual(results.traces[0].per_million("wrong_answers"), 1000)
+        self.assertEqual(results.structure_value(results.traces[0], "sah_cost"), 31.5)
+
+    def test_aggregates_are_no_repetitions(self):
+        aggregate = {**trace(rate=77.0), "run_type": "aggregate", "aggregate_name": "median"}
+        self.assertEqual(load(Folder([trace(), aggregate]).path).traces[0].value("rays_per_second"), 10e6)
+        self.assertEqual(load(Folder([aggregate]).path).traces[0].value("rays_per_second"), 77.0)
+
+    def test_a_run_that_was_cut_off(self):
+        cell = {k: v for k, v in trace().items() if not k.startswith("rays_per")}
+        cell["repetitions"] = [{"rays_per_second": 1e6, "rays_per_cpu_second": 1e6}, {"rays_per_second": 3e6}]
+        folder = Folder(files={"cells.jsonl": json.dumps(cell) + '\n{"name": "trace/bun'})
+        results = load(folder.path)
+        self.assertFalse(results.complete)
+        self.assertEqual(results.traces[0].value("rays_per_second"), 2e6)
+        self.assertEqual(folder.plot().returncode, 0)
+        self.assertIn("--resume", (folder.path / "report.html").read_text())
+
+
+class Drawing(unittest.TestCase):
+    def test_every_figure_of_whole_results(self):
+        folder = Folder(whole(), files={"effective.yaml": "experiment: quick\n"})
+        done = folder.plot()
+        self.assertEqual((done.returncode, done.stderr), (0, ""), done.stderr)
+        for name in ALL:
+            self.assertEqual((folder.path / f"{name}.png").read_bytes()[:4], b"\x89PNG", name)
+            self.assertIn("</svg>", (folder.path / f"{name}.svg").read_text(), name)
+
+    def test_thin_results_never_crash(self):
+        cases = {
+            "nothing": [],
+            "one cell": [trace()],
+            "one build": [build()],
+            "embree alone": [trace("embree"), build("embree")],
+            "no accuracy": [{k: v for k, v in trace().items() if k != "wrong_answers"}],
+            "no field but the name": [{"name": trace()["name"], "rays_per_second": 1.0}],
+            "zero rays and speed": [trace(rate=0.0, rays=0)],
+            "not finite": [trace(rate=float("nan")), trace("bvh4"), build(sah_cost=float("inf"))],
+            "text for a number": [trace(rate="fast"), trace("bvh4", wrong_answers="none")],
+            "strange names": [trace("$x_1$ <&>"), build("$x_1$ <&>"), trace("bvh8", intersector="$")],
+        }
+        for case, rows in cases.items():
+            with self.subTest(case):
+                folder = Folder(rows)
+                done = folder.plot()
+                self.assertEqual((done.returncode, done.stderr), (0, ""), f"{case}: {done.stderr}")
+                self.assertTrue((folder.path / "report.html").is_file())
+        self.assertIn("rays_per_second: left out, ", Folder([]).plot("--no-report").stdout)
+
+    def test_report_is_well_formed_and_escaped(self):
+        evil = "<script>alert(1)</script>&\"'"
+        folder = Folder(whole() + [trace(evil)], {"cpu": evil, "warnings": [evil], "command": f"./arboretum run {evil}", "git_revision": "abc"},
+                        [{"name": evil, "reason": "no avx512"}, {"name": "b", "reason": "no avx512"}, {"name": "c", "reason": evil}],
+                        {"effective.yaml": f"experiment: {evil}\n"})
+        self.assertEqual(folder.plot().returncode, 0)
+        page = (folder.path / "report.html").read_text()
+        reader = Strict()
+        reader.feed(page)
+        self.assertEqual(reader.open, [])
+        self.assertEqual(reader.tags.count("script"), 1)
+        self.assertEqual(reader.tags.count("img"), len(ALL))
+        shown = "".join(reader.text)
+        self.assertGreaterEqual(shown.count(evil), 6)
+        for words in ("(2 cells)", "git checkout abc", "wrong per million", "× embree"):
+            self.assertIn(words, shown)
+        self.assertNotIn("http", page.replace("http://www.w3.org", ""))
+
+    def test_only_some(self):
+        folder = Folder(whole())
+        self.assertEqual(folder.plot("--only", "sah_cost").returncode, 0)
+        self.assertTrue((folder.path / "sah_cost.png").is_file())
+        self.assertFalse((folder.path / "build_time.png").exists())
+
+    def test_errors_are_one_line(self):
+        cases = ((Folder(whole()), ["--only", "sah_costs"], "the nearest is 'sah_cost'"), (Folder(), [], "neither results.json"),
+                 (Folder(files={"results.json": "{"}), [], "results.json: not the JSON"),
+                 (Folder(files={"results.json": "[]"}), [], "results.json: not the JSON"))
+        for folder, words, message in cases:
+            with self.subTest(message):
+                done = folder.plot(*words)
+                self.assertEqual(done.returncode, 2)
+                self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+                self.assertIn(message, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
