@@ -32,8 +32,11 @@ def fail(message):
     sys.exit(2)
 
 
-def chosen(only, known):
-    names = [name.strip() for name in only.split(",") if name.strip()] if only else list(known)
+def chosen(only, known, configured):
+    """The figures that --only names, else those of the configuration, else all."""
+    if not only:
+        return [name for name in known if name in configured] if isinstance(configured, list) else list(known)
+    names = [name.strip() for name in only.split(",") if name.strip()]
     for name in names:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1, 0.0)[0]
@@ -44,7 +47,7 @@ def chosen(only, known):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", metavar="RESULTS", help="a folder that `run` wrote")
-    parser.add_argument("--only", metavar="name,...", help="these figures alone")
+    parser.add_argument("--only", metavar="name,...", help="these figures (default: those that the configuration names)")
     parser.add_argument("--no-report", action="store_true", help="the figures, without report.html")
     arguments = parser.parse_args()
     need_matplotlib()
@@ -54,11 +57,10 @@ def main():
     import style
     from results import NoData, ResultError, load
 
-    names = chosen(arguments.only, figures.ALL)
     try:
         results = load(arguments.results)
         drawn = []
-        for name in names:
+        for name in chosen(arguments.only, figures.ALL, results.context.get("plots")):
             module = importlib.import_module(f"figures.{name}")
             try:
                 style.save(module.draw(results), results.folder, name)

@@ -61,8 +61,10 @@ def facts(context):
     """The context, flattened to lines that a person reads; long texts come with the reproduction."""
     found = []
     for key, value in context.items():
-        if key in ("experiment", "warnings", "warning"):
+        if key in ("experiment", "warnings", "warning", "plots", "executable", "library_build_type", "command"):
             continue
+        if key == "memory_bytes":
+            key, value = "memory", f"{value / 2**30:.1f} GiB"
         if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
             value = "; ".join(", ".join(f"{k} {v}" for k, v in item.items()) for item in value)
         elif isinstance(value, (dict, list)):

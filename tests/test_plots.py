@@ -208,6 +208,9 @@ class Drawing(unittest.TestCase):
         self.assertEqual(folder.plot("--only", "sah_cost").returncode, 0)
         self.assertTrue((folder.path / "sah_cost.png").is_file())
         self.assertFalse((folder.path / "build_time.png").exists())
+        folder = Folder(whole(), {"plots": ["sah_vs_time"]})
+        self.assertEqual(folder.plot().returncode, 0)
+        self.assertEqual([p.stem for p in folder.path.glob("*.png")], ["sah_vs_time"])
 
     def test_errors_are_one_line(self):
         cases = ((Folder(whole()), ["--only", "sah_costs"], "the nearest is 'sah_cost'"), (Folder(), [], "neither results.json"),
