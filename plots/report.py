@@ -63,7 +63,7 @@ def facts(context):
     for key, value in context.items():
         if key in ("experiment", "warnings", "warning", "plots", "executable", "library_build_type", "command"):
             continue
-        if key == "memory_bytes":
+        if key == "memory_bytes" and isinstance(value, int):
             key, value = "memory", f"{value / 2**30:.1f} GiB"
         if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
             value = "; ".join(", ".join(f"{k} {v}" for k, v in item.items()) for item in value)
