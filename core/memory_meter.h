@@ -34,8 +34,8 @@ struct MeteredAllocator {
     return p;
   }
   void deallocate(T* p, std::size_t n) noexcept {
-    ::operator delete(p, kAlignment);
     MemoryMeter::remove(n * sizeof(T));
+    ::operator delete(p, kAlignment);
   }
   template <class U>
   void construct(U* p) noexcept(noexcept(::new (p) U)) {

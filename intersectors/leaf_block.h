@@ -1,0 +1,56 @@
+// One ray against one leaf block: the intersector's lanes, the ray's interval, and the rule that among equal t the
+// lowest primitive id wins.
+#pragma once
+
+#include "intersectors/triangle_hits.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// The nearest hit so far. `primitive` is INT_MAX while there is none, so that a hit at exactly tfar still counts.
+struct NearestHit {
+  static constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
+  float t;
+  float u = 0.0f, v = 0.0f;
+  std::int32_t primitive = kNone;
+};
+
+template <class Intersector, class Block>
+ARBORETUM_INLINE bool closest_hit_block(const typename Intersector::RayData& ray, const Block& block, float tnear, NearestHit& best) {
+  constexpr int W = Block::kWidth;
+  TriangleHits<W> hits;
+  vm<W> m = Intersector::intersect(ray, block, hits);
+  if (none(m)) return false;
+  const vi<W> id = vi<W>::load(block.id);
+  m = m & (hits.t >= vf<W>(tnear)) & ((hits.t < vf<W>(best.t)) | ((hits.t == vf<W>(best.t)) & (id < vi<W>(best.primitive))));
+  unsigned bits = m.bits();
+  if (!bits) return false;
+  if (bits & (bits - 1)) {
+    const vf<W> t = select(m, hits.t, vf<W>(std::numeric_limits<float>::infinity()));
+    unsigned nearest = (m & (t == vf<W>(reduce_min(t)))).bits();
+    bits = nearest & (0u - nearest);
+    for (nearest &= nearest - 1; nearest; nearest &= nearest - 1) {  // equal t: the lowest id
+      if (block.id[__builtin_ctz(nearest)] < block.id[__builtin_ctz(bits)]) bits = nearest & (0u - nearest);
+    }
+  }
+  const int lane = __builtin_ctz(bits);
+  alignas(64) float t[W], u[W], v[W], den[W];
+  hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(den);
+  best.t = t[lane];
+  best.u = u[lane] / den[lane];
+  best.v = v[lane] / den[lane];
+  best.primitive = static_cast<std::int32_t>(block.id[lane]);
+  return true;
+}
+
+template <class Intersector, class Block>
+ARBORETUM_INLINE bool any_hit_block(const typename Intersector::RayData& ray, const Block& block, float tnear, float tfar) {
+  constexpr int W = Block::kWidth;
+  TriangleHits<W> hits;
+  const vm<W> m = Intersector::intersect(ray, block, hits);
+  if (none(m)) return false;
+  return any(m & (hits.t >= vf<W>(tnear)) & (hits.t <= vf<W>(tfar)));
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

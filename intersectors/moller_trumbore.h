@@ -1,0 +1,55 @@
+// Moeller and Trumbore (JGT 1997), in the factorisation that shares C x d between u and v and divides last (as Kensler
+// and Shirley 2006): C = v0 - o, R = C x d, N = (v1 - v0) x (v2 - v0); u = R.e2 / N.d, v = R.e1 / N.d, t = N.C / N.d
+// with e1 = v0 - v1 and e2 = v2 - v0. Fast; leaks at shared edges, since the two sides' u and v are different sums.
+#pragma once
+
+#include "intersectors/triangle_hits.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+struct MollerTrumbore {
+  static constexpr std::string_view kName = "moller_trumbore";
+  static constexpr bool kNeedsVertices = false;
+
+  /// One ray's constants.
+  struct RayData {
+    Vec3f origin, direction;
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {}
+  };
+
+  /// Lanes whose closed triangle the line meets, whatever t is; `hits` is set only where that is any lane.
+  template <class Block>
+  static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
+    constexpr int W = Block::kWidth;
+    using F = vf<W>;
+    const vf3<W> v0{F::load(block.v0[0]), F::load(block.v0[1]), F::load(block.v0[2])};
+    vf3<W> e1, e2;
+    if constexpr (Block::kForm == TriangleForm::edges) {
+      e1 = {F::load(block.e1[0]), F::load(block.e1[1]), F::load(block.e1[2])};
+      e2 = {F::load(block.e2[0]), F::load(block.e2[1]), F::load(block.e2[2])};
+    } else {
+      e1 = v0 - vf3<W>{F::load(block.v1[0]), F::load(block.v1[1]), F::load(block.v1[2])};
+      e2 = vf3<W>{F::load(block.v2[0]), F::load(block.v2[1]), F::load(block.v2[2])} - v0;
+    }
+    const vf3<W> o{F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)};
+    const vf3<W> d{F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)};
+    const vf3<W> n = cross(e2, e1);
+    const vf3<W> c = v0 - o;
+    const vf3<W> r = cross(c, d);
+    const F det = dot(n, d);
+    const F abs_det = abs(det);
+    const vi<W> sign = sign_bits(det);
+    const F u = xor_sign(dot(r, e2), sign);
+    const F v = xor_sign(dot(r, e1), sign);
+    const vm<W> inside = (u >= F(0.0f)) & (v >= F(0.0f)) & (u + v <= abs_det) & (det != F(0.0f));
+    if (any(inside)) {
+      hits.t = xor_sign(dot(n, c), sign) / abs_det;
+      hits.u_numerator = u, hits.v_numerator = v, hits.denominator = abs_det;
+    }
+    return inside;
+  }
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,49 @@
+// Pluecker test in the edge x (sum of end points) form, as Embree's robust mode has it, with strict signs: translated
+// vertices p_i = v_i - o; U = d.((p2 - p0) x (p2 + p0)), V and W likewise. A shared edge gives its two triangles values
+// of exactly opposite sign (the difference flips, the sum commutes), so no ray slips through an edge; three edges that
+// meet at a vertex round apart, so a ray at a vertex can. No tolerance: Embree's adds false hits.
+#pragma once
+
+#include "intersectors/triangle_hits.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+struct Pluecker {
+  static constexpr std::string_view kName = "pluecker";
+  static constexpr bool kNeedsVertices = true;
+
+  struct RayData {
+    Vec3f origin, direction;
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {}
+  };
+
+  template <class Block>
+  static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
+    constexpr int W = Block::kWidth;
+    using F = vf<W>;
+    const vf3<W> o{F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)};
+    const vf3<W> d{F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)};
+    const vf3<W> p0 = vf3<W>{F::load(block.v0[0]), F::load(block.v0[1]), F::load(block.v0[2])} - o;
+    const vf3<W> p1 = vf3<W>{F::load(block.v1[0]), F::load(block.v1[1]), F::load(block.v1[2])} - o;
+    const vf3<W> p2 = vf3<W>{F::load(block.v2[0]), F::load(block.v2[1]), F::load(block.v2[2])} - o;
+    const vf3<W> edge_u = p2 - p0, edge_v = p0 - p1, edge_w = p1 - p2;
+    const F u = dot(cross(edge_u, p2 + p0), d);
+    const F v = dot(cross(edge_v, p0 + p1), d);
+    const F w = dot(cross(edge_w, p1 + p2), d);
+    const F smallest = min_x86(min_x86(u, v), w), largest = max_x86(max_x86(u, v), w);
+    const F sum = u + v + w;
+    vm<W> inside = ((smallest >= F(0.0f)) | (largest <= F(0.0f))) & (sum != F(0.0f));
+    if (any(inside)) {
+      const vf3<W> n = cross(edge_u, edge_v);  // (v1 - v0) x (v2 - v0)
+      const F det = dot(n, d);
+      inside = inside & (det != F(0.0f));
+      hits.t = dot(n, p0) / det;
+      hits.u_numerator = u, hits.v_numerator = v, hits.denominator = sum;
+    }
+    return inside;
+  }
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

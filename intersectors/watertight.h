@@ -1,0 +1,90 @@
+// Watertight ray/triangle intersection (Woop, Benthin, Wald, JCGT 2(1) 2013), with each edge decided by comparing its
+// two rounded products instead of looking at the sign of their difference.
+//
+// Every vertex is translated, permuted and sheared once per (ray, vertex), alike in all triangles that share it, so the
+// rounded 2-D mesh stays closed; rounding is monotone, so an exact Cx*By > Cy*Bx is never computed as <, and a tie is
+// inside on both sides. No contraction can break it (comparisons do not fuse); the shear may fuse, being one expression
+// for every vertex. Only where all three edges tie (det 0) the float test cannot tell, and double products, exact for
+// float inputs, decide, as in the paper.
+#pragma once
+
+#include "intersectors/triangle_hits.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+struct Watertight {
+  static constexpr std::string_view kName = "watertight";
+  static constexpr bool kNeedsVertices = true;
+
+  /// kz: the axis along which the direction is largest. Shear constants dx/dz, dy/dz, 1/dz of the permuted direction.
+  struct RayData {
+    float ox, oy, oz, sx, sy, sz;
+    int kx, ky, kz;
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) {
+      const float ax = __builtin_fabsf(ray.direction.x), ay = __builtin_fabsf(ray.direction.y), az = __builtin_fabsf(ray.direction.z);
+      kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
+      kx = kz == 2 ? 0 : kz + 1;
+      ky = kx == 2 ? 0 : kx + 1;
+      const float* o = &ray.origin.x;
+      const float* d = &ray.direction.x;
+      ox = o[kx], oy = o[ky], oz = o[kz];
+      sx = d[kx] / d[kz], sy = d[ky] / d[kz], sz = 1.0f / d[kz];
+    }
+  };
+
+  template <class Block>
+  static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
+    constexpr int W = Block::kWidth;
+    using F = vf<W>;
+    const F ox(ray.ox), oy(ray.oy), oz(ray.oz), sx(ray.sx), sy(ray.sy);
+    const F az = F::load(block.v0[ray.kz]) - oz, bz = F::load(block.v1[ray.kz]) - oz, cz = F::load(block.v2[ray.kz]) - oz;
+    const F ax = nmadd(sx, az, F::load(block.v0[ray.kx]) - ox), ay = nmadd(sy, az, F::load(block.v0[ray.ky]) - oy);
+    const F bx = nmadd(sx, bz, F::load(block.v1[ray.kx]) - ox), by = nmadd(sy, bz, F::load(block.v1[ray.ky]) - oy);
+    const F cx = nmadd(sx, cz, F::load(block.v2[ray.kx]) - ox), cy = nmadd(sy, cz, F::load(block.v2[ray.ky]) - oy);
+    const F u0 = cx * by, u1 = cy * bx, v0 = ax * cy, v1 = ay * cx, w0 = bx * ay, w1 = by * ax;
+    vm<W> inside = ((u0 >= u1) & (v0 >= v1) & (w0 >= w1)) | ((u0 <= u1) & (v0 <= v1) & (w0 <= w1));
+    if (any(inside)) {
+      const F u = u0 - u1, v = v0 - v1, w = w0 - w1;
+      const F det = u + v + w;
+      const F sz(ray.sz);
+      hits.t = (u * (sz * az) + v * (sz * bz) + w * (sz * cz)) / det;
+      hits.u_numerator = v, hits.v_numerator = w, hits.denominator = det;
+      const vm<W> undecided = inside & (det == F(0.0f));
+      if (__builtin_expect(any(undecided), 0)) {
+        inside = inside & ~undecided;
+        inside = inside | decide_in_double<W>(undecided, ray.sz, {ax, ay, az}, {bx, by, bz}, {cx, cy, cz}, hits);
+      }
+    }
+    return inside;
+  }
+
+ private:
+  /// The lanes of `undecided` that are hit when the edge functions are computed in double; sets their hits.
+  template <int W>
+  static __attribute__((noinline)) vm<W> decide_in_double(vm<W> undecided, float sz, const vf3<W>& a, const vf3<W>& b,
+                                                          const vf3<W>& c, TriangleHits<W>& hits) {
+    float p[9][W], out[4][W];
+    const vf<W> in[9] = {a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z};
+    for (int i = 0; i < 9; ++i) in[i].store(p[i]);
+    hits.t.store(out[0]), hits.u_numerator.store(out[1]), hits.v_numerator.store(out[2]), hits.denominator.store(out[3]);
+    unsigned hit = 0;
+    for (unsigned rest = undecided.bits(); rest; rest &= rest - 1) {
+      const int i = __builtin_ctz(rest);
+      const double u = double(p[6][i]) * p[4][i] - double(p[7][i]) * p[3][i];
+      const double v = double(p[0][i]) * p[7][i] - double(p[1][i]) * p[6][i];
+      const double w = double(p[3][i]) * p[1][i] - double(p[4][i]) * p[0][i];
+      const double det = u + v + w;
+      const bool one_side = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
+      if (!one_side || det == 0) continue;
+      hit |= 1u << i;
+      out[0][i] = float((u * p[2][i] + v * p[5][i] + w * p[8][i]) / det * sz);
+      out[1][i] = float(v / det), out[2][i] = float(w / det), out[3][i] = 1.0f;
+    }
+    hits = {vf<W>::load(out[0]), vf<W>::load(out[1]), vf<W>::load(out[2]), vf<W>::load(out[3])};
+    return vm<W>::from_bits(hit);
+  }
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,33 @@
+// What every ISA shares: mask tests, absolute values, sign handling, and three lanes as a vector.
+#pragma once
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+template <int W> ARBORETUM_INLINE bool any(vm<W> m) { return m.bits() != 0; }
+template <int W> ARBORETUM_INLINE bool none(vm<W> m) { return m.bits() == 0; }
+template <int W> ARBORETUM_INLINE bool all(vm<W> m) { return m.bits() == (1u << W) - 1u; }
+
+template <int W> ARBORETUM_INLINE vf<W> abs(vf<W> a) { return vf<W>::from_int_bits(a.as_int() & vi<W>(0x7fffffff)); }
+/// The sign bit of each lane, nothing else.
+template <int W> ARBORETUM_INLINE vi<W> sign_bits(vf<W> a) { return a.as_int() & vi<W>(std::numeric_limits<std::int32_t>::min()); }
+template <int W> ARBORETUM_INLINE vf<W> xor_sign(vf<W> a, vi<W> sign) { return vf<W>::from_int_bits(a.as_int() ^ sign); }
+template <int W> ARBORETUM_INLINE vf<W> operator-(vf<W> a) { return xor_sign(a, vi<W>(std::numeric_limits<std::int32_t>::min())); }
+
+/// Three vectors of W lanes: W points or directions.
+template <int W>
+struct vf3 {
+  vf<W> x, y, z;
+  friend ARBORETUM_INLINE vf3 operator-(vf3 a, vf3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend ARBORETUM_INLINE vf3 operator+(vf3 a, vf3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+};
+
+/// Fused where the ISA has FMA.
+template <int W> ARBORETUM_INLINE vf<W> dot(vf3<W> a, vf3<W> b) { return madd(a.x, b.x, madd(a.y, b.y, a.z * b.z)); }
+/// Fused where the ISA has FMA.
+template <int W> ARBORETUM_INLINE vf3<W> cross(vf3<W> a, vf3<W> b) {
+  return {msub(a.y, b.z, a.z * b.y), msub(a.z, b.x, a.x * b.z), msub(a.x, b.y, a.y * b.x)};
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,61 @@
+#include "structures/accel.h"
+
+#include <tbb/task_arena.h>
+
+#include "core/error.h"
+#include "core/memory_meter.h"
+#include "core/names.h"
+#include "core/timer.h"
+#include "structure_list.h"
+
+namespace arboretum {
+
+std::span<const StructureEntry> all_structures() {
+  static const std::vector<StructureEntry> entries = [] {
+    std::vector<StructureEntry> list;
+    for_each_type(AllStructures{}, [&]<class S>(std::type_identity<S>) {
+      list.push_back({S::static_info(), []() -> std::unique_ptr<Accel> { return std::make_unique<S>(); }});
+    });
+    return list;
+  }();
+  return entries;
+}
+
+const StructureEntry* find_structure(std::string_view name) {
+  for (const StructureEntry& e : all_structures())
+    if (e.info.name == name) return &e;
+  return nullptr;
+}
+
+std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh, const BuildSettings& settings,
+                                       BuildReport& report) {
+  const StructureEntry* entry = find_structure(name);
+  if (!entry) {
+    std::vector<std::string> names;
+    for (const StructureEntry& e : all_structures()) names.emplace_back(e.info.name);
+    throw UserError(unknown_name_message("structure", name, names));
+  }
+  const auto check = [&](const char* kind, const std::string& value, const std::vector<std::string_view>& valid) {
+    for (std::string_view v : valid)
+      if (v == value) return;
+    const std::vector<std::string> names(valid.begin(), valid.end());
+    throw UserError(std::string(name) + ": " + unknown_name_message(kind, value, names));
+  };
+  check("builder", settings.builder, entry->info.builders);
+  check("leaf", settings.leaf, entry->info.leaves);
+
+  std::unique_ptr<Accel> accel = entry->create();
+  report = {};
+  const unsigned threads = settings.threads < 1 ? 1 : settings.threads;
+  tbb::task_arena arena(int(threads), 1);
+  MemoryMeter::reset_peak();
+  const std::size_t before = MemoryMeter::current();
+  const double wall = wall_seconds(), cpu = process_cpu_seconds();
+  arena.execute([&] { accel->build(mesh, settings, report); });
+  report.seconds = wall_seconds() - wall;
+  report.cpu_seconds = process_cpu_seconds() - cpu;
+  report.peak_bytes = MemoryMeter::peak() - before;
+  return accel;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,10 @@
+// The one list of structures: a line for each folder under structures/.
+//
+// To add one, write structures/<folder>/<name>.h, which declares `namespace arboretum::<folder> { using Structures =
+// TypeList<...>; }`, its .cpp files, and <name>_kernels.h beside it, and put a line here. The build reads these lines
+// (cmake/Structures.cmake): the structure is then built, listed, swept, tested and plotted (docs/add-a-structure.md).
+#pragma once
+
+#include "structures/brute_force/brute_force.h"
+#include "structures/bvh/bvh.h"
+#include "structures/embree/embree.h"

@@ -1,0 +1,48 @@
+// brute_force: no structure at all. One leaf holds every triangle, in the mesh's order, and every ray tests every block.
+// What the other structures are compared with: the same blocks and intersectors, so the same rounding, and no box test.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "core/arena.h"
+#include "core/type_list.h"
+#include "structures/accel.h"
+#include "structures/leaves/blocks.h"
+
+namespace arboretum::brute_force {
+
+class BruteForce final : public Accel {
+ public:
+  static constexpr std::string_view kName = "brute_force";
+  using Blocks = TypeList<EdgeBlock<1>, EdgeBlock<4>, EdgeBlock<8>, EdgeBlock<16>, VertexBlock<1>, VertexBlock<4>,
+                          VertexBlock<8>, VertexBlock<16>>;
+
+  [[nodiscard]] static const StructureInfo& static_info();
+  [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
+  /// O(n) on the calling thread, whatever settings.threads is. Throws UserError above 2^31 - 2 triangles.
+  void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
+  /// One leaf at depth 0; nothing for an empty mesh.
+  [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
+  [[nodiscard]] std::size_t bytes() const noexcept override { return arena_.bytes(); }
+
+  [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }
+  [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }
+  /// The leaf's blocks. `Block` must be the one that leaf() names.
+  template <class Block>
+  [[nodiscard]] std::span<const Block> blocks() const noexcept {
+    return {reinterpret_cast<const Block*>(arena_.data()), block_count_};
+  }
+
+ private:
+  Arena arena_;
+  std::size_t triangles_ = 0, block_count_ = 0;
+  unsigned block_width_ = 1;
+  Bounds3f bounds_;
+  std::string leaf_;
+};
+
+using Structures = TypeList<BruteForce>;
+
+}  // namespace arboretum::brute_force

@@ -1,0 +1,40 @@
+// BinaryTree: what every BVH builder makes; collapse.h turns it into a tree of any branching factor.
+#pragma once
+
+#include <cstdint>
+
+#include "core/bounds.h"
+#include "core/memory_meter.h"
+
+namespace arboretum {
+
+/// Children stand next to each other. `left` is the first child's index, 0 for a leaf (the root is nobody's child).
+struct alignas(32) BinaryNode {
+  Vec3f lower;
+  std::uint32_t left;
+  Vec3f upper;
+  std::uint32_t count;  ///< primitive references below
+
+  [[nodiscard]] bool is_leaf() const noexcept { return left == 0; }
+  [[nodiscard]] float half_area() const noexcept {
+    const Vec3f d = upper - lower;
+    return d.x * d.y + d.y * d.z + d.z * d.x;
+  }
+};
+static_assert(sizeof(BinaryNode) == 32);
+
+/// Node 0 is the root. Slots of `nodes` that no parent names are unused and uninitialised. The references below a node
+/// are consecutive in `primitives`; `first` gives where a leaf's begin.
+struct BinaryTree {
+  MeteredVector<BinaryNode> nodes;
+  MeteredVector<std::uint32_t> primitives;
+  MeteredVector<std::uint32_t> first;  ///< one a node; set for leaves
+
+  /// Where the references below `node` begin.
+  [[nodiscard]] std::uint32_t begin_of(std::uint32_t node) const noexcept {
+    while (!nodes[node].is_leaf()) node = nodes[node].left;
+    return first[node];
+  }
+};
+
+}  // namespace arboretum

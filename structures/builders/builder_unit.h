@@ -1,0 +1,26 @@
+// One translation unit of the builders for one ISA; the stub defines ARBORETUM_TARGET.
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <immintrin.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+#include "core/isa.h"
+#include "core/mesh.h"
+#include "core/timer.h"
+#include "structures/builders/builders.h"
+
+#include "simd/target.h"
+#include "simd/target_begin.h"
+#include "structures/builders/binned_sah.h"
+#include "simd/target_end.h"
+
+namespace arboretum::ARBORETUM_ISA_NAMESPACE {
+extern const BinaryBuilder kBinnedSah;
+const BinaryBuilder kBinnedSah = &build_binned_sah;
+}  // namespace arboretum::ARBORETUM_ISA_NAMESPACE

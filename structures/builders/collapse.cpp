@@ -1,0 +1,151 @@
+#include "structures/builders/collapse.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+namespace arboretum {
+namespace {
+constexpr std::uint32_t kParallel = 1u << 12;
+}
+
+/// cost[k - 1]: least cost of the subtree in at most k slots of its parent.
+struct Collapse::Costs {
+  unsigned slots;
+  float cost[kMaxBranching];
+};
+
+Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : tree_(tree), settings_(settings) {
+  plan_.resize(tree.nodes.size());
+  if (tree.primitives.empty()) return;
+  if (settings_.optimal) {
+    choice_.resize(tree.nodes.size() * settings_.branching);
+    Costs root;
+    optimise(0, root);
+  } else {
+    choose_leaves(0);
+  }
+  measure(0);
+}
+
+void Collapse::optimise(std::uint32_t index, Costs& out) {
+  const BinaryNode& node = tree_.nodes[index];
+  const float area = node.half_area();
+  const float leaf_cost = area * float(blocks(index)) * settings_.intersection_cost;
+  if (node.is_leaf()) {
+    out.slots = 1, out.cost[0] = leaf_cost;
+    plan_[index].slots = 1, plan_[index].leaf = 1;
+    return;
+  }
+  Costs left, right;
+  if (node.count > kParallel) {
+    tbb::parallel_invoke([&] { optimise(node.left, left); }, [&] { optimise(node.left + 1, right); });
+  } else {
+    optimise(node.left, left);
+    optimise(node.left + 1, right);
+  }
+  const unsigned n = settings_.branching;
+  std::uint8_t* choice = &choice_[std::size_t(index) * n];
+  out.slots = std::min(n, left.slots + right.slots);
+  float split_cost[kMaxBranching] = {};  // in exactly k slots, k >= 2
+  unsigned cheapest = 2;
+  for (unsigned k = 2; k <= out.slots; ++k) {
+    float best = std::numeric_limits<float>::infinity();
+    unsigned best_left = 1;
+    for (unsigned l = k > right.slots ? k - right.slots : 1; l <= std::min(k - 1, left.slots); ++l) {
+      const float cost = left.cost[l - 1] + right.cost[k - l - 1];
+      if (cost < best) best = cost, best_left = l;
+    }
+    split_cost[k - 1] = best, choice[k - 1] = std::uint8_t(best_left - 1);
+    if (best < split_cost[cheapest - 1]) cheapest = k;
+  }
+  const float inner_cost = area * settings_.traversal_cost + split_cost[cheapest - 1];
+  plan_[index].leaf = blocks(index) <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;
+  plan_[index].slots = cheapest;
+  out.cost[0] = plan_[index].leaf ? leaf_cost : inner_cost;
+  if (plan_[index].leaf) {
+    out.slots = 1;
+    return;
+  }
+  unsigned used = 1;
+  for (unsigned k = 2; k <= out.slots; ++k) {
+    out.cost[k - 1] = out.cost[k - 2];
+    if (split_cost[k - 1] < out.cost[k - 2]) out.cost[k - 1] = split_cost[k - 1], used = k;
+    choice[k - 1] = std::uint8_t(choice[k - 1] | (used - 1) << 4);
+  }
+}
+
+void Collapse::choose_leaves(std::uint32_t index) {
+  const BinaryNode& node = tree_.nodes[index];
+  plan_[index].slots = settings_.branching;
+  plan_[index].leaf = node.is_leaf() || blocks(index) <= 1;
+  if (plan_[index].leaf) return;
+  if (node.count > kParallel) {
+    tbb::parallel_invoke([&] { choose_leaves(node.left); }, [&] { choose_leaves(node.left + 1); });
+  } else {
+    choose_leaves(node.left);
+    choose_leaves(node.left + 1);
+  }
+}
+
+void Collapse::expand(std::uint32_t index, unsigned slots, Slots& out) const noexcept {
+  if (!is_leaf(index) && slots > 1) {
+    const std::uint8_t* choice = &choice_[std::size_t(index) * settings_.branching];
+    if (const unsigned used = (choice[slots - 1] >> 4) + 1u; used > 1) return expand_children(index, used, out);
+  }
+  out.node[out.size++] = index;
+}
+
+void Collapse::expand_children(std::uint32_t index, unsigned slots, Slots& out) const noexcept {
+  const unsigned left_slots = (choice_[std::size_t(index) * settings_.branching + slots - 1] & 15u) + 1;
+  const std::uint32_t left = tree_.nodes[index].left;
+  expand(left, left_slots, out);
+  expand(left + 1, slots - left_slots, out);
+}
+
+Slots Collapse::children(std::uint32_t index) const noexcept {
+  Slots out;
+  if (settings_.optimal) {
+    expand_children(index, unsigned(plan_[index].slots), out);
+    return out;
+  }
+  const BinaryNode& node = tree_.nodes[index];
+  out.size = 2, out.node[0] = node.left, out.node[1] = node.left + 1;
+  while (out.size < settings_.branching) {  // open the largest
+    int largest = -1;
+    float largest_area = -1.0f;
+    for (unsigned i = 0; i < out.size; ++i) {
+      if (is_leaf(out.node[i])) continue;
+      if (const float area = tree_.nodes[out.node[i]].half_area(); area > largest_area) largest_area = area, largest = int(i);
+    }
+    if (largest < 0) break;
+    const std::uint32_t opened = tree_.nodes[out.node[largest]].left;
+    out.node[largest] = opened;
+    out.node[out.size++] = opened + 1;
+  }
+  return out;
+}
+
+std::uint64_t Collapse::measure(std::uint32_t index) {
+  const auto round_up = [](std::uint64_t bytes) { return (bytes + 31) / 32 * 32; };
+  std::uint64_t total;
+  if (is_leaf(index)) {
+    total = round_up(blocks(index) * settings_.block_bytes);
+  } else {
+    total = round_up(settings_.node_bytes);
+    const Slots slots = children(index);
+    if (tree_.nodes[index].count > kParallel) {
+      std::uint64_t part[kMaxBranching];
+      tbb::parallel_for(0u, slots.size, [&](unsigned i) { part[i] = measure(slots.node[i]); });
+      for (unsigned i = 0; i < slots.size; ++i) total += part[i];
+    } else {
+      for (unsigned i = 0; i < slots.size; ++i) total += measure(slots.node[i]);
+    }
+  }
+  plan_[index].bytes = total;
+  return total;
+}
+
+}  // namespace arboretum

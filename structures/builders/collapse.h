@@ -1,0 +1,67 @@
+// Collapse: a binary tree into a tree of branching factor N (Wald, Benthin, Boulos 2008), greedily by area or with the
+// least SAH cost by dynamic programming (as Aila and Karras 2010 choose treelets; Ylitie, Karras, Laine 2017 for wide BVHs).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "structures/accel.h"
+#include "structures/builders/binary_tree.h"
+
+namespace arboretum {
+
+inline constexpr unsigned kMaxBranching = 16;
+
+struct CollapseSettings {
+  unsigned branching = 8;
+  unsigned block_width = 4;      ///< triangles a leaf block
+  unsigned max_leaf_blocks = 4;
+  float traversal_cost = 1.0f;
+  float intersection_cost = 1.0f;
+  bool optimal = true;
+  std::size_t node_bytes = 0, block_bytes = 0;  ///< what a wide node and a leaf block take
+};
+
+/// The wide children of a binary node, at most kMaxBranching.
+struct Slots {
+  unsigned size = 0;
+  std::uint32_t node[kMaxBranching];
+};
+
+/// Decides which binary nodes become wide nodes and which leaves, and how many bytes each such subtree takes.
+class Collapse {
+ public:
+  Collapse(const BinaryTree& tree, const CollapseSettings& settings);
+
+  /// Whether the subtree at `node` becomes one leaf.
+  [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept { return plan_[node].leaf; }
+  /// The children of the wide node made from `node`, which is not a leaf.
+  [[nodiscard]] Slots children(std::uint32_t node) const noexcept;
+  /// Bytes of the subtree at a node that is_leaf() or is some children()'s: its own, 32-byte multiples, and all below.
+  [[nodiscard]] std::uint64_t bytes(std::uint32_t node) const noexcept { return plan_[node].bytes; }
+  [[nodiscard]] unsigned blocks(std::uint32_t node) const noexcept {
+    return (tree_.nodes[node].count + settings_.block_width - 1) / settings_.block_width;
+  }
+
+ private:
+  struct Plan {
+    std::uint64_t bytes : 48;
+    std::uint64_t slots : 15;  ///< optimal: how many children the wide node made from this one has
+    std::uint64_t leaf : 1;
+  };
+  struct Costs;
+  void optimise(std::uint32_t node, Costs& out);
+  void choose_leaves(std::uint32_t node);
+  std::uint64_t measure(std::uint32_t node);
+  void expand(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
+  void expand_children(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
+
+  const BinaryTree& tree_;
+  const CollapseSettings settings_;
+  MeteredVector<Plan> plan_;
+  /// [node * branching + k - 1], k >= 2: below, the left child's share of k slots less one; above (4 bits), how many of at most
+  /// k slots to use, less one.
+  MeteredVector<std::uint8_t> choice_;
+};
+
+}  // namespace arboretum

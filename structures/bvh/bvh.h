@@ -1,0 +1,73 @@
+// Wide bounding volume hierarchies: bvh2, bvh4, bvh8, bvh16 as one template over the branching factor N.
+//
+// Nodes and leaf blocks lie in one arena and are named by 32-bit references: a byte offset (a multiple of 32), in whose
+// low five bits stand 8 for a leaf and its number of blocks less one (0 .. 7).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/arena.h"
+#include "core/type_list.h"
+#include "structures/accel.h"
+
+namespace arboretum::bvh {
+
+using NodeReference = std::uint32_t;
+inline constexpr NodeReference kLeafBit = 8, kBlockMask = 7, kOffsetMask = ~31u;
+inline constexpr unsigned kMaxLeafBlocks = 8;
+
+[[nodiscard]] constexpr bool is_leaf(NodeReference r) noexcept { return (r & kLeafBit) != 0; }
+[[nodiscard]] constexpr unsigned block_count(NodeReference r) noexcept { return (r & kBlockMask) + 1; }
+[[nodiscard]] constexpr std::size_t offset_of(NodeReference r) noexcept { return r & kOffsetMask; }
+
+/// planes[2 * axis + side][child], side 0 lower, 1 upper. 64, 112, 224, 448 bytes of planes and references for N = 2, 4,
+/// 8, 16. A slot without a child has lower = +inf, upper = -inf, so that no ray enters it; children come first.
+/// With a stride of 224 bytes on 32-byte addresses a node of N = 8 always lies on four cache lines.
+template <int N>
+struct alignas(N <= 4 ? 64 : 32) Node {
+  float planes[6][N];
+  NodeReference child[N];
+};
+static_assert(sizeof(Node<2>) == 64 && sizeof(Node<4>) == 128 && sizeof(Node<8>) == 256 - 32 && sizeof(Node<16>) == 448);
+
+/// What all branching factors share: the arena, its root, what it was built with.
+class BvhBase : public Accel {
+ public:
+  [[nodiscard]] std::size_t bytes() const noexcept override { return arena_.bytes(); }
+  [[nodiscard]] const std::byte* base() const noexcept { return arena_.data(); }
+  [[nodiscard]] NodeReference root() const noexcept { return root_; }
+  /// Entries that a traversal stack can need, the root's included.
+  [[nodiscard]] std::size_t stack_entries() const noexcept { return stack_entries_; }
+  /// Largest |coordinate| of the scene's bounds: what padded box tests scale their pad with.
+  [[nodiscard]] float max_coordinate() const noexcept { return max_coordinate_; }
+  [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }
+
+ protected:
+  Arena arena_;
+  NodeReference root_ = 0;
+  std::size_t stack_entries_ = 1;
+  float max_coordinate_ = 0.0f;
+  Bounds3f bounds_;
+  std::string leaf_;
+};
+
+template <int N>
+class Bvh final : public BvhBase {
+ public:
+  static constexpr int kBranching = N;
+  static constexpr std::string_view kName = N == 2 ? "bvh2" : N == 4 ? "bvh4" : N == 8 ? "bvh8" : "bvh16";
+  [[nodiscard]] static const StructureInfo& static_info();
+  [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
+  void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
+  [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
+};
+
+using Bvh2 = Bvh<2>;
+using Bvh4 = Bvh<4>;
+using Bvh8 = Bvh<8>;
+using Bvh16 = Bvh<16>;
+using Structures = TypeList<Bvh2, Bvh4, Bvh8, Bvh16>;
+
+}  // namespace arboretum::bvh

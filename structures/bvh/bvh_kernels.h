@@ -1,0 +1,33 @@
+// The kernels of the wide BVHs: which leaf blocks, intersectors and ways of traversal each has on this instruction set.
+#pragma once
+
+#include "intersectors/moller_trumbore.h"
+#include "intersectors/pluecker.h"
+#include "intersectors/watertight.h"
+#include "structures/bvh/bvh_single.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+template <int N>
+struct BvhSingle {
+  template <class Block, class Intersector, bool Padded>
+  struct Maker {
+    static void closest_hit(const Accel& a, std::span<const Ray> r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
+    static void any_hit(const Accel& a, std::span<const Ray> r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
+    static void count_closest_hit(const Accel& a, std::span<const Ray> r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
+    static void count_any_hit(const Accel& a, std::span<const Ray> r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
+  };
+};
+
+template <int N>
+void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
+  constexpr std::string_view name = bvh::Bvh<N>::kName;
+  using Edges = typename BlocksOfWidth<EdgeBlock, kRegisterWidth>::Type;
+  using Vertices = typename BlocksOfWidth<VertexBlock, kRegisterWidth>::Type;
+  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, ConcatLists<Edges, Vertices>{}, TypeList<MollerTrumbore>{});
+  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Vertices{}, TypeList<Watertight, Pluecker>{});
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,108 @@
+// Box tests: one ray against the N child boxes of a node.
+//
+// FastBox keeps no promise at all: rounding can lose a box that the exact ray touches only at a face, edge or corner.
+// PaddedBox never misses a box that the exact ray touches: its interval [near, far] holds the exact one, for every t.
+//
+// With FMA (AVX2, AVX-512) a plane costs one fused multiply: t = plane * r - o * r. Padded: the constants are
+// o * r +- e with e = 2^-21 (M + |o|) |r|, M the scene's largest |coordinate|. Proof: r = (1/d)(1 + a), |a| <= u = 2^-24, so
+// plane * r - o * r is off by u (M + |o|)|r| from (plane - o)/d; rounding o * r, adding e, and the fused operation's own
+// rounding add less than u (|o| + |e| / |r| + M + |o|)|r| each: in all under 4 u (M + |o|)|r| = e / 2. A direction component below
+// 2^-60 of the largest gets r = 2^60 / |d|max: the ray moves by less than the pad along that axis wherever it can meet the
+// scene, and e alone is then larger than any such t.
+//
+// Without FMA (scalar, SSE) t = (plane - o) * r with r = 1/d, infinite for 0; padded: Ize (JCGT 2(2) 2013), r of the far planes
+// two ulp larger. 0 * inf is NaN there; min_x86 and max_x86 keep their second operand, the running value, and so ignore it.
+//
+// Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
+#pragma once
+
+#include "simd/simd.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// One ray's constants for boxes: near[axis] is the byte offset of the near planes within a node of N children.
+template <int N, bool Padded>
+struct BoxRay {
+  static constexpr int W = N < 4 ? 4 : N;
+  static constexpr unsigned kSide = N * sizeof(float);
+
+  float rx, ry, rz;
+  float fx, fy, fz;  ///< o * r of the near planes (FMA), or the reciprocals of the far planes (no FMA)
+  float gx, gy, gz;  ///< o * r of the far planes (FMA), or the origin (no FMA)
+  unsigned near_x, near_y, near_z;
+
+  ARBORETUM_INLINE BoxRay(const Ray& ray, float max_coordinate) {
+    const Vec3f o = ray.origin, d = ray.direction;
+    if constexpr (kHasFma) {
+      const float dmax = largest(d);
+      const float tiny = dmax * 0x1p-60f;
+      const float limit = 0x1p60f / dmax;
+      rx = reciprocal(d.x, tiny, limit), ry = reciprocal(d.y, tiny, limit), rz = reciprocal(d.z, tiny, limit);
+      fx = gx = o.x * rx, fy = gy = o.y * ry, fz = gz = o.z * rz;
+      if constexpr (Padded) {
+        const float ex = pad(o.x, rx, max_coordinate), ey = pad(o.y, ry, max_coordinate), ez = pad(o.z, rz, max_coordinate);
+        fx += ex, fy += ey, fz += ez;
+        gx -= ex, gy -= ey, gz -= ez;
+      }
+    } else {
+      rx = 1.0f / d.x, ry = 1.0f / d.y, rz = 1.0f / d.z;
+      constexpr float kTwoUlp = Padded ? 1.0f + 0x1p-22f : 1.0f;
+      fx = rx * kTwoUlp, fy = ry * kTwoUlp, fz = rz * kTwoUlp;
+      gx = o.x, gy = o.y, gz = o.z;
+    }
+    near_x = __builtin_signbit(rx) ? kSide : 0u;
+    near_y = 2 * kSide + (__builtin_signbit(ry) ? kSide : 0u);
+    near_z = 4 * kSide + (__builtin_signbit(rz) ? kSide : 0u);
+  }
+
+ private:
+  static ARBORETUM_INLINE float largest(Vec3f d) {
+    const float x = __builtin_fabsf(d.x), y = __builtin_fabsf(d.y), z = __builtin_fabsf(d.z);
+    const float xy = x > y ? x : y;
+    return xy > z ? xy : z;
+  }
+  static ARBORETUM_INLINE float reciprocal(float d, float tiny, float limit) {
+    return __builtin_fabsf(d) > tiny ? 1.0f / d : __builtin_copysignf(limit, d);
+  }
+  static ARBORETUM_INLINE float pad(float o, float r, float max_coordinate) {
+    return 0x1p-21f * (max_coordinate + __builtin_fabsf(o)) * __builtin_fabsf(r) + 0x1p-100f;
+  }
+};
+
+/// The constants in registers, one ray on all lanes.
+template <int N, bool Padded>
+struct BoxLanes {
+  static constexpr int W = BoxRay<N, Padded>::W;
+  static constexpr unsigned kSide = BoxRay<N, Padded>::kSide;
+  using F = vf<W>;
+  F rx, ry, rz, fx, fy, fz, gx, gy, gz;
+  unsigned near_x, near_y, near_z;
+
+  ARBORETUM_INLINE explicit BoxLanes(const BoxRay<N, Padded>& b)
+      : rx(b.rx), ry(b.ry), rz(b.rz), fx(b.fx), fy(b.fy), fz(b.fz), gx(b.gx), gy(b.gy), gz(b.gz),
+        near_x(b.near_x), near_y(b.near_y), near_z(b.near_z) {}
+
+  /// Entry distances (at least tnear) and, as bits, the children whose interval within [tnear, tfar] is not empty.
+  ARBORETUM_INLINE unsigned test(const std::byte* node, F tnear, F tfar, F& entry) const {
+    const auto planes = [node](unsigned offset) { return F::load(node + offset); };
+    F nx, ny, nz, lx, ly, lz;
+    if constexpr (kHasFma) {
+      nx = msub(planes(near_x), rx, fx), ny = msub(planes(near_y), ry, fy), nz = msub(planes(near_z), rz, fz);
+      lx = msub(planes(near_x ^ kSide), rx, gx), ly = msub(planes(far(near_y, 2)), ry, gy), lz = msub(planes(far(near_z, 4)), rz, gz);
+    } else {
+      nx = (planes(near_x) - gx) * rx, ny = (planes(near_y) - gy) * ry, nz = (planes(near_z) - gz) * rz;
+      lx = (planes(near_x ^ kSide) - gx) * fx, ly = (planes(far(near_y, 2)) - gy) * fy, lz = (planes(far(near_z, 4)) - gz) * fz;
+    }
+    entry = max_x86(nx, max_x86(ny, max_x86(nz, tnear)));
+    const F exit = min_x86(lx, min_x86(ly, min_x86(lz, tfar)));
+    const unsigned bits = (entry <= exit).bits();
+    return N == W ? bits : bits & ((1u << N) - 1u);
+  }
+
+ private:
+  static ARBORETUM_INLINE unsigned far(unsigned near, unsigned axis_planes) { return (2 * axis_planes + 1) * kSide - near; }
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,111 @@
+#include "traversal/kernel_table.h"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+
+#include "core/error.h"
+#include "kernel_units.h"
+#include "structures/accel.h"
+
+namespace arboretum {
+namespace {
+
+using Key = std::tuple<std::string_view, std::string_view, std::string_view, std::string_view, std::string_view, Isa>;
+
+[[nodiscard]] Key key_of(const KernelRow& r) { return {r.structure, r.leaf, r.intersector, r.box, r.traversal, r.isa}; }
+
+const std::map<Key, const KernelRow*>& index() {
+  static const std::map<Key, const KernelRow*> map = [] {
+    std::map<Key, const KernelRow*> m;
+    for (const KernelRow& row : kernel_table()) m.emplace(key_of(row), &row);
+    return m;
+  }();
+  return map;
+}
+
+/// Whether any row of the structure agrees with the given keys; an empty key agrees with all.
+[[nodiscard]] bool any_row(std::string_view structure, std::string_view leaf, std::string_view intersector, std::string_view box,
+                           std::string_view traversal, const Isa* isa) {
+  const auto agrees = [](std::string_view wanted, std::string_view value) { return wanted.empty() || wanted == value; };
+  return std::ranges::any_of(kernel_table(), [&](const KernelRow& r) {
+    return agrees(structure, r.structure) && agrees(leaf, r.leaf) && agrees(intersector, r.intersector) && agrees(box, r.box) &&
+           agrees(traversal, r.traversal) && (!isa || *isa == r.isa);
+  });
+}
+
+}  // namespace
+
+Counters& Counters::operator+=(const Counters& o) noexcept {
+  rays += o.rays, nodes += o.nodes, boxes += o.boxes, boxes_hit += o.boxes_hit, leaves += o.leaves, blocks += o.blocks;
+  triangles += o.triangles, lanes += o.lanes, lanes_active += o.lanes_active;
+  return *this;
+}
+
+std::span<const KernelRow> kernel_table() {
+  static const std::vector<KernelRow> rows = [] {
+    std::vector<KernelRow> list;
+    add_all_rows(list);
+    return list;
+  }();
+  return rows;
+}
+
+const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector, std::string_view box,
+                             std::string_view traversal, Isa isa) {
+  const auto it = index().find(Key{structure, leaf, intersector, box, traversal, isa});
+  return it == index().end() ? nullptr : it->second;
+}
+
+std::string_view default_leaf(std::string_view structure, std::string_view intersector, Isa isa) {
+  // Four triangles a block were the fastest or within noise of it on every structure and ISA (docs/performance.md);
+  // edges where the intersector takes them, else vertices.
+  for (std::string_view leaf : {"triangle4", "triangle4v"}) {
+    if (any_row(structure, leaf, intersector, "", "", &isa)) return leaf;
+  }
+  for (const KernelRow& r : kernel_table()) {
+    if (r.structure == structure && r.intersector == intersector && r.isa == isa) return r.leaf;
+  }
+  return {};
+}
+
+std::string why_no_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector, std::string_view box,
+                          std::string_view traversal, Isa isa) {
+  if (find_kernel(structure, leaf, intersector, box, traversal, isa)) return {};
+  const std::string s(structure), l(leaf), i(intersector), b(box), t(traversal), a(to_string(isa));
+  if (!any_row(structure, "", "", "", "", nullptr)) return "no kernels for " + s;
+  if (!any_row(structure, "", "", "", "", &isa)) return s + " has no " + a + " kernels";
+  if (!any_row(structure, "", "", "", traversal, nullptr)) return s + " has no " + t + " traversal";
+  if (!any_row(structure, "", "", "", traversal, &isa)) return s + " has no " + t + " traversal on " + a;
+  if (!any_row(structure, "", intersector, "", traversal, &isa)) return s + " has no " + i + " kernels for " + t;
+  if (!any_row(structure, leaf, "", "", traversal, &isa)) return s + " has no leaf " + l + " for " + t;
+  if (!any_row(structure, leaf, intersector, "", traversal, &isa)) {
+    std::string others;
+    for (const KernelRow& r : kernel_table()) {
+      if (r.structure == structure && r.intersector == intersector && r.traversal == traversal && r.isa == isa &&
+          others.find(" " + std::string(r.leaf) + ",") == std::string::npos) {
+        others += " " + std::string(r.leaf) + ",";
+      }
+    }
+    others.pop_back();
+    return i + " cannot read leaf " + l + " in " + s + ": use" + others;
+  }
+  return s + " with " + l + " and " + i + " has no box test " + b + " for " + t;
+}
+
+const AxisValues& axis_values() {
+  static const AxisValues values = [] {
+    AxisValues v;
+    const auto add = [](std::vector<std::string_view>& list, std::string_view value) {
+      if (std::ranges::find(list, value) == list.end()) list.push_back(value);
+    };
+    for (const KernelRow& r : kernel_table()) {
+      add(v.structures, r.structure), add(v.leaves, r.leaf), add(v.intersectors, r.intersector);
+      add(v.boxes, r.box), add(v.traversals, r.traversal);
+    }
+    return v;
+  }();
+  return values;
+}
+
+}  // namespace arboretum

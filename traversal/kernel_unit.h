@@ -1,0 +1,26 @@
+// What every kernel unit includes before its ISA begins: standard headers and the project's baseline headers, so that
+// nothing of them is compiled for the ISA. Units are generated (cmake/Structures.cmake).
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include <immintrin.h>
+
+#include "core/isa.h"
+#include "core/ray.h"
+#include "structures/accel.h"
+#include "structures/leaves/blocks.h"
+#include "traversal/counting.h"
+#include "traversal/kernel_rows.h"
+#include "traversal/kernel_table.h"
+
+#include "simd/target.h"
