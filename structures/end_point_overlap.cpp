@@ -15,7 +15,7 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kLargest = 64;  ///< records that are never left out
-constexpr std::size_t kPilot = 256;   ///< records that the work is estimated from
+constexpr std::size_t kPilot = 64;    ///< records that the work is estimated from
 constexpr double kClipWork = 16.0;    ///< of a clip, in box steps
 
 using Point = std::array<double, 3>;
@@ -26,9 +26,16 @@ struct Polygon {
   int count = 0;
 };
 
-/// Sutherland-Hodgman: the part of `in` with sign * (x[axis] - plane) <= 0.
-Polygon clip(const Polygon& in, std::size_t axis, double plane, double sign) {
-  Polygon out;
+/// Sutherland-Hodgman: leaves the part with sign * (x[axis] - plane) <= 0.
+void clip(Polygon& polygon, std::size_t axis, double plane, double sign) {
+  bool all_in = true;
+  for (int i = 0; i < polygon.count; ++i) {
+    all_in = all_in && sign * (polygon.points[static_cast<std::size_t>(i)][axis] - plane) <= 0;
+  }
+  if (all_in) return;
+  const Polygon in = polygon;
+  Polygon& out = polygon;
+  out.count = 0;
   for (int i = 0; i < in.count; ++i) {
     const Point& p = in.points[static_cast<std::size_t>(i)];
     const Point& q = in.points[static_cast<std::size_t>((i + 1) % in.count)];
@@ -42,7 +49,6 @@ Polygon clip(const Polygon& in, std::size_t axis, double plane, double sign) {
       out.points[static_cast<std::size_t>(out.count++)] = cut;
     }
   }
-  return out;
 }
 
 double area_of(const Polygon& polygon) {
@@ -80,6 +86,9 @@ class Measure {
       repeated_ = repeated_ || seen[r];
       seen[r] = true;
     }
+    area_before_.reserve(references.size() + 1);
+    area_before_.push_back(0.0);
+    for (std::uint32_t r : references) area_before_.push_back(area_before_.back() + areas_[r]);
   }
 
   [[nodiscard]] double total_area() const { return total_area_; }
@@ -95,6 +104,12 @@ class Measure {
       ++work;
       const TreeRecord& record = records_[i];
       if (i == index || !overlap(record.bounds, own.bounds)) {
+        i = record.end;
+        continue;
+      }
+      const bool is_ancestor = i < index && index < record.end;
+      if (!repeated_ && !is_ancestor && own.bounds.contains(record.bounds)) {
+        area += area_before_[record.end_reference] - area_before_[record.first_reference];
         i = record.end;
         continue;
       }
@@ -126,6 +141,7 @@ class Measure {
   std::span<const std::uint32_t> references_;
   std::vector<double> areas_;
   std::vector<Bounds3f> bounds_;
+  std::vector<double> area_before_;  ///< of the triangles of the references before each
   double total_area_ = 0.0;
   bool repeated_ = false;  ///< leaves share triangles, which must count once
 };
@@ -178,8 +194,8 @@ double clipped_area(const std::array<Vec3f, 3>& corners, const Bounds3f& box) {
   polygon.count = 3;
   for (std::size_t i = 0; i < 3; ++i) polygon.points[i] = {corners[i].x, corners[i].y, corners[i].z};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    polygon = clip(polygon, axis, box.lower[axis], -1.0);
-    polygon = clip(polygon, axis, box.upper[axis], 1.0);
+    clip(polygon, axis, box.lower[axis], -1.0);
+    clip(polygon, axis, box.upper[axis], 1.0);
     if (polygon.count < 3) return 0.0;
   }
   return area_of(polygon);
