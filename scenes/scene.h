@@ -25,7 +25,7 @@ struct Camera {
 
 /// A material of an MTL file: Kd, Ks, Ke, Tf, Ni, illum, d, map_Kd, map_d.
 struct Material {
-  std::string name;
+  std::string name{};
   Vec3f diffuse{0.6f, 0.6f, 0.6f};
   Vec3f specular{0, 0, 0};
   Vec3f emission{0, 0, 0};
@@ -35,12 +35,12 @@ struct Material {
   float ior = 1.0f;             ///< Ni
   float opacity = 1.0f;         ///< d
   int illum = 2;
-  std::string diffuse_map, opacity_map;
+  std::string diffuse_map{}, opacity_map{};  ///< paths of the images; empty: none
 };
 
 struct Light {
   enum class Type { point, directional, spot } type = Type::point;
-  Vec3f position, direction;
+  Vec3f position{}, direction{};
   Vec3f intensity{1, 1, 1};
   float cone_degrees = 90.0f;
 };
@@ -55,6 +55,11 @@ struct LoadReport {
   std::vector<std::string> warnings;  ///< one line each
 };
 
+/// When the shutter is open; equal times: no motion blur.
+struct Shutter {
+  float open = 0.0f, close = 0.0f;
+};
+
 struct Scene {
   std::string name;
   TriangleMesh mesh;
@@ -62,6 +67,9 @@ struct Scene {
   std::vector<Light> lights;
   Vec3f environment{0, 0, 0};
   std::optional<Camera> camera;
+  Shutter shutter;
+  unsigned key_frames = 1;     ///< most key frames of one mesh in the scene file; `mesh` holds the first
+  std::size_t instances = 0;   ///< transforms that the scene file names; they are baked into `mesh`
   LoadReport report;
 };
 

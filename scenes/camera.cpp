@@ -1,0 +1,38 @@
+#include "scenes/camera.h"
+
+#include <algorithm>
+
+namespace arboretum {
+
+Camera frame_bounds(const Bounds3f& bounds) {
+  Camera camera;
+  const Vec3d lower(bounds.lower), upper(bounds.upper);
+  const Vec3d center = (lower + upper) * 0.5;
+  const double radius = std::max(0.5 * length(upper - lower), 1e-30);
+  const UnitCircle half_angle(0.5 * double(camera.vertical_fov) / 360.0);
+  const Vec3d towards = normalize(Vec3d{0.8, 0.5, 1.0});
+  camera.look_at = to_float(center);
+  camera.position = to_float(center + towards * (radius / half_angle.sine));
+  camera.focus_distance = float(radius / half_angle.sine);
+  return camera;
+}
+
+Camera view_of(const Scene& scene) { return scene.camera ? *scene.camera : frame_bounds(scene.mesh.bounds()); }
+
+RayGenerator::RayGenerator(const Camera& camera, unsigned width, unsigned height) : origin_(camera.position) {
+  const Vec3d forward = normalize(Vec3d(camera.look_at) - Vec3d(camera.position));
+  const Vec3d right = normalize(cross(forward, Vec3d(camera.up))) * (camera.mirror_x ? -1.0 : 1.0);
+  const Vec3d up = normalize(cross(cross(forward, Vec3d(camera.up)), forward));
+  const UnitCircle half_angle(0.5 * double(camera.vertical_fov) / 360.0);
+  const double half_height = half_angle.sine / half_angle.cosine;
+  const double pixel = 2.0 * half_height / double(height);
+  step_x_ = right * pixel;
+  step_y_ = up * -pixel;
+  corner_ = forward - step_x_ * (0.5 * double(width)) - step_y_ * (0.5 * double(height));
+}
+
+Ray RayGenerator::ray(double x, double y) const noexcept {
+  return Ray{.origin = origin_, .direction = to_float(normalize(corner_ + step_x_ * x + step_y_ * y))};
+}
+
+}  // namespace arboretum

@@ -1,0 +1,29 @@
+// Camera rays, and the view of a scene that has no camera.
+#pragma once
+
+#include "core/bounds.h"
+#include "core/ray.h"
+#include "scenes/scene.h"
+#include "scenes/vec3d.h"
+
+namespace arboretum {
+
+/// A camera that sees the whole box from a fixed three-quarter view, y up.
+[[nodiscard]] Camera frame_bounds(const Bounds3f& bounds);
+/// The scene's camera, or frame_bounds of its mesh.
+[[nodiscard]] Camera view_of(const Scene& scene);
+
+/// Makes rays of a camera for a picture of given size; the same bits on every machine.
+class RayGenerator {
+ public:
+  RayGenerator(const Camera& camera, unsigned width, unsigned height);
+  /// The pinhole ray through picture position (x, y) in pixels, y downwards; (0.5, 0.5) is the first pixel's centre. The
+  /// direction has unit length, the interval is [0, infinity).
+  [[nodiscard]] Ray ray(double x, double y) const noexcept;
+
+ private:
+  Vec3f origin_;
+  Vec3d corner_, step_x_, step_y_;
+};
+
+}  // namespace arboretum

@@ -1,0 +1,78 @@
+// sphere, sphere_flake. The flake follows the one of Haines' Standard Procedural Databases (1987): on each sphere nine of
+// a third of its radius, six around its equator and three above.
+#include <deque>
+
+#include "scenes/generators/generators.h"
+#include "scenes/generators/surface.h"
+
+namespace arboretum {
+namespace {
+
+struct Ball {
+  Vec3d center;
+  double radius;
+  Frame frame;  ///< its normal points away from the parent; the children's poles too
+  int level;
+};
+
+void add_ball(MeshBuilder& builder, const Ball& ball, std::size_t count, std::uint16_t material) {
+  builder.add_closed(count, 0.5, material, [&ball](double v, double turns) {
+    const UnitCircle latitude(0.5 * v), longitude(turns);  // v = 0: the pole at -normal
+    return ball.center +
+           ball.frame.to_world(Vec3d{latitude.sine * longitude.cosine, latitude.sine * longitude.sine, -latitude.cosine}) * ball.radius;
+  });
+}
+
+std::size_t balls_of(int levels) {
+  std::size_t all = 0, level = 1;
+  for (int i = 0; i <= levels; ++i) all += level, level *= 9;
+  return all;
+}
+
+}  // namespace
+
+Scene generate_sphere(std::size_t triangles, std::uint64_t) {
+  MeshBuilder builder;
+  add_ball(builder, Ball{{0, 0, 0}, 1.0, Frame({0, 1, 0}), 0}, MeshBuilder::closed_count(triangles), 0);
+  Scene scene;
+  scene.mesh = builder.take();
+  scene.materials.push_back(Material{.name = "matt", .diffuse = {0.7f, 0.6f, 0.5f}});
+  scene.camera = Camera{.position = {1.2f, 1.4f, 2.6f}, .look_at = {0, 0, 0}};
+  scene.lights.push_back(Light{.position = {3, 4, 3}, .intensity = {20, 20, 20}});
+  return scene;
+}
+
+Scene generate_sphere_flake(std::size_t triangles, std::uint64_t) {
+  constexpr std::size_t kTrianglesPerBall = 48;  // fewer look like crystals
+  constexpr int kMostLevels = 7;
+  const std::size_t wanted = MeshBuilder::closed_count(triangles);
+  int levels = 0;
+  while (levels < kMostLevels && balls_of(levels + 1) * kTrianglesPerBall <= wanted) ++levels;
+
+  MeshBuilder builder;
+  std::deque<Ball> waiting{Ball{{0, 0, 0}, 1.0, Frame({0, 1, 0}), 0}};
+  std::size_t left = balls_of(levels);
+  for (; !waiting.empty(); --left) {
+    const Ball ball = waiting.front();
+    waiting.pop_front();
+    add_ball(builder, ball, MeshBuilder::closed_count((wanted - builder.size()) / left), std::uint16_t(ball.level % 2));
+    if (ball.level == levels) continue;
+    for (int child = 0; child < 9; ++child) {
+      const bool upper = child >= 6;
+      const UnitCircle latitude(upper ? 0.15 : 0.0), longitude(upper ? (child - 6) / 3.0 + 1.0 / 12.0 : child / 6.0);
+      const Vec3d direction = normalize(
+          ball.frame.to_world({latitude.cosine * longitude.cosine, latitude.cosine * longitude.sine, latitude.sine}));
+      const double radius = ball.radius / 3.0;
+      waiting.push_back({ball.center + direction * (ball.radius + radius), radius, Frame(direction), ball.level + 1});
+    }
+  }
+  Scene scene;
+  scene.mesh = builder.take();
+  scene.materials.push_back(Material{.name = "mirror", .diffuse = {0.1f, 0.1f, 0.1f}, .specular = {0.8f, 0.7f, 0.5f}, .illum = 3});
+  scene.materials.push_back(Material{.name = "matt", .diffuse = {0.3f, 0.4f, 0.7f}});
+  scene.camera = Camera{.position = {2.1f, 2.0f, 3.6f}, .look_at = {0, 0.25f, 0}};
+  scene.lights.push_back(Light{.position = {4, 6, 3}, .intensity = {40, 40, 40}});
+  return scene;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,62 @@
+#include "scenes/images.h"
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#endif
+#include <stb/stb_image.h>
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+#include "core/error.h"
+#include "scenes/file_bytes.h"
+#include "scenes/vec3d.h"
+
+namespace arboretum {
+
+Vec3f mean_radiance(const std::filesystem::path& image) {
+  check_readable_file(image);
+  int width = 0, height = 0, channels = 0;
+  const std::unique_ptr<float, void (*)(void*)> pixels(stbi_loadf(image.c_str(), &width, &height, &channels, 3), stbi_image_free);
+  if (!pixels) throw UserError(image.string() + ": no image that can be read: " + stbi_failure_reason());
+  Vec3d sum;
+  double weights = 0.0;
+  for (int y = 0; y < height; ++y) {
+    const double weight = UnitCircle(0.5 * (y + 0.5) / height).sine;  // solid angle of the row's pixels
+    for (int x = 0; x < width; ++x) {
+      const float* p = pixels.get() + 3 * (std::size_t(y) * std::size_t(width) + std::size_t(x));
+      sum = sum + Vec3d(p[0], p[1], p[2]) * weight;
+    }
+    weights += weight * width;
+  }
+  const Vec3f mean = to_float(sum * (1.0 / weights));
+  if (!is_finite(mean)) throw UserError(image.string() + ": holds values that are not finite");
+  return mean;
+}
+
+std::optional<ValueRange> value_range(const std::filesystem::path& image) {
+  int width = 0, height = 0, channels = 0;
+  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(stbi_load(image.c_str(), &width, &height, &channels, 0), stbi_image_free);
+  if (!pixels) return std::nullopt;
+  ValueRange range;
+  const std::size_t count = std::size_t(width) * std::size_t(height), stride = std::size_t(channels);
+  for (std::size_t i = 0; i < count; ++i) {
+    const stbi_uc* p = pixels.get() + i * stride;
+    for (std::size_t c = 0; c < stride; ++c) {
+      range.least = std::min(range.least, float(p[c]) / 255.0f);
+      range.greatest = std::max(range.greatest, float(p[c]) / 255.0f);
+    }
+    range.constant = range.constant && std::memcmp(p, pixels.get(), stride) == 0;
+  }
+  return range;
+}
+
+}  // namespace arboretum

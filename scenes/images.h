@@ -1,0 +1,21 @@
+// Images that scenes refer to, as far as they are looked at: mean radiance, and whether they hold anything but one value.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "core/vec3.h"
+
+namespace arboretum {
+
+/// Mean over all directions of a latitude-longitude image (HDR, PNG, JPEG …). Throws UserError.
+[[nodiscard]] Vec3f mean_radiance(const std::filesystem::path& image);
+
+/// Least and greatest value of any channel of an image, 0 to 1; nothing where it cannot be read.
+struct ValueRange {
+  float least = 1.0f, greatest = 0.0f;
+  bool constant = true;  ///< every pixel has the first one's colour
+};
+[[nodiscard]] std::optional<ValueRange> value_range(const std::filesystem::path& image);
+
+}  // namespace arboretum

@@ -1,0 +1,110 @@
+// load_scene: the four ways in which a scene is named, one way out.
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "scenes/catalogue.h"
+#include "scenes/generators/generators.h"
+#include "scenes/readers.h"
+#include "scenes/sanitise.h"
+#include "scenes/scene.h"
+
+namespace arboretum {
+namespace {
+
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return extension;
+}
+
+bool is_yaml(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".yaml" || extension == ".yml";
+}
+
+std::vector<std::string> generator_names() {
+  std::vector<std::string> names;
+  for (const GeneratorInfo& g : generators()) names.emplace_back(g.name);
+  return names;
+}
+
+std::uint64_t parse_whole_number(std::string_view text, std::string_view what, const std::string& word) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size())
+    throw UserError(fmt::format("scene '{}': {} '{}' is no whole number; write GENERATOR:TRIANGLES or GENERATOR:TRIANGLES:SEED", word, what, text));
+  return value;
+}
+
+}  // namespace
+
+Scene read_model(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".obj") return read_obj(path);
+  if (extension == ".ply") return read_ply(path);
+  return read_assimp(path);
+}
+
+std::string SceneSpec::name() const {
+  if (!catalogue.empty()) return catalogue;
+  if (!file.empty()) return file.stem().string();
+  if (!scene.empty()) return scene.stem().string();
+  return fmt::format("{}-{}{}", generator, triangles, seed == 1 ? std::string() : fmt::format("-seed{}", seed));
+}
+
+Scene load_scene(const SceneSpec& spec) {
+  const int forms = !spec.catalogue.empty() + !spec.file.empty() + !spec.scene.empty() + !spec.generator.empty();
+  if (forms != 1) throw UserError("a scene is named by exactly one of: a catalogue name, file, scene, generate");
+  if (!spec.generator.empty()) {
+    Scene scene = generate_scene(spec.generator, spec.triangles, spec.seed);
+    scene.name = spec.name();
+    return scene;
+  }
+  if (!spec.catalogue.empty()) {
+    const CatalogueEntry entry = find_catalogue_entry(spec.catalogue);
+    if (entry.source != CatalogueEntry::Source::generator) return load_catalogue_scene(entry);
+    Scene scene = generate_scene(entry.name, entry.triangles, 1);
+    scene.name = spec.name();
+    return scene;
+  }
+  const std::filesystem::path& path = spec.file.empty() ? spec.scene : spec.file;
+  if (!spec.file.empty() && is_yaml(path)) throw UserError(path.string() + ": is a scene file; name it with 'scene:' instead of 'file:'");
+  if (!spec.scene.empty() && !is_yaml(path)) throw UserError(path.string() + ": is no scene file (.yaml); name a model with 'file:' instead of 'scene:'");
+  Scene scene = spec.file.empty() ? read_scene_yaml(path) : read_model(path);
+  sanitise(scene, path.string());
+  scene.name = spec.name();
+  return scene;
+}
+
+SceneSpec parse_scene_word(const std::string& word) {
+  SceneSpec spec;
+  if (word.empty()) throw UserError("a scene's name is empty; see: ./arboretum list scenes");
+  std::error_code error;
+  const std::filesystem::path path(word);
+  const std::size_t colon = word.find(':');
+  const std::string head = word.substr(0, colon);
+  const std::vector<std::string> names = generator_names();
+  const bool generated = std::find(names.begin(), names.end(), head) != names.end();
+  if (!generated && (word.find('/') != std::string::npos || std::filesystem::exists(path, error) || !path.extension().empty())) {
+    (is_yaml(path) ? spec.scene : spec.file) = path;
+    return spec;
+  }
+  if (generated) {
+    spec.generator = head;
+    if (colon == std::string::npos) return spec;
+    const std::size_t second = word.find(':', colon + 1);
+    spec.triangles = parse_whole_number(std::string_view(word).substr(colon + 1, second - colon - 1), "the number of triangles", word);
+    if (second != std::string::npos) spec.seed = parse_whole_number(std::string_view(word).substr(second + 1), "the seed", word);
+    return spec;
+  }
+  if (colon != std::string::npos) throw UserError(unknown_name_message("generator", head, names));
+  spec.catalogue = find_catalogue_entry(word).name;
+  return spec;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,28 @@
+// Numbers out of text: correctly rounded floats, `nan` and `inf` included, whatever the locale.
+#pragma once
+
+#include <charconv>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+namespace arboretum {
+
+/// Skips blanks (not line ends).
+[[nodiscard]] inline const char* skip_blanks(const char* p, const char* end) noexcept {
+  while (p != end && (*p == ' ' || *p == '\t')) ++p;
+  return p;
+}
+
+/// Reads a float at `p`; returns the end of it, or nullptr where there is none. What is too large becomes an infinity,
+/// what is too small zero or a subnormal.
+[[nodiscard]] inline const char* parse_float(const char* p, const char* end, float& value) {
+  if (p != end && *p == '+') ++p;
+  const auto [next, error] = std::from_chars(p, end, value);
+  if (error == std::errc{}) return next;
+  if (error != std::errc::result_out_of_range) return nullptr;
+  value = std::strtof(std::string(p, next).c_str(), nullptr);
+  return next;
+}
+
+}  // namespace arboretum

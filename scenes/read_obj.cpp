@@ -1,0 +1,201 @@
+// OBJ through tinyobjloader's callback interface: no intermediate copy, and the text of the line at hand stays in reach.
+// tinyobjloader reads `nan` and `inf` as 0, rounds some decimals wrongly and wraps indices beyond 32 bits; so
+// coordinates are read again here from the line itself, and faces with over-long numbers are refused.
+#include <tiny_obj_loader.h>
+
+#include <algorithm>
+#include <istream>
+#include <map>
+#include <optional>
+#include <streambuf>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "scenes/file_bytes.h"
+#include "scenes/number_text.h"
+#include "scenes/polygon.h"
+#include "scenes/readers.h"
+
+namespace arboretum {
+namespace {
+
+/// A stream buffer over mapped bytes. At a callback the get pointer stands just behind the line that caused it.
+class MappedBuffer : public std::streambuf {
+ public:
+  explicit MappedBuffer(std::string_view text) {
+    char* p = const_cast<char*>(text.data());
+    setg(p, p, p + text.size());
+  }
+  /// The line just read, without its end.
+  [[nodiscard]] std::string_view line() const {
+    const char* end = gptr();
+    if (end > eback() && end[-1] == '\n') --end;
+    if (end > eback() && end[-1] == '\r') --end;
+    const char* begin = end;
+    while (begin > eback() && begin[-1] != '\n' && begin[-1] != '\r') --begin;
+    return {begin, std::size_t(end - begin)};
+  }
+  [[nodiscard]] std::size_t line_number() const {
+    return 1 + std::size_t(std::count(static_cast<const char*>(eback()), line().data(), '\n'));
+  }
+};
+
+struct ObjReader {
+  const std::filesystem::path& path;
+  MappedBuffer buffer;
+  Scene scene;
+  std::map<std::string, int> material_ids;
+  bool material_library_seen = false;
+  std::optional<std::uint16_t> material, default_material;
+  std::vector<std::uint32_t> corners;
+  std::size_t short_faces = 0;
+
+  ObjReader(const std::filesystem::path& p, std::string_view text) : path(p), buffer(text) {}
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw UserError(fmt::format("{}:{}: {}", path.string(), buffer.line_number(), what));
+  }
+
+  void add_vertex() {
+    const std::string_view line = buffer.line();
+    const char *p = line.data(), *end = p + line.size();
+    p = skip_blanks(p, end) + 1;  // behind the `v`
+    Vec3f v;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      p = skip_blanks(p, end);
+      const char* next = parse_float(p, end, v[axis]);
+      if (!next) fail(fmt::format("vertex {} has no number for {}; write 'v x y z'", scene.mesh.vertices.size() + 1, "xyz"[axis]));
+      p = next;
+    }
+    if (scene.mesh.vertices.size() >= 0xfffffffeu) fail("more than 2^32 - 2 vertices");
+    scene.mesh.vertices.push_back(v);
+  }
+
+  void check_number_lengths() const {
+    std::size_t digits = 0;
+    for (const char c : buffer.line()) {
+      digits = c >= '0' && c <= '9' ? digits + 1 : 0;
+      if (digits > 9) fail("a face index is out of range");
+    }
+  }
+
+  void add_face(const tinyobj::index_t* indices, int count) {
+    check_number_lengths();
+    const auto vertices = std::int64_t(scene.mesh.vertices.size());
+    corners.clear();
+    for (int i = 0; i < count; ++i) {
+      const std::int64_t index = indices[i].vertex_index;
+      const std::int64_t vertex = index > 0 ? index - 1 : vertices + index;
+      if (index == 0 || vertex < 0 || vertex >= vertices) {
+        fail(fmt::format("face index {} is out of range: {} vertices precede it, so valid are 1 to {} and -1 to -{}", index,
+                         vertices, vertices, vertices));
+      }
+      corners.push_back(std::uint32_t(vertex));
+    }
+    if (corners.size() < 3) {
+      ++short_faces;
+      return;
+    }
+    scene.report.polygons_split += corners.size() > 3;
+    triangulate(corners, scene.mesh.vertices, scene.mesh.triangles);
+    if (scene.mesh.triangles.size() >= kNoTriangle) fail("more than 2^32 - 2 triangles");
+    if (!material) use_default_material();
+    scene.mesh.materials.resize(scene.mesh.triangles.size(), *material);
+  }
+
+  void use_default_material() {
+    if (!default_material) {
+      default_material = std::uint16_t(scene.materials.size());
+      scene.materials.push_back(Material{.name = "default"});
+    }
+    material = *default_material;
+  }
+
+  void use_material(const std::string& name) {
+    if (const auto found = material_ids.find(name); found != material_ids.end()) {
+      material = std::uint16_t(found->second);
+      return;
+    }
+    if (material_library_seen) {
+      scene.report.warnings.push_back(fmt::format("{}:{}: no material '{}' in the material library; grey stands in",
+                                                  path.string(), buffer.line_number(), name));
+    }
+    use_default_material();
+  }
+
+  void add_library(const std::string& name) {
+    material_library_seen = true;
+    const std::filesystem::path file = path.parent_path() / name;
+    if (std::error_code error; !std::filesystem::exists(file, error)) {
+      scene.report.warnings.push_back(fmt::format("{}:{}: no material library '{}'; grey stands in for its materials",
+                                                  path.string(), buffer.line_number(), file.string()));
+      material_library_seen = false;
+      return;
+    }
+    std::vector<Material> read = read_mtl(file, scene.report.warnings);
+    for (Material& m : read) {
+      material_ids.emplace(m.name, int(scene.materials.size()));
+      scene.materials.push_back(std::move(m));
+    }
+    if (scene.materials.size() > kMaxMaterials) fail(fmt::format("more than {} materials", kMaxMaterials));
+  }
+
+  static constexpr std::size_t kNoTriangle = 0xffffffffu;
+  static constexpr std::size_t kMaxMaterials = 65534;  // one is left for the default
+};
+
+/// The word behind the keyword, trailing blanks left out: tinyobjloader's own callback for it needs its material table.
+std::string argument(std::string_view line, std::size_t keyword) {
+  line.remove_prefix(std::min(line.size(), line.find_first_not_of(" \t") + keyword));
+  const std::size_t first = line.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return std::string(line.substr(first, line.find_last_not_of(" \t") - first + 1));
+}
+
+/// Stands in for tinyobjloader's own lookup of `mtllib`, whose failures are no more than a line in a warning string.
+class LibraryReader : public tinyobj::MaterialReader {
+ public:
+  explicit LibraryReader(ObjReader& reader) : reader_(reader) {}
+  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*, std::map<std::string, int>*, std::string*,
+                  std::string*) override {
+    reader_.add_library(name);
+    return true;
+  }
+
+ private:
+  ObjReader& reader_;
+};
+
+}  // namespace
+
+Scene read_obj(const std::filesystem::path& path) {
+  const FileBytes bytes(path);
+  ObjReader reader(path, bytes.text());
+  tinyobj::callback_t callback;
+  callback.vertex_cb = [](void* self, auto...) { static_cast<ObjReader*>(self)->add_vertex(); };
+  callback.index_cb = [](void* self, tinyobj::index_t* indices, int count) {
+    static_cast<ObjReader*>(self)->add_face(indices, count);
+  };
+  callback.usemtl_cb = [](void* self, const char*, int) {
+    auto& r = *static_cast<ObjReader*>(self);
+    r.use_material(argument(r.buffer.line(), 6));
+  };
+  LibraryReader library(reader);
+  std::istream stream(&reader.buffer);
+  std::string warnings, error;
+  if (!tinyobj::LoadObjWithCallback(stream, callback, &reader, &library, &warnings, &error)) {
+    throw UserError(path.string() + ": " + one_line(error));
+  }
+  Scene& scene = reader.scene;
+  if (reader.short_faces > 0) {
+    scene.report.warnings.push_back(
+        fmt::format("{}: {} faces of fewer than three corners left out", path.string(), reader.short_faces));
+  }
+  if (scene.mesh.triangles.empty()) {
+    throw UserError(fmt::format("{}: no face in it ({} vertices); is it an OBJ file?", path.string(), scene.mesh.vertices.size()));
+  }
+  return std::move(reader.scene);
+}
+
+}  // namespace arboretum

@@ -1,0 +1,31 @@
+// Readers: one model file in, one Scene out. They check that indices are in range and leave the rest of the sanitising
+// (non-finite, out of range, zero area) to scenes/sanitise.h.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "scenes/scene.h"
+
+namespace arboretum {
+
+/// Wavefront OBJ through tinyobjloader, materials of its mtllib included. Throws UserError.
+[[nodiscard]] Scene read_obj(const std::filesystem::path& path);
+/// PLY, ASCII or binary. A `material_id` of a face indexes the materials of the MTL file of the same stem. Throws UserError.
+[[nodiscard]] Scene read_ply(const std::filesystem::path& path);
+/// STL, glTF, GLB, OFF and whatever else assimp knows, node transforms applied. Throws UserError.
+[[nodiscard]] Scene read_assimp(const std::filesystem::path& path);
+/// Materials in the file's order. Warnings of the parser are appended, one line each.
+[[nodiscard]] std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<std::string>& warnings);
+/// A scene file of the project. Throws UserError.
+[[nodiscard]] Scene read_scene_yaml(const std::filesystem::path& path);
+
+/// Any model by its extension, not sanitised.
+[[nodiscard]] Scene read_model(const std::filesystem::path& path);
+
+/// Line breaks and control characters of a library's message made spaces, so that an error stays one line.
+[[nodiscard]] std::string one_line(std::string_view text);
+
+}  // namespace arboretum

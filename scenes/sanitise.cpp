@@ -1,0 +1,87 @@
+#include "scenes/sanitise.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+
+namespace arboretum {
+namespace {
+
+/// Whether the doubles sum to zero exactly: they are gathered into a non-overlapping expansion (Shewchuk 1997,
+/// GROW-EXPANSION), which is zero only when each of its components is.
+template <std::size_t N>
+bool sums_to_zero(const double (&terms)[N]) noexcept {
+  double expansion[N] = {};
+  for (std::size_t n = 0; n < N; ++n) {
+    double carry = terms[n];
+    for (std::size_t i = 0; i < n; ++i) {
+      const double sum = carry + expansion[i];
+      const double virtual_part = sum - carry;
+      const double error = (carry - (sum - virtual_part)) + (expansion[i] - virtual_part);
+      expansion[i] = error, carry = sum;
+    }
+    expansion[n] = carry;
+  }
+  for (const double component : expansion)
+    if (component != 0.0) return false;
+  return true;
+}
+
+/// Whether three points of the plane, float32 numbers in doubles, are exactly collinear. Products of two floats are exact
+/// in double (48 bits, no underflow), so the determinant is an exact sum of six doubles.
+bool collinear(double ax, double ay, double bx, double by, double cx, double cy) noexcept {
+  const double left = (bx - ax) * (cy - ay), right = (by - ay) * (cx - ax);
+  constexpr double kErrorBound = 4.0 * 0x1p-53;  // Shewchuk's ccwerrboundA is (3 + 16 u) u
+  if (std::abs(left - right) > kErrorBound * (std::abs(left) + std::abs(right))) return false;
+  return sums_to_zero({ax * by, -ay * bx, bx * cy, -by * cx, cx * ay, -cy * ax});
+}
+
+bool is_in_range(Vec3f v) noexcept {
+  return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate && std::abs(v.z) <= kMaxCoordinate;
+}
+
+}  // namespace
+
+bool has_zero_area(Vec3f a, Vec3f b, Vec3f c) noexcept {
+  return collinear(a.x, a.y, b.x, b.y, c.x, c.y) && collinear(a.y, a.z, b.y, b.z, c.y, c.z) &&
+         collinear(a.z, a.x, b.z, b.x, c.z, c.x);
+}
+
+void sanitise(Scene& scene, const std::string& source) {
+  TriangleMesh& mesh = scene.mesh;
+  LoadReport& report = scene.report;
+  report.triangles_read += mesh.triangles.size();
+  const bool has_materials = mesh.materials.size() == mesh.triangles.size();
+  if (!has_materials) mesh.materials.clear();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto [a, b, c] = mesh.corners(i);
+    if (!is_finite(a) || !is_finite(b) || !is_finite(c)) {
+      ++report.non_finite;
+    } else if (!is_in_range(a) || !is_in_range(b) || !is_in_range(c)) {
+      ++report.out_of_range;
+    } else if (has_zero_area(a, b, c)) {
+      ++report.degenerate;
+    } else {
+      mesh.triangles[kept] = mesh.triangles[i];
+      if (has_materials) mesh.materials[kept] = mesh.materials[i];
+      ++kept;
+    }
+  }
+  mesh.triangles.resize(kept);
+  if (has_materials) mesh.materials.resize(kept);
+  for (Vec3f& v : mesh.vertices)
+    if (!is_finite(v) || !is_in_range(v)) v = Vec3f{};
+  if (kept == 0) {
+    throw UserError(fmt::format("{}: no triangle left: of {} read, {} are not finite, {} out of range, {} of zero area", source,
+                                report.triangles_read, report.non_finite, report.out_of_range, report.degenerate));
+  }
+  if (scene.materials.empty()) {
+    scene.materials.push_back(Material{.name = "default"});
+    mesh.materials.clear();
+  }
+}
+
+}  // namespace arboretum

@@ -1,0 +1,127 @@
+#include "scenes/yaml_node.h"
+
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "scenes/file_bytes.h"
+#include "scenes/readers.h"
+#include "scenes/vec3d.h"
+
+namespace arboretum {
+
+YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
+  const FileBytes bytes(path_);
+  try {
+    root_ = YAML::Load(std::string(bytes.text()));
+  } catch (const YAML::Exception& error) {
+    throw UserError(fmt::format("{}:{}: {}", path_.string(), error.mark.line + 1, one_line(error.msg)));
+  }
+  if (!root_.IsMap()) throw UserError(path_.string() + ": is no scene file: expected keys such as 'meshes:' at its top");
+}
+
+void YamlFile::fail(const YAML::Node& node, const std::string& what) const {
+  const int line = node.Mark().line + 1;
+  throw UserError(line > 0 ? fmt::format("{}:{}: {}", path_.string(), line, what) : fmt::format("{}: {}", path_.string(), what));
+}
+
+void YamlFile::check_keys(const YAML::Node& node, std::string_view what, std::initializer_list<const char*> keys) const {
+  if (!node.IsMap()) fail(node, fmt::format("{} must be a map of keys and values", what));
+  const std::vector<std::string> valid(keys.begin(), keys.end());
+  std::set<std::string> seen;
+  for (const auto& entry : node) {
+    if (!entry.first.IsScalar()) fail(entry.first, fmt::format("a key of {} is no word", what));
+    const std::string& key = entry.first.Scalar();
+    if (std::find(valid.begin(), valid.end(), key) == valid.end())
+      fail(entry.first, unknown_name_message(fmt::format("key of {}", what), one_line(key), valid));
+    if (!seen.insert(key).second) fail(entry.first, fmt::format("{} names '{}' twice", what, key));
+  }
+}
+
+YAML::Node YamlFile::need(const YAML::Node& map, const char* key, std::string_view what) const {
+  const YAML::Node value = map[key];
+  if (!value || value.IsNull()) fail(map, fmt::format("{} needs '{}'", what, key));
+  return value;
+}
+
+void YamlFile::check_list(const YAML::Node& node, std::string_view what) const {
+  if (!node.IsSequence() || node.size() == 0) fail(node, fmt::format("{} must be a list with something in it", what));
+}
+
+std::string YamlFile::text(const YAML::Node& node, std::string_view what) const {
+  if (!node.IsScalar() || node.Scalar().empty()) fail(node, fmt::format("{} must be a text", what));
+  return node.Scalar();
+}
+
+double YamlFile::number(const YAML::Node& node, std::string_view what) const {
+  double value = 0.0;
+  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(float(value))) {
+    fail(node, fmt::format("{} must be a finite number{}", what, node.IsScalar() ? ", not '" + one_line(node.Scalar()) + "'" : ""));
+  }
+  return value;
+}
+
+std::uint64_t YamlFile::count(const YAML::Node& node, std::string_view what, std::uint64_t at_most) const {
+  const double value = number(node, what);
+  if (value < 1.0 || value != std::floor(value) || value > double(at_most))
+    fail(node, fmt::format("{} must be a whole number from 1 to {}", what, at_most));
+  return std::uint64_t(value);
+}
+
+bool YamlFile::boolean(const YAML::Node& node, std::string_view what) const {
+  bool value = false;
+  if (!node.IsScalar() || !YAML::convert<bool>::decode(node, value)) fail(node, fmt::format("{} must be true or false", what));
+  return value;
+}
+
+Vec3f YamlFile::vec3(const YAML::Node& node, std::string_view what) const {
+  if (!node.IsSequence() || node.size() != 3) fail(node, fmt::format("{} must be a list of three numbers", what));
+  return {float(number(node[0], what)), float(number(node[1], what)), float(number(node[2], what))};
+}
+
+Vec3f YamlFile::color(const YAML::Node& node, std::string_view what) const {
+  Vec3f value;
+  if (node.IsScalar()) {
+    const float grey = float(number(node, what));
+    value = {grey, grey, grey};
+  } else {
+    value = vec3(node, what);
+  }
+  if (value.x < 0 || value.y < 0 || value.z < 0) fail(node, fmt::format("{} must not be negative", what));
+  return value;
+}
+
+Camera YamlFile::camera(const YAML::Node& node) const {
+  check_keys(node, "camera",
+             {"position", "look_at", "up", "vertical_fov", "mirror_x", "resolution", "aperture_radius", "focus_distance"});
+  Camera camera;
+  camera.position = vec3(need(node, "position", "camera"), "camera position");
+  camera.look_at = vec3(need(node, "look_at", "camera"), "camera look_at");
+  if (node["up"]) camera.up = vec3(node["up"], "camera up");
+  const Vec3d forward = Vec3d(camera.look_at) - Vec3d(camera.position);
+  if (!(length(forward) > 0.0)) fail(node, "camera position and look_at are the same point");
+  if (!(length(cross(normalize(forward), Vec3d(camera.up))) > 1e-6 * length(Vec3d(camera.up))))
+    fail(node, "camera up is zero or parallel to the view");
+  if (node["vertical_fov"]) camera.vertical_fov = float(number(node["vertical_fov"], "camera vertical_fov"));
+  if (!(camera.vertical_fov > 0.0f && camera.vertical_fov < 180.0f))
+    fail(node["vertical_fov"], "camera vertical_fov must lie between 0 and 180 degrees");
+  if (node["mirror_x"]) camera.mirror_x = boolean(node["mirror_x"], "camera mirror_x");
+  if (const YAML::Node resolution = node["resolution"]) {
+    if (!resolution.IsSequence() || resolution.size() != 2) fail(resolution, "camera resolution must be [width, height]");
+    camera.width = unsigned(count(resolution[0], "camera width", 65536));
+    camera.height = unsigned(count(resolution[1], "camera height", 65536));
+  }
+  for (const auto& [key, value] : {std::pair{"aperture_radius", &camera.aperture_radius}, {"focus_distance", &camera.focus_distance}}) {
+    if (!node[key]) continue;
+    *value = float(number(node[key], fmt::format("camera {}", key)));
+    if (*value < 0.0f) fail(node[key], fmt::format("camera {} must not be negative", key));
+  }
+  if (camera.aperture_radius > 0.0f && camera.focus_distance == 0.0f)
+    fail(node, "a camera with an aperture_radius needs a focus_distance above 0");
+  return camera;
+}
+
+}  // namespace arboretum
