@@ -9,6 +9,8 @@ from string import Template
 
 import tables
 
+LARGEST_SVG = 1_500_000  # bytes; a drawing of more goes into the page as PNG
+
 
 def write(results, drawn):
     """`drawn`: (name, module, why left out or None). Returns the page's path."""
@@ -52,8 +54,11 @@ def figure(folder, name, module, reason):
     head = f'<h3 id="{escape(name)}">{escape(module.TITLE)}</h3>'
     if reason:
         return f'{head}<p class="soft">Not drawn: {escape(reason)}.</p>'
-    picture = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode("ascii")
-    return (f'{head}<figure><img alt="{escape(module.TITLE)}" src="data:image/svg+xml;base64,{picture}">'
+    picture, kind = folder / f"{name}.svg", "svg+xml"
+    if picture.stat().st_size > LARGEST_SVG:
+        picture, kind = folder / f"{name}.png", "png"
+    data = base64.b64encode(picture.read_bytes()).decode("ascii")
+    return (f'{head}<figure><img alt="{escape(module.TITLE)}" src="data:image/{kind};base64,{data}">'
             f"<figcaption>{escape(module.CAPTION)}</figcaption></figure>")
 
 

@@ -44,6 +44,7 @@ class Cell:
 
     axes: dict
     rows: list = field(default_factory=list)
+    _estimates: dict = field(default_factory=dict)
 
     def values(self, name):
         """The finite numbers that the rows hold under `name`."""
@@ -56,8 +57,11 @@ class Cell:
         return float(np.median(values)) if values else None
 
     def estimate(self, name):
-        values = self.values(name)
-        return estimate(values) if values else None
+        """The median with its confidence interval; None where no row has `name`."""
+        if name not in self._estimates:
+            values = self.values(name)
+            self._estimates[name] = estimate(values) if values else None
+        return self._estimates[name]
 
     def per_million(self, name):
         """A count of answers per million rays; None where the cell was not checked."""
@@ -137,7 +141,9 @@ def axis_sort_key(axis):
 
 
 def ordered(values, axis):
-    """Distinct values of an axis, in a fixed order, embree last."""
+    """Distinct values of an axis in a fixed order, embree last; scenes as they come, which is the configuration's order."""
+    if axis == "scene":
+        return list(dict.fromkeys(values))
     key = axis_sort_key(axis)
     return sorted(set(values), key=lambda v: (str(v) == "embree", key(v)))
 

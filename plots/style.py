@@ -56,6 +56,27 @@ def marker_legend(markers):
             for k, m in markers.items()]
 
 
+def short(scene, most=24):
+    return scene if len(scene) <= most else scene[: most // 2 - 1] + "…" + scene[-most // 2 :]
+
+
+def panel_grid(scenes, workloads, width, height, most_columns):
+    """A panel for each scene and workload, titled; a scene begins a row. Gives the figure and {(scene, workload): axis}."""
+    columns = min(len(workloads), most_columns)
+    rows_each = -(-len(workloads) // columns)
+    figure, axes = panels(len(scenes) * rows_each, columns, width, height)
+    found = {}
+    for first, scene in enumerate(scenes):
+        for place in range(rows_each * columns):
+            axis = axes[first * rows_each + place // columns][place % columns]
+            if place >= len(workloads):
+                axis.set_visible(False)
+                continue
+            found[scene, workloads[place]] = axis
+            axis.set_title(f"{short(scene)}, {workloads[place].replace('_', ' ')}")
+    return figure, found
+
+
 def legends_right(figure, legends):
     """(title, handles) one below the other at the figure's right edge, outside all data; save() keeps them whole."""
     height, top = figure.get_size_inches()[1], 0.98

@@ -1,7 +1,9 @@
 """Wrong answers against time: what accuracy costs. One panel a scene and workload, the Pareto front drawn."""
 
+from matplotlib.ticker import LogLocator, NullLocator
+
 from results import NoData, ordered
-from style import colour, legends_right, marker_legend, marker_map, panels, structure_legend
+from style import colour, legends_right, marker_legend, marker_map, panel_grid, structure_legend
 
 TITLE = "Accuracy against time"
 CAPTION = ("A point is a cell; every wrong answer counts: missed hits, false hits, wrong surfaces, against exact arithmetic. "
@@ -21,23 +23,27 @@ def draw(results):
     markers = marker_map(tests)
     smallest = min((wrong for _, _, wrong in points if wrong > 0), default=1.0)
 
-    figure, axes = panels(len(scenes), len(workloads), 3.7, 3.0, sharey=True)
-    for row, scene in enumerate(scenes):
-        for column, workload in enumerate(workloads):
-            axis = axes[row][column]
-            here = [p for p in points if p[0]["scene"] == scene and p[0]["workload"] == workload]
-            for cell, nanoseconds, wrong in here:
-                axis.plot(nanoseconds, wrong, markers[test(cell)], color=colour(cell["structure"]), markersize=6,
-                          markeredgecolor="white", markeredgewidth=0.6)
-            front = pareto_front([(t, w) for _, t, w in here])
-            axis.step([t for t, _ in front], [w for _, w in front], where="post", color="#777777", linewidth=1, zorder=1)
-            axis.set_title(f"{scene}, {workload.replace('_', ' ')}")
-            axis.set_yscale("symlog", linthresh=smallest, linscale=0.5)
-            axis.set_xlim(0, 1.08 * max((t for _, t, _ in here), default=1.0))
-            if row == len(scenes) - 1:
-                axis.set_xlabel("time, ns a ray")
-        axes[row][0].set_ylim(-0.15 * smallest, 2.0 * max(wrong for _, _, wrong in points) or 1.0)
-        axes[row][0].set_ylabel("wrong answers per million")
+    top = 2.0 * max(wrong for _, _, wrong in points) or 1.0
+    figure, axes = panel_grid(scenes, workloads, 3.9, 3.0, 3)
+    for (scene, workload), axis in axes.items():
+        here = [p for p in points if p[0]["scene"] == scene and p[0]["workload"] == workload]
+        for cell, nanoseconds, wrong in here:
+            axis.plot(nanoseconds, wrong, markers[test(cell)], color=colour(cell["structure"]), markersize=6,
+                      markeredgecolor="white", markeredgewidth=0.6)
+        front = pareto_front([(t, w) for _, t, w in here])
+        axis.step([t for t, _ in front], [w for _, w in front], where="post", color="#777777", linewidth=1, zorder=1)
+        axis.set_yscale("symlog", linthresh=smallest, linscale=0.5)
+        axis.set_ylim(-0.15 * smallest, top)
+        times = [t for _, t, _ in here]
+        if times and max(times) > 6 * min(times):
+            axis.set_xscale("log")
+            axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.xaxis.set_major_formatter("{x:g}")
+            axis.xaxis.set_minor_locator(NullLocator())
+        else:
+            axis.set_xlim(0, 1.08 * max(times, default=1.0))
+        axis.set_xlabel("time, ns a ray")
+        axis.set_ylabel("wrong answers per million")
     legends_right(figure, [("structure", structure_legend(structures)), ("intersector, box", marker_legend(markers))])
     return figure
 

@@ -1,21 +1,20 @@
 """Horizontal bars, one a built structure, one panel a scene: what sah_cost and build_time have in common."""
 
 from results import NoData, axis_sort_key, ordered, undetermined_axes
-from style import colour, hatch, panels
+from style import colour, hatch, panels, short
 
 
 def bar_panels(results, value_of, axis_label, note_of, label_axes):
     """`value_of(cell)` gives (median, low, high) or None; `note_of(cell)` the text at a bar's end.
 
     `label_axes` are the axes that may tell bars of a scene apart; those that the ones before settle are not written.
-    Cells that are alike in them and in value are one bar.
     """
-    cells = [c for c in results.structures if value_of(c)]
+    cells = without_doubles([c for c in results.structures if value_of(c)], value_of)
     if not cells:
         raise NoData("no structure has this figure")
     varied = [a for a in undetermined_axes(cells, ("scene", "structure", *label_axes)) if a in label_axes]
     scenes = ordered((c["scene"] for c in cells), "scene")
-    bars = {scene: scene_bars([c for c in cells if c["scene"] == scene], value_of, varied) for scene in scenes}
+    bars = {scene: scene_bars([c for c in cells if c["scene"] == scene], varied) for scene in scenes}
 
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
@@ -27,21 +26,22 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes):
             axis.set_visible(False)
             continue
         draw_panel(axis, bars[scenes[index]], value_of, note_of, varied)
-        axis.set_title(scenes[index])
+        axis.set_title(short(scenes[index]))
         axis.set_xlabel(axis_label)
     return figure
 
 
-def scene_bars(cells, value_of, varied):
-    """The cells of a scene in drawing order, doubles left out (a SAH cost that is the same on every ISA)."""
-    seen, kept = set(), []
+def without_doubles(cells, value_of):
+    """A SAH cost that is the same on every ISA and thread count is one bar."""
+    seen = {}
     for cell in cells:
-        key = (cell["structure"], *(cell[a] for a in varied if a != "isa"), round(value_of(cell)[0], 12))
-        if key not in seen:
-            seen.add(key)
-            kept.append(cell)
+        seen.setdefault((*(cell[a] for a in ("scene", "structure", "builder", "leaf")), value_of(cell)), cell)
+    return list(seen.values())
+
+
+def scene_bars(cells, varied):
     order = {s: i for i, s in enumerate(ordered((c["structure"] for c in cells), "structure"))}
-    return sorted(kept, key=lambda c: (order[c["structure"]], [axis_sort_key(a)(c[a]) for a in varied]))
+    return sorted(cells, key=lambda c: (order[c["structure"]], [axis_sort_key(a)(c[a]) for a in varied]))
 
 
 def draw_panel(axis, cells, value_of, note_of, varied):
@@ -57,7 +57,7 @@ def draw_panel(axis, cells, value_of, note_of, varied):
     axis.grid(axis="y", visible=False)
 
 
-def short(value):
+def digits(value):
     """Three digits or all before the point, without an exponent for what a build takes."""
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:#.3g}"
 

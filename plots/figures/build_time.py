@@ -1,6 +1,6 @@
 """Build time, from mesh to a structure ready for rays: one panel a scene."""
 
-from figures.bars import bar_panels, short
+from figures.bars import bar_panels, digits
 
 TITLE = "Build time"
 CAPTION = ("Wall time from mesh to a structure ready for rays, with the 95 % confidence interval of the median where a build "
@@ -14,6 +14,6 @@ def draw(results):
 
     def note(cell):
         rate = cell.value("triangles_per_second")
-        return f"{short(value(cell)[0])} ms" + (f", {rate / 1e6:.2f} Mtri/s" if rate else "")
+        return f"{digits(value(cell)[0])} ms" + (f", {rate / 1e6:.2f} Mtri/s" if rate else "")
 
     return bar_panels(results, value, "build time, ms", note, ("builder", "threads", "isa", "leaf"))

@@ -2,7 +2,7 @@
 
 from figures.modes import Modes
 from results import NoData, ordered
-from style import MARKERS, colour, hatch, legends_right, marker_legend, marker_map, panels, structure_legend
+from style import MARKERS, colour, hatch, legends_right, marker_legend, marker_map, panel_grid, structure_legend
 
 TITLE = "Rays per second"
 CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with its 95 % confidence interval of the "
@@ -20,21 +20,11 @@ def draw(results):
     markers = marker_map(modes.labels) if len(modes.labels) <= len(MARKERS) else {}
 
     width = min(7.0, max(3.2, 0.2 * len(isas) * (len(structures) + 1) + 0.8))
-    columns = min(len(workloads), 3 if width < 4.2 else 2)
-    rows_each = -(-len(workloads) // columns)  # panel rows that a scene takes
-    figure, axes = panels(len(scenes) * rows_each, columns, width, 2.9)
-    for first, scene in enumerate(scenes):
-        for place in range(rows_each * columns):
-            axis = axes[first * rows_each + place // columns][place % columns]
-            if place >= len(workloads):
-                axis.set_visible(False)
-                continue
-            workload = workloads[place]
-            here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
-            panel(axis, here, metric, isas, structures, modes, markers)
-            axis.set_title(f"{scene}, {workload.replace('_', ' ')}")
-            if place % columns == 0:
-                axis.set_ylabel(unit)
+    figure, axes = panel_grid(scenes, workloads, width, 2.9, 3 if width < 4.2 else 2)
+    for (scene, workload), axis in axes.items():
+        here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
+        panel(axis, here, metric, isas, structures, modes, markers)
+        axis.set_ylabel(unit)
     legends = [("structure", structure_legend(structures))]
     legends_right(figure, legends + ([("mode", marker_legend(markers))] if len(markers) > 1 else []))
     return figure
@@ -52,6 +42,9 @@ def panel(axis, cells, metric, isas, structures, modes, markers):
             best = max(e.median for _, e in here) / 1e6
             axis.bar(x, best, bar, color=colour(structure), alpha=0.55, hatch=hatch(structure), edgecolor="white",
                      linewidth=0.5)
+            if not markers:  # too many modes to tell apart: where they lie is still seen
+                axis.plot([x] * len(here), [e.median / 1e6 for _, e in here], ".", color="#222222", markersize=2.5)
+                continue
             for cell, value in here:
                 label = modes.label(cell)
                 at = x
@@ -59,7 +52,7 @@ def panel(axis, cells, metric, isas, structures, modes, markers):
                     at += (modes.labels.index(label) / (len(markers) - 1) - 0.5) * 0.55 * bar
                 axis.errorbar(at, value.median / 1e6,
                               [[(value.median - value.low) / 1e6], [(value.high - value.median) / 1e6]],
-                              fmt=markers.get(label, "."), color="#222222", markersize=4, markerfacecolor="white",
+                              fmt=markers[label], color="#222222", markersize=4, markerfacecolor="white",
                               markeredgewidth=0.9, elinewidth=0.9)
     axis.set_xticks(range(len(isas)), isas)
     axis.set_xlim(-0.55, len(isas) - 0.45)
