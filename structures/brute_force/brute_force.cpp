@@ -14,6 +14,7 @@ const StructureInfo& BruteForce::static_info() {
     i.name = kName;
     i.summary = "every ray tests every triangle: the reference, for small scenes";
     i.builders = {"in_order"};
+    i.uses_parameters = false;
     for_each_type(Blocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
     return i;
   }();

@@ -69,6 +69,7 @@ const StructureInfo& EmbreeAccel::static_info() {
       .leaves = {"triangle4", "triangle4v"},
       .build_depends_on_isa = true,
       .build_depends_on_threads = true,
+      .uses_parameters = false,
   };
   return info;
 }

@@ -1,0 +1,18 @@
+#include <immintrin.h>
+
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "core/isa.h"
+#include "tests/simd/operations.h"
+
+#define ARBORETUM_TARGET ARBORETUM_TARGET_AVX2
+#include "simd/target.h"
+#include "simd/target_begin.h"
+#include "tests/simd/operations_impl.h"
+#include "simd/target_end.h"
+
+namespace arboretum::simd_test {
+OperationTable operations_avx2(int width) { return isa_avx2::test::table_of(width); }
+}  // namespace arboretum::simd_test

@@ -1,0 +1,236 @@
+// Embree behind Accel: the same rays as a double-precision brute force, on every ISA, build quality and robustness.
+#include <cmath>
+#include <iostream>
+#include <limits>
+
+#include <tbb/global_control.h>
+
+#include "core/error.h"
+#include "core/memory_meter.h"
+#include "core/random.h"
+#include "structures/embree/embree.h"
+#include "tests/catch.h"
+
+using namespace arboretum;
+using arboretum::embree::EmbreeAccel;
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+float number(std::uint64_t seed, std::uint64_t i, std::uint64_t dimension, float low, float high) {
+  return low + (high - low) * random_float(seed, i, dimension);
+}
+
+TriangleMesh random_triangles(std::size_t count, std::uint64_t seed) {
+  TriangleMesh mesh;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3f center{number(seed, i, 0, -1, 1), number(seed, i, 1, -1, 1), number(seed, i, 2, -1, 1)};
+    for (int k = 0; k < 3; ++k) {
+      const std::uint64_t d = 3 + 3 * std::uint64_t(k);
+      mesh.vertices.push_back(center + 0.2f * Vec3f{number(seed, i, d, -1, 1), number(seed, i, d + 1, -1, 1), number(seed, i, d + 2, -1, 1)});
+    }
+    const auto first = std::uint32_t(3 * i);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed) {
+  std::vector<Ray> rays;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3f from{number(seed, i, 0, -2, 2), number(seed, i, 1, -2, 2), number(seed, i, 2, -2, 2)};
+    const Vec3f to{number(seed, i, 3, -1, 1), number(seed, i, 4, -1, 1), number(seed, i, 5, -1, 1)};
+    rays.push_back({from, 0.0f, to - from, i % 3 == 0 ? 1.0f : kInfinity});
+  }
+  return rays;
+}
+
+/// Moeller-Trumbore in double. `near_edge`: some triangle's decision is within 1e-5 of a boundary, so a float kernel may differ.
+struct Truth {
+  bool hit = false, near_edge = false;
+  double t = 0, u = 0, v = 0;
+  std::uint32_t primitive = kNoPrimitive;
+};
+
+Truth brute_force(const TriangleMesh& mesh, const Ray& ray) {
+  struct D3 { double x, y, z; };
+  const auto d3 = [](Vec3f p) { return D3{p.x, p.y, p.z}; };
+  const auto sub = [](D3 a, D3 b) { return D3{a.x - b.x, a.y - b.y, a.z - b.z}; };
+  const auto cross = [](D3 a, D3 b) { return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
+  const auto dot = [](D3 a, D3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+  Truth truth;
+  truth.t = ray.tfar;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const auto [a, b, c] = mesh.corners(i);
+    const D3 e1 = sub(d3(b), d3(a)), e2 = sub(d3(c), d3(a)), d = d3(ray.direction), s = sub(d3(ray.origin), d3(a));
+    const D3 p = cross(d, e2), q = cross(s, e1);
+    const double det = dot(e1, p), u = dot(s, p) / det, v = dot(d, q) / det, t = dot(e2, q) / det;
+    const double margin = std::min({u, v, 1 - u - v});
+    const bool inside_interval = t >= ray.tnear - 1e-5 && t <= double(ray.tfar) + 1e-5;
+    if (inside_interval && (std::abs(margin) < 1e-5 || std::abs(t - ray.tnear) < 1e-5 || std::abs(t - ray.tfar) < 1e-5)) truth.near_edge = true;
+    if (!(margin >= 0 && t >= ray.tnear && t <= truth.t)) continue;
+    if (truth.hit && t == truth.t) continue;
+    truth = {true, truth.near_edge, t, u, v, std::uint32_t(i)};
+  }
+  return truth;
+}
+
+EmbreeAccel& build(EmbreeAccel& accel, const TriangleMesh& mesh, Isa isa, std::string_view builder, std::string_view leaf, unsigned threads = 1) {
+  BuildSettings settings;
+  settings.builder = builder, settings.leaf = leaf, settings.isa = isa, settings.threads = threads;
+  BuildReport report;
+  accel.build(mesh, settings, report);
+  return accel;
+}
+
+std::vector<Hit> closest(const EmbreeAccel& accel, const std::vector<Ray>& rays) {
+  std::vector<Hit> hits(rays.size());
+  accel.intersect_single(rays, hits);
+  return hits;
+}
+
+std::vector<std::uint8_t> any(const EmbreeAccel& accel, const std::vector<Ray>& rays) {
+  std::vector<std::uint8_t> occluded(rays.size(), 2);
+  accel.occluded_single(rays, occluded);
+  return occluded;
+}
+
+}  // namespace
+
+TEST_CASE("embree finds what a double-precision brute force finds") {
+  for (std::size_t triangles : {1u, 2u, 7u, 300u, 2000u}) {
+    const TriangleMesh mesh = random_triangles(triangles, 11 + triangles);
+    const std::vector<Ray> rays = random_rays(triangles > 1000 ? 400 : 1000, 5);
+    std::vector<Truth> truth;
+    for (const Ray& ray : rays) truth.push_back(brute_force(mesh, ray));
+    for (Isa isa : kAllIsas) {
+      if (isa == Isa::scalar) continue;
+      if (!is_available(isa)) {
+        std::cout << "skipped: " << to_string(isa) << ", not available here\n";
+        continue;
+      }
+      for (std::string_view builder : EmbreeAccel::static_info().builders) {
+        for (std::string_view leaf : EmbreeAccel::static_info().leaves) {
+          INFO("triangles " << triangles << ", isa " << to_string(isa) << ", " << builder << ", " << leaf);
+          EmbreeAccel accel;
+          build(accel, mesh, isa, builder, leaf);
+          CHECK(accel.isa() == isa);
+          CHECK(accel.bytes() > 0);
+          const std::vector<Hit> hits = closest(accel, rays);
+          const std::vector<std::uint8_t> occluded = any(accel, rays);
+          std::size_t compared = 0, found = 0;
+          for (std::size_t i = 0; i < rays.size(); ++i) {
+            CHECK((occluded[i] == 0 || occluded[i] == 1));
+            if (truth[i].near_edge) continue;
+            ++compared, found += truth[i].hit;
+            INFO("ray " << i);
+            REQUIRE(hits[i].is_hit() == truth[i].hit);
+            REQUIRE(occluded[i] == std::uint8_t(truth[i].hit));
+            if (!truth[i].hit) {
+              REQUIRE(hits[i].t == kInfinity);
+              continue;
+            }
+            REQUIRE(std::abs(hits[i].t - truth[i].t) <= 1e-4 * truth[i].t + 1e-5);
+            if (hits[i].primitive != truth[i].primitive) {  // two surfaces closer than the tolerance
+              const Truth other = truth[i];
+              REQUIRE(std::abs(hits[i].t - other.t) <= 1e-5);
+              continue;
+            }
+            REQUIRE(std::abs(hits[i].u - truth[i].u) <= 2e-3);
+            REQUIRE(std::abs(hits[i].v - truth[i].v) <= 2e-3);
+          }
+          CHECK(compared > rays.size() * 9 / 10);
+          if (triangles >= 300) CHECK(found > rays.size() / 10);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("u weighs the second vertex and v the third") {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  for (std::string_view leaf : EmbreeAccel::static_info().leaves) {
+    EmbreeAccel accel;
+    build(accel, mesh, Isa::sse, "medium", leaf);
+    const Hit hit = closest(accel, {Ray{{1, 0.5f, -2}, 0, {0, 0, 2}, 1}})[0];  // t == tfar: a closed interval
+    CHECK(hit.primitive == 0);
+    CHECK(hit.t == Approx(1.0f));
+    CHECK(hit.u == Approx(0.25f));
+    CHECK(hit.v == Approx(0.125f));
+  }
+}
+
+TEST_CASE("rays that are none hit nothing in embree") {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<Ray> rays{
+      {{nan, 0, 0}, 0, {0, 0, 1}, kInfinity},       {{0, 0, -3}, 0, {0, nan, 1}, kInfinity},
+      {{0, 0, -3}, nan, {0, 0, 1}, kInfinity},      {{0, 0, -3}, 0, {0, 0, 1}, nan},
+      {{kInfinity, 0, 0}, 0, {-1, 0, 0}, kInfinity}, {{0, 0, -3}, 0, {0, 0, kInfinity}, kInfinity},
+      {{0, 0, 0}, 0, {0, 0, 0}, kInfinity},         {{0, 0, -3}, 9, {0, 0, 1}, 1},
+      {{0, 0, -3}, 0, {0, 0, 1}, -kInfinity},       {{0, 0, -3}, 0, {0, 0, 1}, -1},
+  };
+  const TriangleMesh mesh = random_triangles(500, 3);
+  for (Isa isa : available_isas()) {
+    if (isa == Isa::scalar) continue;
+    for (std::string_view leaf : EmbreeAccel::static_info().leaves) {
+      EmbreeAccel accel;
+      build(accel, mesh, isa, "medium", leaf);
+      const std::vector<Hit> hits = closest(accel, rays);
+      const std::vector<std::uint8_t> occluded = any(accel, rays);
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        INFO(to_string(isa) << " " << leaf << " ray " << i);
+        CHECK_FALSE(hits[i].is_hit());
+        CHECK(occluded[i] == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("embree gives its memory back, and can build again") {
+  const std::size_t before = MemoryMeter::current();
+  {
+    TriangleMesh mesh = random_triangles(4000, 1);
+    mesh.vertices.shrink_to_fit();  // no room behind the last vertex: Embree gets a copy
+    EmbreeAccel accel;
+    build(accel, mesh, Isa::sse, "high", "triangle4");
+    const std::size_t copied = accel.bytes();
+    CHECK(copied >= mesh.vertices.size() * sizeof(Vec3f) + 4000 * 36);
+    CHECK(MemoryMeter::current() == before + copied);
+    mesh.vertices.reserve(mesh.vertices.size() + 1);
+    build(accel, mesh, Isa::sse, "high", "triangle4");
+    CHECK(accel.bytes() < copied);
+    const TriangleMesh empty;
+    build(accel, empty, Isa::sse, "medium", "triangle4v");
+    CHECK_FALSE(closest(accel, random_rays(3, 1))[1].is_hit());
+    CHECK(closest(accel, {}).empty());
+  }
+  CHECK(MemoryMeter::current() == before);
+}
+
+TEST_CASE("embree says what it cannot do") {
+  const TriangleMesh mesh = random_triangles(3, 1);
+  EmbreeAccel accel;
+  CHECK_THROWS_WITH(build(accel, mesh, Isa::scalar, "medium", "triangle4"), Catch::Contains("no scalar kernels"));
+  CHECK_THROWS_WITH(build(accel, mesh, Isa::sse, "mediun", "triangle4"), Catch::Contains("did you mean 'medium'?"));
+  CHECK_THROWS_AS(build(accel, mesh, Isa::sse, "medium", "triangle8"), UserError);
+  build(accel, mesh, Isa::sse, "medium", "triangle4");
+  CHECK_NOTHROW(accel.expect(Isa::sse, false));
+  CHECK_THROWS_AS(accel.expect(Isa::avx2, false), std::logic_error);
+  CHECK_THROWS_AS(accel.expect(Isa::sse, true), std::logic_error);
+  struct : StructureVisitor {
+    void node(const NodeView&) override { FAIL(); }
+    void leaf(const LeafView&) override { FAIL(); }
+  } visitor;
+  CHECK_FALSE(accel.visit(visitor));
+}
+
+TEST_CASE("an embree device does not limit the threads of others") {
+  const TriangleMesh mesh = random_triangles(100, 1);
+  const std::size_t before = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  EmbreeAccel accel;
+  build(accel, mesh, Isa::sse, "medium", "triangle4", 1);
+  CHECK(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) == before);
+}
