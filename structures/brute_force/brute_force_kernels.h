@@ -70,8 +70,10 @@ struct BruteForceMaker {
 };
 
 inline void add_kernels(std::type_identity<brute_force::BruteForce>, KernelRows& rows) {
-  add_rows<BruteForceMaker>(rows, brute_force::BruteForce::kName, "single", kIsa, ConcatLists<typename BlocksOfWidth<EdgeBlock, kRegisterWidth>::Type, typename BlocksOfWidth<VertexBlock, kRegisterWidth>::Type>{},
-                            TypeList<MollerTrumbore, Watertight, Pluecker>{});
+  constexpr std::string_view name = brute_force::BruteForce::kName;
+  add_rows<BruteForceMaker>(rows, name, "single", kIsa, BlocksOfWidth<EdgeBlock, kRegisterWidth>{}, TypeList<MollerTrumbore>{});
+  add_rows<BruteForceMaker>(rows, name, "single", kIsa, BlocksOfWidth<VertexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
+  add_rows<BruteForceMaker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -23,10 +23,12 @@ struct BvhSingle {
 template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   constexpr std::string_view name = bvh::Bvh<N>::kName;
-  using Edges = typename BlocksOfWidth<EdgeBlock, kRegisterWidth>::Type;
-  using Vertices = typename BlocksOfWidth<VertexBlock, kRegisterWidth>::Type;
-  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, ConcatLists<Edges, Vertices>{}, TypeList<MollerTrumbore>{});
-  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Vertices{}, TypeList<Watertight, Pluecker>{});
+  using Edges = BlocksOfWidth<EdgeBlock, kRegisterWidth>;
+  using Vertices = BlocksOfWidth<VertexBlock, kRegisterWidth>;
+  // The full leaf axis for the fastest and the crack-free intersector; else the default leaf (compile time).
+  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Edges{}, TypeList<MollerTrumbore>{});
+  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Vertices{}, TypeList<Watertight>{});
+  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

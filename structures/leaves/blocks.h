@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <string_view>
+#include <type_traits>
 
 #include "core/mesh.h"
 #include "core/ray.h"
@@ -61,13 +62,12 @@ struct alignas(8) VertexBlock {
   }
 };
 
-/// The blocks that make sense on an instruction set of W-lane registers: up to two registers wide.
+/// The blocks that make sense on an instruction set of W-lane registers, W = 1 for scalar: no wider than two registers,
+/// sixteen only where one register holds them.
 template <template <int> class Block, int W>
-struct BlocksOfWidth;
-template <template <int> class Block> struct BlocksOfWidth<Block, 1> { using Type = TypeList<Block<1>, Block<4>>; };
-template <template <int> class Block> struct BlocksOfWidth<Block, 4> { using Type = TypeList<Block<1>, Block<4>, Block<8>>; };
-template <template <int> class Block> struct BlocksOfWidth<Block, 8> { using Type = TypeList<Block<1>, Block<4>, Block<8>, Block<16>>; };
-template <template <int> class Block> struct BlocksOfWidth<Block, 16> { using Type = TypeList<Block<1>, Block<4>, Block<8>, Block<16>>; };
+using BlocksOfWidth = std::conditional_t<W == 1, TypeList<Block<1>, Block<4>>,
+                                         std::conditional_t<W == 16, TypeList<Block<1>, Block<4>, Block<8>, Block<16>>,
+                                                            TypeList<Block<1>, Block<4>, Block<8>>>>;
 
 /// Writes `count` triangles (at most M) into a block and marks the other lanes empty. `corners(i)` gives the i-th
 /// triangle's three vertices, `primitive(i)` its id.
