@@ -146,6 +146,22 @@ Scene flat_grid(Dice& dice) {
   return s;
 }
 
+/// The edge from p to -p, seen from p * 2^-85 or a float32 step beside it: the sign hangs on bits that lie beyond the 106 of
+/// a double-double.
+Scene three_scales(Dice& dice) {
+  Scene s;
+  const Vec3f p = dice.point();
+  add_triangle(s.mesh, p, -p, dice.point());
+  add_triangle(s.mesh, -p, p, -s.mesh.vertices.back());
+  for (int i = 0; i < 20; ++i) {
+    Vec3f o = p * std::ldexp(1.0f, -80 - dice.integer(12));
+    float& c = o[static_cast<std::size_t>(dice.integer(3))];
+    c = std::nextafter(c, dice.integer(2) ? kInf : -kInf);
+    s.rays.push_back({i == 0 ? p * 0x1p-80f : o, 0.0f, dice.point(), kInf});
+  }
+  return s;
+}
+
 void check_scene(const Scene& scene, const std::string& label, DecisionCounts& counts) {
   const Oracle oracle(scene.mesh);
   const std::vector<ExactHit> closest = oracle.closest_hit(scene.rays, &counts);
@@ -243,6 +259,7 @@ TEST_CASE("the oracle equals rational brute force on nasty scenes, and each leve
       {"random soup", random_soup, 25, true, false},     {"exponential soup", exponential_soup, 25, true, false},
       {"whole float range", whole_range, 25, true, false}, {"aimed fan", aimed_fan, 30, true, true},
       {"nearly aimed", nearly_aimed, 25, true, true},    {"flat grid", flat_grid, 20, true, true},
+      {"three scales", three_scales, 30, true, true},
   };
   std::uint64_t seed = 1;
   for (const Family& family : families) {
