@@ -86,7 +86,8 @@ def reproduce(results):
         command = shlex.join(str(c) for c in command)
     revision = context.get("git_revision") or context.get("revision")
     lines = [f"git checkout {revision}"] if revision else []
-    lines.append(str(command) if command else "./arboretum run effective.yaml")
+    command = str(command or "arboretum run effective.yaml")
+    lines.append(f"./{command}" if command.startswith("arboretum ") else command)
     parts.append(f"<pre>{escape(chr(10).join(lines))}</pre>")
     if str(context.get("git_dirty", context.get("dirty", ""))).lower() in ("true", "1", "yes"):
         parts.append('<p class="bad">The tree had changes that no revision holds: these figures cannot be repeated exactly.</p>')
