@@ -64,9 +64,9 @@ class Effects {
       triangles += usage_.triangles[i];
     }
     set(name, materials > 0,
-        materials > 0 ? fmt::format("{} triangles of {} material{} {} (first: {})", triangles, materials, materials == 1 ? "" : "s", what,
+        materials > 0 ? fmt::format("{}: {} triangles of {} material{}, first {}", what, triangles, materials, materials == 1 ? "" : "s",
                                     scene_.materials[first].name)
-                      : fmt::format("no material {}", what));
+                      : fmt::format("no {}", what));
     return materials > 0;
   }
 
@@ -79,7 +79,7 @@ class Effects {
     std::size_t emitters = 0;
     for (std::size_t i = 0; i < scene_.materials.size(); ++i)
       if (is_bright(scene_.materials[i].emission)) emitters += usage_.triangles[i];
-    by_material("shadow_soft", [](const Material& m) { return is_bright(m.emission); }, "emits light");
+    by_material("shadow_soft", [](const Material& m) { return is_bright(m.emission); }, "light from surfaces (Ke > 0)");
     const bool environment = is_bright(scene_.environment);
     set("env_light", environment,
         environment ? fmt::format("the environment's radiance is ({:.3g}, {:.3g}, {:.3g})", scene_.environment.x, scene_.environment.y, scene_.environment.z)
@@ -90,11 +90,11 @@ class Effects {
   }
 
   void surfaces() {
-    by_material("mirror", is_mirror, "reflects perfectly (illum 3, Ks > 0, Pr 0)");
-    by_material("glossy", is_glossy, "has a rough specular lobe (Ks > 0)");
-    by_material("dielectric", is_dielectric, "refracts (illum 4 to 9, Ni other than 1, Tf > 0)");
+    by_material("mirror", is_mirror, "perfect reflection (illum 3, Ks > 0, Pr 0)");
+    by_material("glossy", is_glossy, "rough specular lobe (Ks > 0)");
+    by_material("dielectric", is_dielectric, "refraction (illum 4 to 7 or 9, Ni other than 1, Tf > 0)");
     if (emitters_ == 0) set("diffuse_gi", false, "nothing emits light");
-    else by_material("diffuse_gi", [](const Material& m) { return is_bright(m.diffuse) || !m.diffuse_map.empty(); }, "is diffuse (Kd > 0) in a lit scene");
+    else by_material("diffuse_gi", [](const Material& m) { return is_bright(m.diffuse) || !m.diffuse_map.empty(); }, "diffuse surface (Kd > 0) in a lit scene");
   }
 
   void camera_and_motion() {
@@ -115,12 +115,12 @@ class Effects {
       const auto range = m.opacity_map.empty() ? std::nullopt : value_range(m.opacity_map);
       return range && range->least < 1.0f;
     };
-    by_material("alpha_cutout", cut_out, "is not opaque (d < 1, or map_d with a value below 1)");
+    by_material("alpha_cutout", cut_out, "cut-out (d < 1, or a readable map_d with a value below 1)");
     const auto textured = [](const Material& m) {
       const auto range = m.diffuse_map.empty() ? std::nullopt : value_range(m.diffuse_map);
       return range && !range->constant;
     };
-    by_material("texture", textured, "has a readable map_Kd of more than one colour");
+    by_material("texture", textured, "texture (a readable map_Kd of more than one colour)");
   }
 
   const Scene& scene_;

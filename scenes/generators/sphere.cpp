@@ -23,9 +23,18 @@ void add_ball(MeshBuilder& builder, const Ball& ball, std::size_t count, std::ui
   });
 }
 
-std::size_t balls_of(int levels) {
-  std::size_t all = 0, level = 1;
-  for (int i = 0; i <= levels; ++i) all += level, level *= 9;
+constexpr int kMostLevels = 7;
+
+/// A ball's share of the triangles is as its radius, in units of the smallest ball of the deepest level.
+std::size_t share(int level, int levels) {
+  std::size_t s = 1;
+  for (int i = level; i < levels; ++i) s *= 3;
+  return s;
+}
+
+std::size_t all_shares(int levels) {
+  std::size_t all = 0, balls = 1;
+  for (int level = 0; level <= levels; ++level) all += balls * share(level, levels), balls *= 9;
   return all;
 }
 
@@ -43,19 +52,20 @@ Scene generate_sphere(std::size_t triangles, std::uint64_t) {
 }
 
 Scene generate_sphere_flake(std::size_t triangles, std::uint64_t) {
-  constexpr std::size_t kTrianglesPerBall = 48;  // fewer look like crystals
-  constexpr int kMostLevels = 7;
+  constexpr std::size_t kSmallestBall = 48;  // with fewer triangles it looks like a crystal
   const std::size_t wanted = MeshBuilder::closed_count(triangles);
   int levels = 0;
-  while (levels < kMostLevels && balls_of(levels + 1) * kTrianglesPerBall <= wanted) ++levels;
+  while (levels < kMostLevels && all_shares(levels + 1) * kSmallestBall <= wanted) ++levels;
 
   MeshBuilder builder;
   std::deque<Ball> waiting{Ball{{0, 0, 0}, 1.0, Frame({0, 1, 0}), 0}};
-  std::size_t left = balls_of(levels);
-  for (; !waiting.empty(); --left) {
+  std::size_t shares = all_shares(levels);
+  while (!waiting.empty()) {
     const Ball ball = waiting.front();
     waiting.pop_front();
-    add_ball(builder, ball, MeshBuilder::closed_count((wanted - builder.size()) / left), std::uint16_t(ball.level % 2));
+    const std::size_t own = share(ball.level, levels);
+    add_ball(builder, ball, MeshBuilder::closed_count((wanted - builder.size()) * own / shares), std::uint16_t(ball.level % 2));
+    shares -= own;
     if (ball.level == levels) continue;
     for (int child = 0; child < 9; ++child) {
       const bool upper = child >= 6;

@@ -84,7 +84,7 @@ Scene generate_teapot_in_stadium(std::size_t triangles, std::uint64_t) {
   scene.materials.push_back(Material{.name = "grass", .diffuse = {0.2f, 0.4f, 0.15f}});
   scene.materials.push_back(Material{.name = "china", .diffuse = {0.7f, 0.7f, 0.75f}, .specular = {0.04f, 0.04f, 0.04f}, .roughness = 0.05f});
   scene.materials.push_back(Material{.name = "stands", .diffuse = {0.5f, 0.5f, 0.5f}});
-  scene.camera = Camera{.position = {0.5f, 0.62f, 1.75f}, .look_at = {0.02f, 0.42f, 0.0f}, .vertical_fov = 45};
+  scene.camera = Camera{.position = {0.5f, 0.75f, 2.1f}, .look_at = {0.03f, 0.4f, 0.0f}, .vertical_fov = 45};
   scene.lights.push_back(Light{.position = {2, 4, 3}, .intensity = {30, 30, 30}});
   return scene;
 }

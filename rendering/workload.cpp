@@ -1,0 +1,231 @@
+#include "rendering/workload.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <stdexcept>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "core/random.h"
+#include "scenes/camera.h"
+
+namespace arboretum {
+namespace {
+
+constexpr std::array<std::string_view, 6> kNames{"primary", "shadow", "ambient_occlusion", "reflection", "diffuse", "random"};
+
+/// Random dimensions: each workload draws its own, so that two of them never share a number.
+enum Dimension : std::uint64_t { kOcclusionDimension = 16, kDiffuseDimension = 32, kRandomDimension = 48 };
+
+/// A secondary ray leaves its surface at least this steeply (sine to the surface): a direction rounded to float32 must
+/// not point back into it.
+constexpr double kLeastSine = 0x1p-20;
+
+void check_known(std::string_view name) {
+  if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return;
+  throw UserError(unknown_name_message("workload", name, std::vector<std::string>(kNames.begin(), kNames.end())));
+}
+
+void check_resolution(const View& view) {
+  constexpr unsigned kMost = 65536;
+  if (view.width == 0 || view.height == 0 || view.width > kMost || view.height > kMost) {
+    throw UserError("resolution " + std::to_string(view.width) + " x " + std::to_string(view.height) +
+                    " is not possible; each must be within 1 to " + std::to_string(kMost));
+  }
+}
+
+/// Calls visit(x, y) for the pixels of a square of side `size` (a power of two) at (x, y) that lie in the picture, in
+/// Morton order.
+template <class Visit>
+void visit_morton(unsigned x, unsigned y, unsigned size, const View& view, const Visit& visit) {
+  if (x >= view.width || y >= view.height) return;
+  if (size == 1) {
+    visit(x, y);
+    return;
+  }
+  const unsigned half = size / 2;
+  visit_morton(x, y, half, view, visit);
+  visit_morton(x + half, y, half, view, visit);
+  visit_morton(x, y + half, half, view, visit);
+  visit_morton(x + half, y + half, half, view, visit);
+}
+
+/// A point of a surface that a ray has hit: where rays may start from.
+class SurfacePoint {
+ public:
+  SurfacePoint(const TriangleMesh& mesh, const Ray& ray, const Hit& hit) {
+    const auto corners = mesh.corners(hit.primitive);
+    const Vec3d a(corners[0]), ab = Vec3d(corners[1]) - a, ac = Vec3d(corners[2]) - a;
+    const double u = hit.u, v = hit.v;
+    a_ = a;
+    point_ = a + ab * u + ac * v;
+    normal_ = normalize(cross(ab, ac));
+    if (dot(normal_, Vec3d(ray.direction)) > 0.0) normal_ = normal_ * -1.0;
+    // Bound of the rounding error of a point computed from barycentrics in float32: gamma_7 times the sum of the terms'
+    // magnitudes (Pharr, Jakob, Humphreys, Physically Based Rendering, 3rd ed., 3.9).
+    constexpr double kUnit = 0x1p-24, kGamma7 = 7.0 * kUnit / (1.0 - 7.0 * kUnit);
+    double weights[3] = {std::abs(1.0 - u - v), std::abs(u), std::abs(v)};
+    for (std::size_t k = 0; k < 3; ++k) {
+      error_.x += kGamma7 * weights[k] * std::abs(double(corners[k].x));
+      error_.y += kGamma7 * weights[k] * std::abs(double(corners[k].y));
+      error_.z += kGamma7 * weights[k] * std::abs(double(corners[k].z));
+    }
+  }
+
+  [[nodiscard]] Vec3d point() const noexcept { return point_; }
+  /// Of unit length, on the side that the incoming ray came from.
+  [[nodiscard]] Vec3d normal() const noexcept { return normal_; }
+
+  /// Where a ray on the side of `side` (the normal, or its opposite) starts: off the surface along the normal by the
+  /// error bound, rounded away from it, further until the float32 point is on that side of the triangle's plane.
+  [[nodiscard]] Vec3f origin(Vec3d side) const noexcept {
+    double distance = std::abs(side.x) * error_.x + std::abs(side.y) * error_.y + std::abs(side.z) * error_.z;
+    distance = std::max(distance, 0x1p-126);
+    for (int attempt = 0; attempt < 200; ++attempt, distance *= 2.0) {
+      const Vec3d wanted = point_ + side * distance;
+      Vec3f p = to_float(wanted);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double s = axis == 0 ? side.x : axis == 1 ? side.y : side.z;
+        const double w = axis == 0 ? wanted.x : axis == 1 ? wanted.y : wanted.z;
+        if (s > 0.0 && double(p[axis]) < w) p[axis] = std::nextafter(p[axis], Bounds3f::kInfinity);
+        if (s < 0.0 && double(p[axis]) > w) p[axis] = std::nextafter(p[axis], -Bounds3f::kInfinity);
+      }
+      if (dot(Vec3d(p) - a_, side) > 0.5 * distance) return p;
+    }
+    return to_float(point_);
+  }
+
+ private:
+  Vec3d a_, point_, normal_, error_;
+};
+
+/// The unit direction, turned away from the surface where it is too grazing to leave it for sure.
+Vec3f leaving(Vec3d direction, Vec3d side) {
+  direction = normalize(direction);
+  const double sine = dot(direction, side);
+  if (sine < kLeastSine) direction = normalize(direction + side * (kLeastSine - sine));
+  return to_float(direction);
+}
+
+/// Cosine-distributed about `normal`; by Malley's method, from the unit disc.
+Vec3d cosine_direction(Vec3d normal, std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) {
+  const double r2 = random_double(seed, index, dimension);
+  const double r = std::sqrt(r2);
+  const UnitCircle circle(random_double(seed, index, dimension + 1));
+  return Frame(normal).to_world({r * circle.cosine, r * circle.sine, std::sqrt(1.0 - r2)});
+}
+
+Vec3d point_on_sphere(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) {
+  const double z = 2.0 * random_double(seed, index, dimension) - 1.0;
+  const double r = std::sqrt(std::max(0.0, 1.0 - z * z));
+  const UnitCircle circle(random_double(seed, index, dimension + 1));
+  return {r * circle.cosine, r * circle.sine, z};
+}
+
+/// The scene's first point light, else a point above the camera by a quarter of the median distance to what it sees: a
+/// measure that suits rooms and landscapes alike.
+Vec3d light_position(const Scene& scene, std::span<const Ray> primary_rays, std::span<const Hit> primary_hits) {
+  for (const Light& light : scene.lights)
+    if (light.type == Light::Type::point) return Vec3d(light.position);
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < primary_hits.size(); ++i)
+    if (primary_hits[i].is_hit()) distances.push_back(double(primary_hits[i].t) * length(Vec3d(primary_rays[i].direction)));
+  const Camera camera = view_of(scene);
+  if (distances.empty()) return Vec3d(camera.position);
+  const auto median = distances.begin() + std::ptrdiff_t(distances.size() / 2);
+  std::nth_element(distances.begin(), median, distances.end());
+  return Vec3d(camera.position) + normalize(Vec3d(camera.up)) * (0.25 * *median);
+}
+
+Ray shadow_ray(const SurfacePoint& surface, Vec3d light) {
+  const Vec3d to_light = light - surface.point();
+  if (!(length(to_light) > 0.0)) return Ray{.origin = surface.origin(surface.normal()), .direction = to_float(surface.normal()), .tfar = 0.0f};
+  // A light behind the surface is seen from behind: the ray starts on the light's side, or it would meet its own triangle.
+  const Vec3d side = dot(to_light, surface.normal()) >= 0.0 ? surface.normal() : surface.normal() * -1.0;
+  const Vec3f origin = surface.origin(side);
+  const Vec3d rest = light - Vec3d(origin);
+  return Ray{.origin = origin, .direction = leaving(rest, side), .tfar = float(length(rest))};
+}
+
+std::vector<Ray> random_rays(const Bounds3f& bounds, const View& view) {
+  const Vec3d lower(bounds.lower), upper(bounds.upper);
+  const Vec3d center = (lower + upper) * 0.5;
+  const double radius = 0.5 * length(upper - lower);
+  std::vector<Ray> rays(std::size_t(view.width) * view.height);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    Vec3f from, to;
+    for (std::uint64_t attempt = 0; from == to && attempt < 64; ++attempt) {
+      from = to_float(center + point_on_sphere(view.seed, i, kRandomDimension + 4 * attempt) * radius);
+      to = to_float(center + point_on_sphere(view.seed, i, kRandomDimension + 4 * attempt + 2) * radius);
+    }
+    const Vec3d chord = Vec3d(to) - Vec3d(from);
+    const double distance = length(chord);
+    rays[i] = Ray{.origin = from, .direction = distance > 0.0 ? to_float(chord * (1.0 / distance)) : Vec3f{0, 0, 1}, .tfar = float(distance)};
+  }
+  return rays;
+}
+
+}  // namespace
+
+std::span<const std::string_view> workload_names() { return kNames; }
+
+bool is_secondary(std::string_view workload) {
+  check_known(workload);
+  return workload != "primary" && workload != "random";
+}
+
+Query query_of(std::string_view workload) {
+  check_known(workload);
+  return workload == "shadow" || workload == "ambient_occlusion" ? Query::any_hit : Query::closest_hit;
+}
+
+Workload make_primary(const Scene& scene, const View& view) {
+  check_resolution(view);
+  Workload workload{.name = "primary", .query = Query::closest_hit, .rays = {}};
+  workload.rays.reserve(std::size_t(view.width) * view.height);
+  const RayGenerator camera(view_of(scene), view.width, view.height);
+  visit_morton(0, 0, std::bit_ceil(std::max(view.width, view.height)), view,
+               [&](unsigned x, unsigned y) { workload.rays.push_back(camera.ray(x + 0.5, y + 0.5)); });
+  return workload;
+}
+
+Workload make_workload(std::string_view name, const Scene& scene, const View& view, std::span<const Ray> primary_rays,
+                       std::span<const Hit> primary_hits) {
+  check_known(name);
+  check_resolution(view);
+  if (name == "primary") return make_primary(scene, view);
+  Workload workload{.name = std::string(name), .query = query_of(name), .rays = {}};
+  const Bounds3f bounds = scene.mesh.bounds();
+  if (name == "random") {
+    workload.rays = random_rays(bounds, view);
+    return workload;
+  }
+  if (primary_rays.size() != primary_hits.size()) throw std::invalid_argument("make_workload: one hit for each primary ray");
+  const double diagonal = length(Vec3d(bounds.upper) - Vec3d(bounds.lower));
+  const Vec3d light = light_position(scene, primary_rays, primary_hits);
+  workload.rays.reserve(primary_rays.size());
+  for (std::size_t i = 0; i < primary_rays.size(); ++i) {
+    if (!primary_hits[i].is_hit()) continue;
+    const SurfacePoint surface(scene.mesh, primary_rays[i], primary_hits[i]);
+    const Vec3d normal = surface.normal();
+    if (name == "shadow") {
+      workload.rays.push_back(shadow_ray(surface, light));
+      continue;
+    }
+    Ray ray{.origin = surface.origin(normal), .direction = {}};
+    if (name == "reflection") {
+      const Vec3d in = normalize(Vec3d(primary_rays[i].direction));
+      ray.direction = leaving(in - normal * (2.0 * dot(in, normal)), normal);
+    } else if (name == "diffuse") {
+      ray.direction = leaving(cosine_direction(normal, view.seed, i, kDiffuseDimension), normal);
+    } else {
+      ray.direction = leaving(cosine_direction(normal, view.seed, i, kOcclusionDimension), normal);
+      ray.tfar = float(0.2 * diagonal);
+    }
+    workload.rays.push_back(ray);
+  }
+  return workload;
+}
+
+}  // namespace arboretum
