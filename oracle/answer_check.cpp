@@ -26,7 +26,8 @@ void expect_one_size(std::size_t rays, std::size_t truth, std::size_t answers) {
   }
 }
 
-bool is_at_nearest_t(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth, std::uint32_t primitive) {
+bool is_at_nearest_t(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth,
+                     std::uint32_t primitive) {
   if (primitive == truth.hit.primitive) return true;
   if (primitive >= mesh.size() || !truth.tie) return false;
   const Corners given = mesh.corners(primitive);
@@ -62,7 +63,8 @@ void check_one(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth, 
     something_behind = difference > tolerance && !right_primitive;
     if ((right_surface || right_primitive) && std::isfinite(truth.hit.t)) {
       const double error = std::fabs(difference) / ulp_of(truth.hit.t);
-      tally.t_errors.push_back(std::isnan(error) ? std::numeric_limits<float>::infinity() : static_cast<float>(error));
+      tally.t_errors.push_back(std::isnan(error) ? std::numeric_limits<float>::infinity()
+                                                 : static_cast<float>(error));
     }
   }
   if (something_behind && adjacency().passes_through(ray, truth.hit.primitive, truth.hit.u, truth.hit.v)) {
@@ -80,8 +82,8 @@ double quantile(std::vector<float>& values, double p) {
 
 }  // namespace
 
-AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> rays, std::span<const ExactHit> truth,
-                               std::span<const Hit> answers,
+AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> rays,
+                               std::span<const ExactHit> truth, std::span<const Hit> answers,
                                const std::function<const SurfaceAdjacency&()>& adjacency) {
   expect_one_size(rays.size(), truth.size(), answers.size());
   tbb::enumerable_thread_specific<Tally> tallies;

@@ -1,8 +1,10 @@
-// DoubleDouble: an unevaluated sum of two doubles, about 106 bits, for the middle level of the exact predicate.
+// DoubleDouble: an unevaluated sum of two doubles, about 106 bits, for the middle level of the exact
+// predicate.
 //
-// Error bounds: Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic building blocks of double-word
-// arithmetic", ACM TOMS 44(2), 2017. Each operation below has a relative error under 10 * 2^-106. They need
-// round-to-nearest, no contraction and no underflow of the low parts; the predicate's operands see to the last one.
+// Error bounds: Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic building blocks of
+// double-word arithmetic", ACM TOMS 44(2), 2017. Each operation below has a relative error under 10 * 2^-106.
+// They need round-to-nearest, no contraction and no underflow of the low parts; the predicate's operands see
+// to the last one.
 #pragma once
 
 #include <cmath>
@@ -34,14 +36,18 @@ struct DoubleDouble {
   return {p, ((ah * bh - p) + ah * bl + al * bh) + al * bl};
 }
 
-[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a) noexcept { return {-a.hi, -a.lo}; }
+[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a) noexcept {
+  return {-a.hi, -a.lo};
+}
 
 [[nodiscard]] inline DoubleDouble operator+(DoubleDouble a, DoubleDouble b) noexcept {
   const DoubleDouble s = two_sum(a.hi, b.hi), t = two_sum(a.lo, b.lo);
   const DoubleDouble v = fast_two_sum(s.hi, s.lo + t.hi);
   return fast_two_sum(v.hi, t.lo + v.lo);
 }
-[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a, DoubleDouble b) noexcept { return a + -b; }
+[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a, DoubleDouble b) noexcept {
+  return a + -b;
+}
 
 [[nodiscard]] inline DoubleDouble operator*(DoubleDouble a, DoubleDouble b) noexcept {
   const DoubleDouble p = two_product(a.hi, b.hi);

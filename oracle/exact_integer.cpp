@@ -50,10 +50,12 @@ IntegerTriple difference(const IntegerTriple& a, const IntegerTriple& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-int sign_of(const ExactInteger& x) { return x.sign() > 0 ? 1 : x.sign() < 0 ? -1 : 0; }
+int sign_of(const ExactInteger& x) {
+  return x.sign() > 0 ? 1 : x.sign() < 0 ? -1 : 0;
+}
 
-/// Points in multiples of 2^point_exponent, the direction in multiples of 2^direction_exponent: small common scales keep
-/// the integers of ordinary scenes within a few machine words.
+/// Points in multiples of 2^point_exponent, the direction in multiples of 2^direction_exponent: small common
+/// scales keep the integers of ordinary scenes within a few machine words.
 struct Scaled {
   int point_exponent = std::numeric_limits<int>::max();
   int direction_exponent = std::numeric_limits<int>::max();
@@ -88,7 +90,8 @@ int compare_scaled(const ExactInteger& a, int a_exponent, const ExactInteger& b,
 int compare(const ExactFraction& a, const ExactFraction& b) {
   const int sign_a = sign_of(a.numerator), sign_b = sign_of(b.numerator);
   if (sign_a != sign_b) return sign_a < sign_b ? -1 : 1;
-  const int c = compare_scaled(a.numerator * b.denominator, a.exponent, b.numerator * a.denominator, b.exponent);
+  const int c =
+      compare_scaled(a.numerator * b.denominator, a.exponent, b.numerator * a.denominator, b.exponent);
   return c > 0 ? 1 : c < 0 ? -1 : 0;
 }
 
@@ -125,7 +128,8 @@ float round_to_float(const ExactFraction& a) {
   if (std::fabs(approximate) > 2 * kLargest) return approximate > 0 ? kInfinity : -kInfinity;
   constexpr double kMax = std::numeric_limits<float>::max();
   const float value = static_cast<float>(std::clamp(approximate, -kMax, kMax));
-  // The conversion may have gone to the wrong neighbour where the value lies beside a midpoint: settle it exactly.
+  // The conversion may have gone to the wrong neighbour where the value lies beside a midpoint: settle it
+  // exactly.
   for (int direction : {1, -1}) {
     const float next = std::nextafter(value, direction > 0 ? kInfinity : -kInfinity);
     const double midpoint = std::isinf(next) ? direction * kLargest : 0.5 * (double(value) + double(next));

@@ -9,8 +9,9 @@
 
 namespace arboretum {
 
-/// Fixed-size signed integer, no allocation. The largest value needed has degree 6 in numbers of 278 bits (float32's whole
-/// range as multiples of 2^-149, one bit for the difference), which with the carries stays under 1700 bits.
+/// Fixed-size signed integer, no allocation. The largest value needed has degree 6 in numbers of 278 bits
+/// (float32's whole range as multiples of 2^-149, one bit for the difference), which with the carries stays
+/// under 1700 bits.
 using ExactInteger = boost::multiprecision::number<
     boost::multiprecision::cpp_int_backend<2048, 2048, boost::multiprecision::signed_magnitude,
                                            boost::multiprecision::unchecked, void>,

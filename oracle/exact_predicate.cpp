@@ -1,14 +1,16 @@
-// Error bounds. u = 2^-53. Every operand is a float32, a multiple of 2^-149 below 2^128 in size; so every value of degree
-// three here is 0 or between 2^-447 and 2^390, a quotient of two such between 2^-840 and 2^840, and the low parts of
-// double-doubles are multiples of the same grids: nothing under- or overflows and relative bounds hold throughout.
+// Error bounds. u = 2^-53. Every operand is a float32, a multiple of 2^-149 below 2^128 in size; so every
+// value of degree three here is 0 or between 2^-447 and 2^390, a quotient of two such between 2^-840 and
+// 2^840, and the low parts of double-doubles are multiples of the same grids: nothing under- or overflows and
+// relative bounds hold throughout.
 //
-// det[p, q, r] in doubles: p and q are differences of float32 numbers (one rounding each), then there are five roundings on
-// the longest way (determinant.h): each of the six products carries at most seven factors (1 + e), |e| <= u. With
-// |p|, |q|, |r| the largest components the products sum to at most 6 |p||q||r|, so the error is below
-// 6 * 7.01 u |p||q||r|. r itself may be such a difference: eight factors, 6 * 8.01 u = 48.1 u. kDoubleBound = 56 u leaves room for the
-// roundings of |p|, |q|, |r| and of the bound itself.
+// det[p, q, r] in doubles: p and q are differences of float32 numbers (one rounding each), then there are
+// five roundings on the longest way (determinant.h): each of the six products carries at most seven factors
+// (1 + e), |e| <= u. With |p|, |q|, |r| the largest components the products sum to at most 6 |p||q||r|, so
+// the error is below 6 * 7.01 u |p||q||r|. r itself may be such a difference: eight factors, 6 * 8.01 u
+// = 48.1 u. kDoubleBound = 56 u leaves room for the roundings of |p|, |q|, |r| and of the bound itself.
 //
-// In double-doubles the differences are exact, five operations remain, each within 10 * 2^-106: 6 * 5.01 * 10 * 2^-106 < 2^-97.
+// In double-doubles the differences are exact, five operations remain, each within 10 * 2^-106: 6 * 5.01 * 10
+// * 2^-106 < 2^-97.
 #include "oracle/exact_predicate.h"
 
 #include <algorithm>
@@ -22,7 +24,9 @@ constexpr double kDoubleBound = 56 * 0x1p-53;
 constexpr double kDoubleDoubleBound = 0x1p-96;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Triple<double> widen(Vec3f p) { return {p.x, p.y, p.z}; }
+Triple<double> widen(Vec3f p) {
+  return {p.x, p.y, p.z};
+}
 
 Triple<double> operator-(const Triple<double>& a, const Triple<double>& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -33,22 +37,32 @@ Triple<DoubleDouble> difference(const Triple<double>& a, const Triple<double>& b
   return {two_sum(a[0], -b[0]), two_sum(a[1], -b[1]), two_sum(a[2], -b[2])};
 }
 
-double size_of(const Triple<double>& a) { return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])}); }
+double size_of(const Triple<double>& a) {
+  return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])});
+}
 double size_of(const Triple<DoubleDouble>& a) {
   return std::max({std::fabs(a[0].hi), std::fabs(a[1].hi), std::fabs(a[2].hi)});
 }
 
-int sign_beyond(double value, double bound) { return value > bound ? 1 : value < -bound ? -1 : 0; }
+int sign_beyond(double value, double bound) {
+  return value > bound ? 1 : value < -bound ? -1 : 0;
+}
 
-double down(double x) { return std::nextafter(x, -kInfinity); }
-double up(double x) { return std::nextafter(x, kInfinity); }
+double down(double x) {
+  return std::nextafter(x, -kInfinity);
+}
+double up(double x) {
+  return std::nextafter(x, kInfinity);
+}
 
-/// Half the width of an interval around numerator / denominator, given the errors of both, rounding of the quotient not
-/// counted: (n + dn) / (d + dd) - n / d = (dn - (n / d) dd) / (d + dd). Infinite where the denominator may be near 0.
+/// Half the width of an interval around numerator / denominator, given the errors of both, rounding of the
+/// quotient not counted: (n + dn) / (d + dd) - n / d = (dn - (n / d) dd) / (d + dd). Infinite where the
+/// denominator may be near 0.
 double quotient_error(double quotient, double numerator_error, double denominator, double denominator_error) {
   const double size = std::fabs(denominator);
   if (!(size > 2 * denominator_error)) return kInfinity;
-  return (numerator_error + std::fabs(quotient) * denominator_error) / (size - denominator_error) * (1 + 0x1p-48);
+  return (numerator_error + std::fabs(quotient) * denominator_error) / (size - denominator_error) *
+         (1 + 0x1p-48);
 }
 
 }  // namespace
@@ -116,7 +130,8 @@ bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
 
 int ExactPredicate::edge_sign_in_double_double(const Triple<DoubleDouble>& p, const Triple<DoubleDouble>& q,
                                                double scale, bool& certain) const {
-  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]},
+                               DoubleDouble{direction_[2]}};
   const int sign = sign_beyond(determinant(p, q, d).hi, kDoubleDoubleBound * scale * size_of(p) * size_of(q));
   certain = sign != 0;
   return sign;
@@ -126,7 +141,8 @@ ExactPredicate::Approximate ExactPredicate::approximate_t(const Corners& corners
   const Triple<double> pa = widen(corners[0]);
   const Triple<DoubleDouble> a = difference(pa, origin_), e1 = difference(widen(corners[1]), pa),
                              e2 = difference(widen(corners[2]), pa);
-  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]},
+                               DoubleDouble{direction_[2]}};
   const Triple<DoubleDouble> normal = cross(e1, e2);
   const double scale = kDoubleDoubleBound * size_of(e1) * size_of(e2);
   return Approximate::quotient(dot(normal, a), scale * size_of(a), dot(normal, d), scale * direction_size_);
@@ -161,8 +177,12 @@ bool ExactPredicate::within_interval(const Corners& corners, Enclosure& t) {
   const ExactFraction exact = exact_point(ray_, corners).t;
   const double rounded = to_double(exact);
   t = rounded == 0.0 ? Enclosure{0.0, 0.0} : Enclosure{down(rounded), up(rounded)};
-  const auto not_below = [&](double limit) { return std::isinf(limit) ? limit < 0 : compare(exact, limit) >= 0; };
-  const auto not_above = [&](double limit) { return std::isinf(limit) ? limit > 0 : compare(exact, limit) <= 0; };
+  const auto not_below = [&](double limit) {
+    return std::isinf(limit) ? limit < 0 : compare(exact, limit) >= 0;
+  };
+  const auto not_above = [&](double limit) {
+    return std::isinf(limit) ? limit > 0 : compare(exact, limit) <= 0;
+  };
   return not_below(tnear_) && not_above(tfar_);
 }
 
@@ -171,7 +191,8 @@ int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
   const Approximate p = approximate_t(first), q = approximate_t(second);
   if (p.usable() && q.usable()) {
     const DoubleDouble difference = p.value - q.value;
-    const double bound = (p.radius + q.radius) * (1 + 0x1p-50) + (std::fabs(p.value.hi) + std::fabs(q.value.hi)) * 0x1p-100;
+    const double bound =
+        (p.radius + q.radius) * (1 + 0x1p-50) + (std::fabs(p.value.hi) + std::fabs(q.value.hi)) * 0x1p-100;
     if (const int sign = sign_beyond(difference.hi, bound)) return ++counts_.in_double_double, sign;
   }
   ++counts_.in_integers;
@@ -179,10 +200,12 @@ int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
 }
 
 RoundedPoint ExactPredicate::round(const Corners& corners) {
-  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]},
+                               DoubleDouble{direction_[2]}};
   const Triple<double> pa = widen(corners[0]), pb = widen(corners[1]), pc = widen(corners[2]);
-  const Triple<DoubleDouble> a = difference(pa, origin_), b = difference(pb, origin_), c = difference(pc, origin_),
-                             e1 = difference(pb, pa), e2 = difference(pc, pa), normal = cross(e1, e2);
+  const Triple<DoubleDouble> a = difference(pa, origin_), b = difference(pb, origin_),
+                             c = difference(pc, origin_), e1 = difference(pb, pa), e2 = difference(pc, pa),
+                             normal = cross(e1, e2);
   const double scale = kDoubleDoubleBound * size_of(e1) * size_of(e2);
   const DoubleDouble denominator = dot(normal, d);
   const double denominator_error = scale * direction_size_;
@@ -194,14 +217,18 @@ RoundedPoint ExactPredicate::round(const Corners& corners) {
   float rounded[3];
   bool certain = std::fabs(point[0].value.hi) * 0x1p-54 >= point[0].radius;
   for (int k = 0; k < 3 && certain; ++k) {
-    if (!point[k].usable()) { certain = false; break; }
+    if (!point[k].usable()) {
+      certain = false;
+      break;
+    }
     const Enclosure e = point[k].enclosure();
     constexpr double kMax = std::numeric_limits<float>::max();
     certain = std::fabs(e.lower) <= kMax && std::fabs(e.upper) <= kMax &&
               static_cast<float>(e.lower) == static_cast<float>(e.upper);
     rounded[k] = certain ? static_cast<float>(e.lower) : 0.0f;
   }
-  if (certain) return ++counts_.in_double_double, RoundedPoint{point[0].value.hi, rounded[0], rounded[1], rounded[2]};
+  if (certain)
+    return ++counts_.in_double_double, RoundedPoint{point[0].value.hi, rounded[0], rounded[1], rounded[2]};
   ++counts_.in_integers;
   const ExactPoint exact = exact_point(ray_, corners);
   return {to_double(exact.t), round_to_float(exact.t), round_to_float(exact.u), round_to_float(exact.v)};

@@ -1,9 +1,10 @@
-// ExactPredicate: whether a ray meets a triangle, and where, decided exactly on float32 inputs of any finite size.
+// ExactPredicate: whether a ray meets a triangle, and where, decided exactly on float32 inputs of any finite
+// size.
 //
-// Three levels (the scheme of Shewchuk's adaptive predicates, 1997): doubles with a proved error bound, double-doubles
-// with a proved error bound, whole numbers. A level decides only what its bound allows; the last decides everything.
-// E_ij = det[p_i - o, p_j - o, d]; the line meets the closed triangle where the three are all >= 0 or all <= 0 and their
-// sum N.d is not 0; t = N.(a - o) / N.d with N = (b - a) x (c - a).
+// Three levels (the scheme of Shewchuk's adaptive predicates, 1997): doubles with a proved error bound,
+// double-doubles with a proved error bound, whole numbers. A level decides only what its bound allows; the
+// last decides everything. E_ij = det[p_i - o, p_j - o, d]; the line meets the closed triangle where the
+// three are all >= 0 or all <= 0 and their sum N.d is not 0; t = N.(a - o) / N.d with N = (b - a) x (c - a).
 #pragma once
 
 #include <array>
@@ -20,7 +21,8 @@ namespace arboretum {
 struct DecisionCounts {
   std::uint64_t in_double = 0, in_double_double = 0, in_integers = 0;
   DecisionCounts& operator+=(const DecisionCounts& other) noexcept {
-    in_double += other.in_double, in_double_double += other.in_double_double, in_integers += other.in_integers;
+    in_double += other.in_double, in_double_double += other.in_double_double,
+        in_integers += other.in_integers;
     return *this;
   }
 };
@@ -30,8 +32,8 @@ struct Enclosure {
   double lower = 0.0, upper = 0.0;
 };
 
-/// The exact point where a ray meets a triangle, rounded: t to a relative error of at most 2^-50 and correctly to
-/// float32; u and v, the weights of the second and third corner, correctly to float32.
+/// The exact point where a ray meets a triangle, rounded: t to a relative error of at most 2^-50 and
+/// correctly to float32; u and v, the weights of the second and third corner, correctly to float32.
 struct RoundedPoint {
   double t = 0.0;
   float t_rounded = 0.0f, u = 0.0f, v = 0.0f;
@@ -43,8 +45,8 @@ class ExactPredicate {
   /// `ray` must be valid (core/ray.h) and outlive the predicate.
   explicit ExactPredicate(const Ray& ray) noexcept;
 
-  /// Whether the ray meets the closed triangle at a t within the closed interval; then `t` encloses it. The corners must be
-  /// finite.
+  /// Whether the ray meets the closed triangle at a t within the closed interval; then `t` encloses it. The
+  /// corners must be finite.
   [[nodiscard]] bool meets(const Corners& corners, Enclosure& t);
   /// Sign of t(first) - t(second). Both must be met by the ray's line.
   [[nodiscard]] int compare_t(const Corners& first, const Corners& second);

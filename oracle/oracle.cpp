@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t kGrain = 512;  // rays of one task
 
-/// The exact nearest hit among those shown so far: `t` encloses its t, and an order that enclosures do not settle is exact.
+/// The exact nearest hit among those shown so far: `t` encloses its t, and an order that enclosures do not
+/// settle is exact.
 struct Nearest {
   std::uint32_t id = kNoPrimitive;
   Corners corners;

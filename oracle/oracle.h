@@ -1,9 +1,9 @@
 // Oracle: the exact answer of every ray, and the check of given answers against it.
 //
-// Inputs are float32 bit patterns, taken as exact numbers; every decision (hit or miss, which is nearest, which tie) is
-// exact: a floating-point filter first, then exact arithmetic where it cannot decide. The search goes through the
-// oracle's own tree, which shares no code with the structures under test and never leaves out a triangle that the
-// exact ray touches.
+// Inputs are float32 bit patterns, taken as exact numbers; every decision (hit or miss, which is nearest,
+// which tie) is exact: a floating-point filter first, then exact arithmetic where it cannot decide. The
+// search goes through the oracle's own tree, which shares no code with the structures under test and never
+// leaves out a triangle that the exact ray touches.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ namespace arboretum {
 
 struct DecisionCounts;  // oracle/exact_predicate.h
 
-/// The exact answer of one closest-hit ray. `hit`: t, u, v rounded from the exact values to float32, and the lowest id of
-/// those at the exact nearest t. `t` as a double has a relative error of at most 2^-50.
+/// The exact answer of one closest-hit ray. `hit`: t, u, v rounded from the exact values to float32, and the
+/// lowest id of those at the exact nearest t. `t` as a double has a relative error of at most 2^-50.
 struct ExactHit {
   Hit hit;
   double t = 0.0;
@@ -32,14 +32,18 @@ struct AnswerCheck {
   std::uint64_t missed_hits = 0;     ///< exact hit, reported miss
   std::uint64_t false_hits = 0;      ///< exact miss, reported hit
   std::uint64_t wrong_surface = 0;   ///< both hit, t apart by more than 2^-12 relative
-  /// Both hit, but the primitive is not one of those at the exact nearest t, be the surface right or wrong; no part of
-  /// wrong_answers().
+  /// Both hit, but the primitive is not one of those at the exact nearest t, be the surface right or wrong;
+  /// no part of wrong_answers().
   std::uint64_t wrong_primitive = 0;
-  /// Misses, or hits of something behind, through a closed surface and not past its silhouette. 0 for any hit.
+  /// Misses, or hits of something behind, through a closed surface and not past its silhouette. 0 for any
+  /// hit.
   std::uint64_t cracks = 0;
-  /// |t - exact t| in units of the last place of the exact t's float32, over the rays with the right surface or primitive.
+  /// |t - exact t| in units of the last place of the exact t's float32, over the rays with the right surface
+  /// or primitive.
   double t_error_ulp_median = 0, t_error_ulp_p99 = 0, t_error_ulp_max = 0;
-  [[nodiscard]] std::uint64_t wrong_answers() const noexcept { return missed_hits + false_hits + wrong_surface; }
+  [[nodiscard]] std::uint64_t wrong_answers() const noexcept {
+    return missed_hits + false_hits + wrong_surface;
+  }
 };
 
 class Oracle {
@@ -50,13 +54,16 @@ class Oracle {
   Oracle(Oracle&&) noexcept;
   Oracle& operator=(Oracle&&) noexcept;
 
-  /// Both use all TBB threads allowed to the caller; the answers do not depend on their number. `counts`, where given,
-  /// is added to: how many decisions each level of the predicate took.
-  [[nodiscard]] std::vector<ExactHit> closest_hit(std::span<const Ray> rays, DecisionCounts* counts = nullptr) const;
+  /// Both use all TBB threads allowed to the caller; the answers do not depend on their number. `counts`,
+  /// where given, is added to: how many decisions each level of the predicate took.
+  [[nodiscard]] std::vector<ExactHit> closest_hit(std::span<const Ray> rays,
+                                                  DecisionCounts* counts = nullptr) const;
   /// 1 where anything lies within the closed interval, else 0.
-  [[nodiscard]] std::vector<std::uint8_t> any_hit(std::span<const Ray> rays, DecisionCounts* counts = nullptr) const;
+  [[nodiscard]] std::vector<std::uint8_t> any_hit(std::span<const Ray> rays,
+                                                  DecisionCounts* counts = nullptr) const;
 
-  /// `truth` as closest_hit or any_hit gave it for the same rays. Throws std::invalid_argument where the sizes differ.
+  /// `truth` as closest_hit or any_hit gave it for the same rays. Throws std::invalid_argument where the
+  /// sizes differ.
   [[nodiscard]] AnswerCheck check_closest_hit(std::span<const Ray> rays, std::span<const ExactHit> truth,
                                               std::span<const Hit> answers) const;
   [[nodiscard]] AnswerCheck check_any_hit(std::span<const Ray> rays, std::span<const std::uint8_t> truth,

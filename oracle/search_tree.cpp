@@ -14,7 +14,9 @@ constexpr std::uint32_t kParallelRange = 8192;
 constexpr double kNodeCost = 0.5;  // of a pair of box tests, in units of one triangle test
 
 /// Centre of a box in doubles, where no float32 box overflows.
-double center(const Bounds3f& b, std::size_t axis) { return 0.5 * (double(b.lower[axis]) + double(b.upper[axis])); }
+double center(const Bounds3f& b, std::size_t axis) {
+  return 0.5 * (double(b.lower[axis]) + double(b.upper[axis]));
+}
 
 struct Bins {
   Bounds3f bounds[kBins];
@@ -59,7 +61,8 @@ SearchTree::SearchTree(const TriangleMesh& mesh) {
     const std::uint32_t middle = split(state, all, 0);
     for (int child = 0; child < 2; ++child) {
       BuildRange range{child == 0 ? 0 : middle, child == 0 ? middle : all.end, {}};
-      for (std::uint32_t i = range.begin; i < range.end; ++i) range.bounds.extend(state.bounds[state.order[i]]);
+      for (std::uint32_t i = range.begin; i < range.end; ++i)
+        range.bounds.extend(state.bounds[state.order[i]]);
       build_child(state, range, 1, 0, child);
     }
   }
@@ -69,7 +72,8 @@ SearchTree::SearchTree(const TriangleMesh& mesh) {
   });
 }
 
-void SearchTree::build_child(BuildState& state, const BuildRange& range, unsigned depth, std::uint32_t node, int child) {
+void SearchTree::build_child(BuildState& state, const BuildRange& range, unsigned depth, std::uint32_t node,
+                             int child) {
   Node& parent = nodes_[node];
   for (std::size_t axis = 0; axis < 3; ++axis) {
     parent.bounds[axis][0][child] = range.bounds.lower[axis];
@@ -137,7 +141,8 @@ std::uint32_t SearchTree::split(BuildState& state, const BuildRange& range, unsi
       if (cost < best_cost) best_cost = cost, best_axis = axis, best_bin = b;
     }
   }
-  if (count <= kMaxLeaf && !(best_cost + kNodeCost * range.bounds.area() < range.bounds.area() * count)) return range.begin;
+  if (count <= kMaxLeaf && !(best_cost + kNodeCost * range.bounds.area() < range.bounds.area() * count))
+    return range.begin;
   if (!(best_cost < std::numeric_limits<double>::infinity())) return half;
   const double scale = kBins / (high[best_axis] - low[best_axis]);
   const auto middle = std::partition(first, last, [&](std::uint32_t i) {

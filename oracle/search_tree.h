@@ -1,5 +1,5 @@
-// SearchTree: the oracle's own hierarchy of boxes. It shares no code with structures/, and its box test never turns away
-// a box that the exact ray touches.
+// SearchTree: the oracle's own hierarchy of boxes. It shares no code with structures/, and its box test never
+// turns away a box that the exact ray touches.
 #pragma once
 
 #include <array>
@@ -20,15 +20,16 @@ class SearchTree {
   /// Builds over the triangles whose corners are all finite; the others are left out.
   explicit SearchTree(const TriangleMesh& mesh);
 
-  /// Calls `triangle(id, corners, limit)` for every triangle that the ray may meet at a t in [tnear, limit], roughly front to
-  /// back. `limit` starts as tfar; the callee may lower it to anything that is not below the nearest hit's t. The search ends
-  /// when the callee returns true.
+  /// Calls `triangle(id, corners, limit)` for every triangle that the ray may meet at a t in [tnear, limit],
+  /// roughly front to back. `limit` starts as tfar; the callee may lower it to anything that is not below the
+  /// nearest hit's t. The search ends when the callee returns true.
   template <class Callee>
   void search(const Ray& ray, Callee&& triangle) const;
 
  private:
-  /// Two children side by side: bounds[axis][side][child]. A child with count > 0 is a leaf of that many triangles from
-  /// `first`; one with count == 0 and first == 0 does not exist (only the root's, which nothing points at, can be 0).
+  /// Two children side by side: bounds[axis][side][child]. A child with count > 0 is a leaf of that many
+  /// triangles from `first`; one with count == 0 and first == 0 does not exist (only the root's, which
+  /// nothing points at, can be 0).
   struct Node {
     float bounds[3][2][2];
     std::uint32_t first[2];
@@ -56,11 +57,11 @@ class SearchTree {
 };
 
 /// Box test of one ray. For an axis with d != 0 the exact ray is between the planes l and h for t in
-/// [(l - o) / d, (h - o) / d] (or the other way round). Computed in doubles, (l - o) * (1 / d) has three roundings and no
-/// under- or overflow (float32 operands), so it is the exact number times 1 + e with |e| < 4 * 2^-53; scaling keeps the
-/// order, so the largest entry of the axes is also within that of the exact one, and widening entry and exit by
-/// kWiden = 2^-50 of their size covers both and the rounding of the widening itself. An axis with d == 0 (either sign) is
-/// a plain comparison of exact numbers.
+/// [(l - o) / d, (h - o) / d] (or the other way round). Computed in doubles, (l - o) * (1 / d) has three
+/// roundings and no under- or overflow (float32 operands), so it is the exact number times 1 + e with |e| < 4
+/// * 2^-53; scaling keeps the order, so the largest entry of the axes is also within that of the exact one,
+/// and widening entry and exit by kWiden = 2^-50 of their size covers both and the rounding of the widening
+/// itself. An axis with d == 0 (either sign) is a plain comparison of exact numbers.
 class ConservativeSlabs {
  public:
   explicit ConservativeSlabs(const Ray& ray) noexcept : tnear_(ray.tnear) {
@@ -74,8 +75,10 @@ class ConservativeSlabs {
     any_parallel_ = parallel_[0] || parallel_[1] || parallel_[2];
   }
 
-  /// Whether child `c` of the bounds may be met at a t in [tnear, limit]; `entry` is then at most the exact t of entry.
-  [[nodiscard]] bool touches(const float (&bounds)[3][2][2], int c, double limit, double& entry) const noexcept {
+  /// Whether child `c` of the bounds may be met at a t in [tnear, limit]; `entry` is then at most the exact t
+  /// of entry.
+  [[nodiscard]] bool touches(const float (&bounds)[3][2][2], int c, double limit,
+                             double& entry) const noexcept {
     constexpr double kWiden = 0x1p-50, kInfinity = std::numeric_limits<double>::infinity();
     double enter = -kInfinity, leave = kInfinity;
     for (std::size_t axis = 0; axis < 3; ++axis) {

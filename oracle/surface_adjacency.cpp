@@ -14,13 +14,16 @@ Triple<double> from(Vec3f origin, Vec3f p) {
   return {double(p.x) - origin.x, double(p.y) - origin.y, double(p.z) - origin.z};
 }
 
-double size_of(const Triple<double>& a) { return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])}); }
+double size_of(const Triple<double>& a) {
+  return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])});
+}
 
 /// Side of `p` of the plane through the edge along the ray; 0 where doubles cannot tell.
 int side(const Ray& ray, Vec3f a, Vec3f b, Vec3f p) {
   const Triple<double> edge = from(a, b), third = from(a, p),
                        d{ray.direction.x, ray.direction.y, ray.direction.z};
-  const double value = determinant(edge, third, d), bound = 0x1p-47 * size_of(edge) * size_of(third) * size_of(d);
+  const double value = determinant(edge, third, d),
+               bound = 0x1p-47 * size_of(edge) * size_of(third) * size_of(d);
   return value > bound ? 1 : value < -bound ? -1 : 0;
 }
 
@@ -34,9 +37,8 @@ SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
     if (is_finite(points[i])) order.push_back(i);
   }
   const auto key = [&points](std::uint32_t i) { return std::tie(points[i].x, points[i].y, points[i].z); };
-  std::sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
-    return key(i) != key(j) ? key(i) < key(j) : i < j;
-  });
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t i, std::uint32_t j) { return key(i) != key(j) ? key(i) < key(j) : i < j; });
   welded_.resize(points.size());
   std::iota(welded_.begin(), welded_.end(), 0u);
   for (std::size_t k = 1; k < order.size(); ++k) {
@@ -63,7 +65,8 @@ SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
 }
 
 bool SurfaceAdjacency::is_crossed(const Ray& ray, std::uint32_t a, std::uint32_t b) const {
-  const auto [first, last] = std::equal_range(edges_.begin(), edges_.end(), Edge{std::min(a, b), std::max(a, b), 0});
+  const auto [first, last] =
+      std::equal_range(edges_.begin(), edges_.end(), Edge{std::min(a, b), std::max(a, b), 0});
   if (last - first != 2) return false;
   const std::vector<Vec3f>& p = mesh_.vertices;
   return side(ray, p[a], p[b], p[first->third]) * side(ray, p[a], p[b], p[(first + 1)->third]) < 0;
@@ -84,7 +87,8 @@ bool SurfaceAdjacency::passes_through(const Ray& ray, std::uint32_t triangle, do
   if (small == 0) return true;
   if (small == 1) return is_crossed(ray, corner[(last_small + 1) % 3], corner[(last_small + 2) % 3]);
   const std::uint32_t vertex = corner[large];
-  const auto first = std::lower_bound(spokes_.begin(), spokes_.end(), std::array<std::uint32_t, 2>{vertex, 0});
+  const auto first =
+      std::lower_bound(spokes_.begin(), spokes_.end(), std::array<std::uint32_t, 2>{vertex, 0});
   bool any = false;
   for (auto spoke = first; spoke != spokes_.end() && (*spoke)[0] == vertex; ++spoke) {
     if (!is_crossed(ray, vertex, (*spoke)[1])) return false;

@@ -24,7 +24,8 @@ struct EndPointOverlap {
   double sampled = 1.0;  ///< share of the records that were looked at
 };
 
-/// `references` are the primitives of all leaves, in the records' order. `work` bounds the number of box steps and clips.
+/// `references` are the primitives of all leaves, in the records' order. `work` bounds the number of box
+/// steps and clips.
 [[nodiscard]] EndPointOverlap end_point_overlap(const TriangleMesh& mesh, std::span<const TreeRecord> records,
                                                 std::span<const std::uint32_t> references, double work = 4e8);
 

@@ -40,8 +40,8 @@ struct HardCase {
 }
 
 /// Throws where the file is missing or not what it should be.
-[[nodiscard]] inline std::vector<HardCase> load_hard_cases(
-    const std::string& path = ARBORETUM_SOURCE_DIR "/tests/hard_cases.json") {
+[[nodiscard]] inline std::vector<HardCase> load_hard_cases(const std::string& path = ARBORETUM_SOURCE_DIR
+                                                           "/tests/hard_cases.json") {
   std::ifstream file(path);
   if (!file) throw std::runtime_error("cannot read " + path);
   std::vector<HardCase> cases;

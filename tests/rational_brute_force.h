@@ -1,4 +1,5 @@
-// The definition of truth, written out slowly in rational numbers: every triangle, no filter, no tree. For tests alone.
+// The definition of truth, written out slowly in rational numbers: every triangle, no filter, no tree. For
+// tests alone.
 #pragma once
 
 #include <array>
@@ -25,13 +26,19 @@ inline Number number(float x) {
   const boost::multiprecision::cpp_int power = boost::multiprecision::cpp_int(1) << std::abs(exponent);
   return exponent >= 0 ? Number(mantissa * power) : Number(mantissa) / Number(power);
 }
-inline Point point(Vec3f p) { return {number(p.x), number(p.y), number(p.z)}; }
-inline Point sub(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Number dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline Point point(Vec3f p) {
+  return {number(p.x), number(p.y), number(p.z)};
+}
+inline Point sub(const Point& a, const Point& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+inline Number dot(const Point& a, const Point& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 /// det[a, b, c] by the rule of Sarrus.
 inline Number det(const Point& a, const Point& b, const Point& c) {
-  return a[0] * b[1] * c[2] + a[1] * b[2] * c[0] + a[2] * b[0] * c[1] - a[2] * b[1] * c[0] - a[1] * b[0] * c[2] -
-         a[0] * b[2] * c[1];
+  return a[0] * b[1] * c[2] + a[1] * b[2] * c[0] + a[2] * b[0] * c[1] - a[2] * b[1] * c[0] -
+         a[1] * b[0] * c[2] - a[0] * b[2] * c[1];
 }
 
 struct Answer {
@@ -40,8 +47,8 @@ struct Answer {
   Number t, u, v;  ///< u, v of the lowest id
 };
 
-/// t from the point's barycentric coordinates along the direction, not from the plane's normal: another way round than the
-/// code under test.
+/// t from the point's barycentric coordinates along the direction, not from the plane's normal: another way
+/// round than the code under test.
 inline Answer closest_hit(const TriangleMesh& mesh, const Ray& ray) {
   Answer answer;
   if (!is_valid(ray)) return answer;

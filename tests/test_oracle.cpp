@@ -1,47 +1,22 @@
 #include "oracle/oracle.h"
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include "core/random.h"
 #include "oracle/exact_predicate.h"
-#include "oracle/surface_adjacency.h"
 #include "tests/catch.h"
 #include "tests/hard_cases.h"
 #include "tests/rational_brute_force.h"
+#include "tests/small_meshes.h"
 
 using namespace arboretum;
 
 namespace {
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
-
-/// Random numbers in sequence, for generators that draw as many as they like.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : seed_(seed) {}
-  float uniform(float low = -1.0f, float high = 1.0f) { return low + (high - low) * random_float(seed_, next_++, 0); }
-  int integer(int count) { return static_cast<int>(random_bits(seed_, next_++, 1) % static_cast<unsigned>(count)); }
-  /// Signed, the logarithm uniform in base 2: from 2^low to 2^high.
-  float exponential(float low, float high) {
-    const float size = std::exp2(uniform(low, high));
-    return integer(2) == 0 ? size : -size;
-  }
-  Vec3f point() { return {uniform(), uniform(), uniform()}; }
-
- private:
-  std::uint64_t seed_, next_ = 0;
-};
-
-void add_triangle(TriangleMesh& mesh, Vec3f a, Vec3f b, Vec3f c) {
-  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), {a, b, c});
-  mesh.triangles.push_back({first, first + 1, first + 2});
-}
 
 struct Scene {
   TriangleMesh mesh;
@@ -51,17 +26,21 @@ struct Scene {
 Scene random_soup(Dice& dice) {
   Scene s;
   for (int i = 0; i < 12; ++i) add_triangle(s.mesh, dice.point(), dice.point(), dice.point());
-  for (int i = 0; i < 40; ++i) s.rays.push_back({dice.point() * 2.0f, 0.0f, dice.point(), dice.integer(3) ? kInf : 1.0f});
+  for (int i = 0; i < 40; ++i)
+    s.rays.push_back({dice.point() * 2.0f, 0.0f, dice.point(), dice.integer(3) ? kInf : 1.0f});
   return s;
 }
 
 Scene exponential_soup(Dice& dice) {
   Scene s;
-  const auto p = [&dice] { return Vec3f{dice.exponential(-20, 20), dice.exponential(-20, 20), dice.exponential(-20, 20)}; };
+  const auto p = [&dice] {
+    return Vec3f{dice.exponential(-20, 20), dice.exponential(-20, 20), dice.exponential(-20, 20)};
+  };
   for (int i = 0; i < 12; ++i) add_triangle(s.mesh, p(), p(), p());
   for (int i = 0; i < 20; ++i) s.rays.push_back({p(), 0.0f, p(), kInf});
   for (const Triangle& t : s.mesh.triangles) {
-    const Vec3f o = p(), target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f + s.mesh.vertices[t.c] * 0.25f;
+    const Vec3f o = p(), target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f +
+                                  s.mesh.vertices[t.c] * 0.25f;
     s.rays.push_back({o, 0.0f, target - o, kInf});
   }
   return s;
@@ -75,21 +54,24 @@ Scene whole_range(Dice& dice) {
   for (int i = 0; i < 6; ++i) add_triangle(s.mesh, p(scale), p(scale), p(scale));
   for (int i = 0; i < 6; ++i) add_triangle(s.mesh, p(scale), p(size), p(scale));
   for (const Triangle& t : s.mesh.triangles) {
-    const Vec3f o = p(scale), target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f + s.mesh.vertices[t.c] * 0.25f;
+    const Vec3f o = p(scale), target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f +
+                                       s.mesh.vertices[t.c] * 0.25f;
     s.rays.push_back({o, 0.0f, target * 0.5f - o * 0.5f, kInf});
     s.rays.push_back({o, 0.0f, p(size), kInf});
   }
   return s;
 }
 
-/// A fan on small whole numbers: rays at its vertices, its edges' middles and within its plane are exact hits of both sides.
+/// A fan on small whole numbers: rays at its vertices, its edges' middles and within its plane are exact hits
+/// of both sides.
 Scene aimed_fan(Dice& dice) {
   Scene s;
   const auto whole = [&dice](int n) { return static_cast<float>(dice.integer(2 * n + 1) - n); };
   const Vec3f apex{whole(4), whole(4), whole(4)};
   std::vector<Vec3f> ring;
   for (int i = 0; i < 6; ++i) ring.push_back({whole(8), whole(8), dice.integer(2) ? apex.z : whole(8)});
-  for (std::size_t i = 0; i < ring.size(); ++i) add_triangle(s.mesh, apex, ring[i], ring[(i + 1) % ring.size()]);
+  for (std::size_t i = 0; i < ring.size(); ++i)
+    add_triangle(s.mesh, apex, ring[i], ring[(i + 1) % ring.size()]);
   add_triangle(s.mesh, ring[0], apex, ring[1]);  // a copy, wound the other way
   add_triangle(s.mesh, apex, apex, ring[1]);     // without area
   for (const Vec3f& p : ring) {
@@ -98,23 +80,24 @@ Scene aimed_fan(Dice& dice) {
     s.rays.push_back({o, 0.0f, apex - o, 1.0f});
     s.rays.push_back({o, 1.0f, p - o, kInf});
     s.rays.push_back({o, 0.0f, (p + apex) * 0.5f - o, kInf});
-    s.rays.push_back({p, 0.0f, apex - p, kInf});                       // along an edge
-    s.rays.push_back({o, 0.0f, p - apex, kInf});                       // parallel to one
-    s.rays.push_back({o, 0.0f, {0.0f, -0.0f, whole(1)}, kInf});        // axis-parallel, or no direction
+    s.rays.push_back({p, 0.0f, apex - p, kInf});                 // along an edge
+    s.rays.push_back({o, 0.0f, p - apex, kInf});                 // parallel to one
+    s.rays.push_back({o, 0.0f, {0.0f, -0.0f, whole(1)}, kInf});  // axis-parallel, or no direction
     s.rays.push_back({{p.x, p.y, -20.0f}, 0.0f, {-0.0f, 0.0f, 3.0f}, kInf});
     s.rays.push_back({{o.x, apex.y, apex.z}, 0.0f, {1.0f, 1e-42f, -0.0f}, kInf});
   }
   return s;
 }
 
-/// Vertices with many bits: rays aimed at them and at edges are rounded, and pass within a rounding of the feature.
+/// Vertices with many bits: rays aimed at them and at edges are rounded, and pass within a rounding of the
+/// feature.
 Scene nearly_aimed(Dice& dice) {
   Scene s;
   std::vector<Vec3f> p;
   for (int i = 0; i < 8; ++i) p.push_back(dice.point() + Vec3f{dice.integer(2) * 1000.0f, 0, 0});
   for (int i = 0; i < 14; ++i) {
-    add_triangle(s.mesh, p[static_cast<std::size_t>(dice.integer(8))], p[static_cast<std::size_t>(dice.integer(8))],
-                 p[static_cast<std::size_t>(dice.integer(8))]);
+    add_triangle(s.mesh, p[static_cast<std::size_t>(dice.integer(8))],
+                 p[static_cast<std::size_t>(dice.integer(8))], p[static_cast<std::size_t>(dice.integer(8))]);
   }
   for (int i = 0; i < 40; ++i) {
     const Vec3f o = dice.point() * 3.0f, q = p[static_cast<std::size_t>(dice.integer(8))],
@@ -126,12 +109,14 @@ Scene nearly_aimed(Dice& dice) {
   return s;
 }
 
-/// Axis-aligned and flat: boxes without thickness, planes through the origin, intervals that end on the surface.
+/// Axis-aligned and flat: boxes without thickness, planes through the origin, intervals that end on the
+/// surface.
 Scene flat_grid(Dice& dice) {
   Scene s;
   for (int x = 0; x < 3; ++x) {
     for (int y = 0; y < 3; ++y) {
-      const Vec3f a{float(x), float(y), 1}, b{float(x + 1), float(y), 1}, c{float(x + 1), float(y + 1), 1}, d{float(x), float(y + 1), 1};
+      const Vec3f a{float(x), float(y), 1}, b{float(x + 1), float(y), 1}, c{float(x + 1), float(y + 1), 1},
+          d{float(x), float(y + 1), 1};
       add_triangle(s.mesh, a, b, c);
       add_triangle(s.mesh, a, c, d);
     }
@@ -140,14 +125,16 @@ Scene flat_grid(Dice& dice) {
     const Vec3f o{dice.integer(13) * 0.25f, dice.integer(13) * 0.25f, static_cast<float>(dice.integer(3))};
     const float slope = dice.integer(2) ? 0.0f : dice.integer(9) * 0.25f - 1.0f;
     const float end = static_cast<float>(dice.integer(3));
-    s.rays.push_back({o, dice.integer(2) ? 0.0f : 1.0f, {slope, dice.integer(2) ? 0.0f : slope, static_cast<float>(dice.integer(3) - 1)},
+    s.rays.push_back({o,
+                      dice.integer(2) ? 0.0f : 1.0f,
+                      {slope, dice.integer(2) ? 0.0f : slope, static_cast<float>(dice.integer(3) - 1)},
                       dice.integer(2) ? kInf : end});
   }
   return s;
 }
 
-/// The edge from p to -p, seen from p * 2^-85 or a float32 step beside it: the sign hangs on bits that lie beyond the 106 of
-/// a double-double.
+/// The edge from p to -p, seen from p * 2^-85 or a float32 step beside it: the sign hangs on bits that lie
+/// beyond the 106 of a double-double.
 Scene three_scales(Dice& dice) {
   Scene s;
   const Vec3f p = dice.point();
@@ -183,40 +170,6 @@ void check_scene(const Scene& scene, const std::string& label, DecisionCounts& c
     const rational::Number error = abs(rational::Number(closest[i].t) - exact.t);
     CHECK(error <= abs(exact.t) * rational::Number(0x1p-50));
   }
-}
-
-/// A closed sphere of latitude and longitude, its vertices shared or one a corner.
-TriangleMesh sphere(int rings, int segments, bool shared) {
-  TriangleMesh mesh;
-  const auto at = [&](int r, int s) {
-    const double theta = 3.141592653589793 * r / rings, phi = 6.283185307179586 * (s % segments) / segments;
-    if (r == 0 || r == rings) return Vec3f{0, 0, r == 0 ? 1.0f : -1.0f};
-    return Vec3f{float(std::sin(theta) * std::cos(phi)), float(std::sin(theta) * std::sin(phi)), float(std::cos(theta))};
-  };
-  for (int r = 0; r < rings; ++r) {
-    for (int s = 0; s < segments; ++s) {
-      if (r + 1 < rings) add_triangle(mesh, at(r, s), at(r + 1, s), at(r + 1, s + 1));
-      if (r > 0) add_triangle(mesh, at(r, s), at(r + 1, s + 1), at(r, s + 1));
-    }
-  }
-  if (!shared) return mesh;
-  TriangleMesh welded;
-  for (Triangle t : mesh.triangles) {
-    for (std::uint32_t* v : {&t.a, &t.b, &t.c}) {
-      const Vec3f p = mesh.vertices[*v];
-      const auto found = std::find(welded.vertices.begin(), welded.vertices.end(), p);
-      *v = static_cast<std::uint32_t>(found - welded.vertices.begin());
-      if (found == welded.vertices.end()) welded.vertices.push_back(p);
-    }
-    welded.triangles.push_back(t);
-  }
-  return welded;
-}
-
-std::vector<Hit> hits_of(const std::vector<ExactHit>& truth) {
-  std::vector<Hit> hits;
-  for (const ExactHit& h : truth) hits.push_back(h.hit);
-  return hits;
 }
 
 }  // namespace
@@ -256,9 +209,12 @@ TEST_CASE("the oracle equals rational brute force on nasty scenes, and each leve
     bool needs_double_double, needs_integers;
   };
   const Family families[] = {
-      {"random soup", random_soup, 25, true, false},     {"exponential soup", exponential_soup, 25, true, false},
-      {"whole float range", whole_range, 25, true, false}, {"aimed fan", aimed_fan, 30, true, true},
-      {"nearly aimed", nearly_aimed, 25, true, true},    {"flat grid", flat_grid, 20, true, true},
+      {"random soup", random_soup, 25, true, false},
+      {"exponential soup", exponential_soup, 25, true, false},
+      {"whole float range", whole_range, 25, true, false},
+      {"aimed fan", aimed_fan, 30, true, true},
+      {"nearly aimed", nearly_aimed, 25, true, true},
+      {"flat grid", flat_grid, 20, true, true},
       {"three scales", three_scales, 30, true, true},
   };
   std::uint64_t seed = 1;
@@ -278,7 +234,8 @@ TEST_CASE("the oracle equals rational brute force on nasty scenes, and each leve
 
 TEST_CASE("sign of an edge function that doubles get wrong") {
   // The ray passes 2^-60 beside the edge: the double determinant is 0 or of either sign, the truth is not.
-  const Corners left{Vec3f{1, 1, 1}, Vec3f{-1, -1, 1}, Vec3f{-1, 1, 1}}, right{Vec3f{1, 1, 1}, Vec3f{1, -1, 1}, Vec3f{-1, -1, 1}};
+  const Corners left{Vec3f{1, 1, 1}, Vec3f{-1, -1, 1}, Vec3f{-1, 1, 1}},
+      right{Vec3f{1, 1, 1}, Vec3f{1, -1, 1}, Vec3f{-1, -1, 1}};
   const Ray beside{{0x1p-60f, 0, 0}, 0, {0, 0, 1}, kInf}, upon{{0, 0, 0}, 0, {0, 0, 1}, kInf};
   Enclosure t;
   ExactPredicate near(beside), on(upon);
@@ -300,13 +257,13 @@ TEST_CASE("exact integers round to float32 as the standard asks") {
       {1, 3, 0, 1.0f / 3.0f},
       {0, 5, 17, 0.0f},
       {-1, 3, 0, -1.0f / 3.0f},
-      {(1 << 24) + 1, 1, 0, 16777216.0f},     // a tie goes to the even neighbour below
-      {(1 << 24) + 3, 1, 0, 16777220.0f},     // and to the one above
-      {1, 1, -150, 0.0f},                     // half the least denormal: a tie, zero is even
-      {3, 1, -151, 0x1p-149f},                // above the tie
+      {(1 << 24) + 1, 1, 0, 16777216.0f},  // a tie goes to the even neighbour below
+      {(1 << 24) + 3, 1, 0, 16777220.0f},  // and to the one above
+      {1, 1, -150, 0.0f},                  // half the least denormal: a tie, zero is even
+      {3, 1, -151, 0x1p-149f},             // above the tie
       {1, 1, 128, kInf},
       {-1, 1, 300, -kInf},
-      {0x1ffffff, 1, 103, kInf},              // halfway between the largest number and 2^128
+      {0x1ffffff, 1, 103, kInf},  // halfway between the largest number and 2^128
       {0x1fffffe, 1, 103, std::numeric_limits<float>::max()},
   };
   for (const Case& c : cases) {
@@ -323,10 +280,12 @@ TEST_CASE("the search tree finds what a plain loop finds, on a mesh with depth")
   const TriangleMesh mesh = sphere(40, 80, true);
   const Oracle oracle(mesh);
   std::vector<Ray> rays;
-  for (std::uint32_t i = 0; i < mesh.vertices.size(); i += 7) rays.push_back({{0.1f, 0.2f, -0.05f}, 0, mesh.vertices[i] - Vec3f{0.1f, 0.2f, -0.05f}, kInf});
+  for (std::uint32_t i = 0; i < mesh.vertices.size(); i += 7)
+    rays.push_back({{0.1f, 0.2f, -0.05f}, 0, mesh.vertices[i] - Vec3f{0.1f, 0.2f, -0.05f}, kInf});
   for (std::uint64_t i = 0; i < 300; ++i) {
     Dice dice(i);
-    rays.push_back({dice.point() * 2.0f, 0, dice.integer(4) ? dice.point() : Vec3f{0, dice.uniform(), -0.0f}, dice.integer(2) ? kInf : 1.5f});
+    rays.push_back({dice.point() * 2.0f, 0, dice.integer(4) ? dice.point() : Vec3f{0, dice.uniform(), -0.0f},
+                    dice.integer(2) ? kInf : 1.5f});
   }
   const std::vector<ExactHit> truth = oracle.closest_hit(rays);
   const std::vector<std::uint8_t> any = oracle.any_hit(rays);
@@ -337,7 +296,8 @@ TEST_CASE("the search tree finds what a plain loop finds, on a mesh with depth")
     for (std::uint32_t k = 0; k < mesh.size(); ++k) {
       Enclosure t;
       if (!predicate.meets(mesh.corners(k), t)) continue;
-      if (nearest == kNoPrimitive || predicate.compare_t(mesh.corners(k), mesh.corners(nearest)) < 0) nearest = k;
+      if (nearest == kNoPrimitive || predicate.compare_t(mesh.corners(k), mesh.corners(nearest)) < 0)
+        nearest = k;
     }
     CHECK(truth[i].hit.primitive == nearest);
     CHECK((any[i] != 0) == (nearest != kNoPrimitive));
@@ -354,7 +314,8 @@ TEST_CASE("meshes and rays that mean nothing") {
   TriangleMesh mesh;
   add_triangle(mesh, {-1, -1, nan}, {1, -1, 0}, {0, 1, 0});
   add_triangle(mesh, {-1, -1, -0.5f}, {kInf, -1, 0}, {0, 1, 0});
-  for (int i = 0; i < 1000; ++i) add_triangle(mesh, {-1, -1, 0}, {1, -1, 0}, {0, 1, 0});  // one place: no split helps
+  for (int i = 0; i < 1000; ++i)
+    add_triangle(mesh, {-1, -1, 0}, {1, -1, 0}, {0, 1, 0});  // one place: no split helps
   const Oracle oracle(mesh);
   const ExactHit answer = oracle.closest_hit({&ray, 1}).front();
   CHECK(answer.hit.primitive == 2);
@@ -379,145 +340,4 @@ TEST_CASE("a deep tree does not overflow the search") {
     const Ray from_left{{x * 0.75f, 0, 0}, 0, {1, 0, 0}, kInf};
     CHECK(oracle.closest_hit({&from_left, 1}).front().hit.primitive == static_cast<std::uint32_t>(i + 120));
   }
-}
-
-TEST_CASE("right answers pass the check") {
-  for (bool shared : {true, false}) {
-    const TriangleMesh mesh = sphere(8, 16, shared);
-    const Oracle oracle(mesh);
-    std::vector<Ray> rays;
-    Dice dice(5);
-    for (int i = 0; i < 500; ++i) rays.push_back({dice.point() * 2.0f, 0, dice.point(), kInf});
-    const std::vector<ExactHit> truth = oracle.closest_hit(rays);
-    const AnswerCheck check = oracle.check_closest_hit(rays, truth, hits_of(truth));
-    CHECK(check.rays == 500);
-    CHECK(check.hits > 50);
-    CHECK(check.hits < 500);
-    CHECK(check.wrong_answers() == 0);
-    CHECK(check.wrong_primitive == 0);
-    CHECK(check.cracks == 0);
-    CHECK(check.t_error_ulp_max <= 0.5);
-  }
-}
-
-TEST_CASE("each wrong answer is counted for what it is") {
-  TriangleMesh mesh;
-  add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1});
-  add_triangle(mesh, {-1, -1, 1}, {1, 1, 1}, {-1, 1, 1});
-  add_triangle(mesh, {-1, -1, 2}, {1, -1, 2}, {0, 1, 2});
-  const Oracle oracle(mesh);
-  const Ray inside{{0.5f, -0.25f, 0}, 0, {0, 0, 1}, kInf}, on_edge{{0, 0, 0}, 0, {0, 0, 1}, kInf},
-      beside{{5, 0, 0}, 0, {0, 0, 1}, kInf};
-  const float next = std::nextafter(1.0f, 2.0f), nan = std::numeric_limits<float>::quiet_NaN();
-  struct Case {
-    const char* name;
-    Ray ray;
-    Hit answer;
-    std::uint64_t missed, false_hits, surface, primitive, cracks;
-    double ulp;  ///< -1: no t to speak of
-  };
-  const Case cases[] = {
-      {"right", inside, {1, 0, 0, 0}, 0, 0, 0, 0, 0, 0},
-      {"miss", inside, {}, 1, 0, 0, 0, 1, -1},
-      {"false hit", beside, {1, 0, 0, 0}, 0, 1, 0, 0, 0, -1},
-      {"right miss", beside, {}, 0, 0, 0, 0, 0, -1},
-      {"behind", inside, {2, 0, 0, 2}, 0, 0, 1, 1, 1, -1},
-      {"in front", inside, {0.5f, 0, 0, 2}, 0, 0, 1, 1, 0, -1},
-      {"neighbour at the same t", inside, {1, 0, 0, 1}, 0, 0, 0, 1, 0, 0},
-      {"t one ulp off", inside, {next, 0, 0, 0}, 0, 0, 0, 0, 0, 1},
-      {"t within the tolerance", inside, {1 + 0x1p-13f, 0, 0, 0}, 0, 0, 0, 0, 0, 1024},
-      {"right triangle, t beyond the tolerance", inside, {1 + 0x1p-11f, 0, 0, 0}, 0, 0, 1, 0, 0, 4096},
-      {"right triangle, t not a number", inside, {nan, 0, 0, 0}, 0, 0, 1, 0, 0, kInf},
-      {"a triangle that is not there", inside, {1, 0, 0, 77}, 0, 0, 0, 1, 0, 0},
-      {"edge: the other of two ties", on_edge, {1, 0, 0, 1}, 0, 0, 0, 0, 0, 0},
-      {"edge: crack", on_edge, {2, 0, 0, 2}, 0, 0, 1, 1, 1, -1},
-  };
-  for (const Case& c : cases) {
-    INFO(c.name);
-    const AnswerCheck check = oracle.check_closest_hit({&c.ray, 1}, oracle.closest_hit({&c.ray, 1}), {&c.answer, 1});
-    CHECK(check.rays == 1);
-    CHECK(check.hits == (c.answer.is_hit() ? 1u : 0u));
-    CHECK(check.missed_hits == c.missed);
-    CHECK(check.false_hits == c.false_hits);
-    CHECK(check.wrong_surface == c.surface);
-    CHECK(check.wrong_primitive == c.primitive);
-    CHECK(check.cracks == c.cracks);
-    CHECK(check.wrong_answers() == c.missed + c.false_hits + c.surface);
-    CHECK(check.t_error_ulp_max == std::max(c.ulp, 0.0));
-  }
-}
-
-TEST_CASE("median, 99th percentile and maximum of the error of t") {
-  TriangleMesh mesh;
-  add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {0, 1, 1});
-  const Oracle oracle(mesh);
-  std::vector<Ray> rays(200, Ray{{0, 0, 0}, 0, {0, 0, 1}, kInf});
-  const std::vector<ExactHit> truth = oracle.closest_hit(rays);
-  std::vector<Hit> answers = hits_of(truth);
-  for (std::size_t i = 0; i < answers.size(); ++i) answers[i].t = 1.0f + static_cast<float>(i) * 0x1p-23f;
-  const AnswerCheck check = oracle.check_closest_hit(rays, truth, answers);
-  CHECK(check.t_error_ulp_median == 99);
-  CHECK(check.t_error_ulp_p99 == 197);
-  CHECK(check.t_error_ulp_max == 199);
-}
-
-TEST_CASE("a miss is a crack where the surface is closed and not at its silhouette or border") {
-  struct Case {
-    const char* name;
-    TriangleMesh mesh;
-    Ray ray;
-    bool crack;
-  };
-  std::vector<Case> cases;
-  TriangleMesh tent;  // two sides that meet in a ridge at x = 0
-  add_triangle(tent, {0, -1, 0}, {0, 1, 0}, {1, 0, -1});
-  add_triangle(tent, {0, 1, 0}, {0, -1, 0}, {-1, 0, -1});
-  cases.push_back({"ridge from above", tent, {{0, 0.25f, 5}, 0, {0, 0, -1}, kInf}, true});
-  cases.push_back({"ridge from the side is a silhouette", tent, {{5, 0.25f, 0}, 0, {-1, 0, 0}, kInf}, false});
-  cases.push_back({"inside a triangle", tent, {{0.25f, 0, 5}, 0, {0, 0, -1}, kInf}, true});
-  cases.push_back({"border", tent, {{0.5f, 0.5f, 5}, 0, {0, 0, -1}, kInf}, false});
-  cases.push_back({"open fan: end of the ridge", tent, {{0, 1, 5}, 0, {0, 0, -1}, kInf}, false});
-  TriangleMesh turned = tent;
-  std::swap(turned.triangles[1].a, turned.triangles[1].b);
-  cases.push_back({"winding does not matter", turned, {{0, 0.25f, 5}, 0, {0, 0, -1}, kInf}, true});
-  TriangleMesh fin = tent;
-  add_triangle(fin, {0, -1, 0}, {0, 1, 0}, {0, 0, 1});
-  cases.push_back({"three triangles at one edge", fin, {{0, 0.25f, 5}, 0, {0, 0, -1}, kInf}, false});
-  const TriangleMesh ball = sphere(8, 16, false), welded = sphere(8, 16, true);
-  const Vec3f vertex = ball.vertices[60];
-  Vec3f widest = ball.vertices.front();
-  for (const Vec3f& p : ball.vertices) widest = p.x > widest.x ? p : widest;
-  for (const TriangleMesh* mesh : {&ball, &welded}) {
-    cases.push_back({"vertex of a ball from within", *mesh, {{0, 0, 0}, 0, vertex, kInf}, true});
-    cases.push_back({"vertex of a ball from outside", *mesh, {vertex * 4.0f, 0, -vertex, kInf}, true});
-    cases.push_back({"pole", *mesh, {{0, 0, 3}, 0, {0, 0, -1}, kInf}, true});
-    cases.push_back({"vertex at the silhouette", *mesh, {widest - Vec3f{0, 3, 0}, 0, {0, 3, 0}, kInf}, false});
-  }
-  for (const Case& c : cases) {
-    INFO(c.name);
-    const Oracle oracle(c.mesh);
-    const std::vector<ExactHit> truth = oracle.closest_hit({&c.ray, 1});
-    REQUIRE(truth.front().hit.is_hit());
-    const Hit miss;
-    CHECK(oracle.check_closest_hit({&c.ray, 1}, truth, {&miss, 1}).cracks == (c.crack ? 1u : 0u));
-  }
-}
-
-TEST_CASE("any hit counts missed and false hits alone, and sizes must agree") {
-  TriangleMesh mesh;
-  add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {0, 1, 1});
-  const Oracle oracle(mesh);
-  const Ray hit{{0, 0, 0}, 0, {0, 0, 1}, kInf}, miss{{5, 0, 0}, 0, {0, 0, 1}, kInf}, short_of{{0, 0, 0}, 0, {0, 0, 1}, 0.5f};
-  const std::vector<Ray> rays{hit, hit, miss, miss, short_of, short_of};
-  const std::vector<std::uint8_t> truth = oracle.any_hit(rays);
-  CHECK(truth == std::vector<std::uint8_t>{1, 1, 0, 0, 0, 0});
-  const AnswerCheck check = oracle.check_any_hit(rays, truth, std::vector<std::uint8_t>{1, 0, 0, 1, 0, 1});
-  CHECK(check.rays == 6);
-  CHECK(check.hits == 3);
-  CHECK(check.missed_hits == 1);
-  CHECK(check.false_hits == 2);
-  CHECK(check.wrong_answers() == 3);
-  CHECK(check.cracks == 0);
-  CHECK_THROWS_AS(oracle.check_any_hit(rays, truth, std::vector<std::uint8_t>{1}), std::invalid_argument);
-  CHECK_THROWS_AS(oracle.check_closest_hit(rays, oracle.closest_hit(rays), {}), std::invalid_argument);
 }

@@ -8,6 +8,7 @@
 #include "core/random.h"
 #include "structures/end_point_overlap.h"
 #include "tests/catch.h"
+#include "tests/small_meshes.h"
 
 using namespace arboretum;
 
@@ -58,15 +59,12 @@ class HandMade final : public Accel {
   StructureInfo info_;
 };
 
-void add_triangle(TriangleMesh& mesh, Vec3f a, Vec3f b, Vec3f c) {
-  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), {a, b, c});
-  mesh.triangles.push_back({first, first + 1, first + 2});
+Branch leaf(std::vector<std::uint32_t> primitives) {
+  return {{}, std::move(primitives)};
 }
 
-Branch leaf(std::vector<std::uint32_t> primitives) { return {{}, std::move(primitives)}; }
-
-/// Two triangles of area 2 in z = 0; each has an area of 0.5 in the other's box (2 by 2). All of it is 3 by 2.
+/// Two triangles of area 2 in z = 0; each has an area of 0.5 in the other's box (2 by 2). All of it is 3
+/// by 2.
 TriangleMesh two_that_overlap() {
   TriangleMesh mesh;
   add_triangle(mesh, {0, 0, 0}, {2, 0, 0}, {0, 2, 0});
@@ -93,15 +91,17 @@ Branch halved(const TriangleMesh& mesh, std::vector<std::uint32_t> ids, std::siz
     return mesh.corners(a)[0][axis] < mesh.corners(b)[0][axis];
   });
   const auto middle = ids.begin() + static_cast<std::ptrdiff_t>(ids.size() / 2);
-  return {{halved(mesh, {ids.begin(), middle}, (axis + 1) % 3), halved(mesh, {middle, ids.end()}, (axis + 1) % 3)}, {}};
+  return {{halved(mesh, {ids.begin(), middle}, (axis + 1) % 3),
+           halved(mesh, {middle, ids.end()}, (axis + 1) % 3)},
+          {}};
 }
 
 /// The records of a hand-made tree, as end_point_overlap takes them.
 std::uint32_t write_records(const TriangleMesh& mesh, const Branch& branch, std::vector<TreeRecord>& records,
                             std::vector<std::uint32_t>& references) {
   const std::size_t index = records.size();
-  records.push_back({bounds_of(mesh, branch), branch.children.empty() ? 1.0 * branch.primitives.size() : 1.0, 0,
-                     static_cast<std::uint32_t>(references.size()), 0, branch.children.empty()});
+  records.push_back({bounds_of(mesh, branch), branch.children.empty() ? 1.0 * branch.primitives.size() : 1.0,
+                     0, static_cast<std::uint32_t>(references.size()), 0, branch.children.empty()});
   references.insert(references.end(), branch.primitives.begin(), branch.primitives.end());
   for (const Branch& child : branch.children) write_records(mesh, child, records, references);
   records[index].end = static_cast<std::uint32_t>(records.size());
@@ -141,7 +141,8 @@ TEST_CASE("a node over two leaves, by hand") {
   BuilderParameters costs;
   costs.traversal_cost = 1.5f;
   costs.intersection_cost = 2.0f;
-  const StructureStatistics s = compute_statistics(HandMade(mesh, {{leaf({0}), leaf({1})}, {}}), mesh, costs, true);
+  const StructureStatistics s =
+      compute_statistics(HandMade(mesh, {{leaf({0}), leaf({1})}, {}}), mesh, costs, true);
   CHECK(s.available);
   CHECK(s.nodes == 1);
   CHECK(s.leaves == 2);
@@ -159,7 +160,8 @@ TEST_CASE("a node over two leaves, by hand") {
   CHECK(s.sah_child_cost == Approx(2 * 1.5 + 2 * 2.0 * 8.0 / 12.0));
   CHECK(s.epo == Approx((2.0 * 0.5 + 2.0 * 0.5) / 4.0));
   CHECK(s.epo_sampled == 1.0);
-  const StructureStatistics without = compute_statistics(HandMade(mesh, {{leaf({0}), leaf({1})}, {}}), mesh, costs, false);
+  const StructureStatistics without =
+      compute_statistics(HandMade(mesh, {{leaf({0}), leaf({1})}, {}}), mesh, costs, false);
   CHECK(without.epo == 0.0);
   CHECK(without.sah_cost == s.sah_cost);
 }
@@ -178,7 +180,8 @@ TEST_CASE("a root that is a leaf, an empty structure, one that shows nothing") {
   CHECK(empty.available);
   CHECK(empty.sah_cost == 0.0);
   CHECK(empty.epo == 0.0);
-  const StructureStatistics hidden = compute_statistics(HandMade(mesh, leaf({0, 1}), false), mesh, costs, true);
+  const StructureStatistics hidden =
+      compute_statistics(HandMade(mesh, leaf({0, 1}), false), mesh, costs, true);
   CHECK_FALSE(hidden.available);
   CHECK(hidden.bytes == 1234);
 }
@@ -187,7 +190,8 @@ TEST_CASE("a shared triangle belongs to both leaves and counts once against othe
   TriangleMesh mesh = two_that_overlap();
   const BuilderParameters costs;
   // Triangle 1 in both leaves: only the second leaf has something foreign, triangle 0.
-  const StructureStatistics s = compute_statistics(HandMade(mesh, {{leaf({0, 1}), leaf({1})}, {}}), mesh, costs, true);
+  const StructureStatistics s =
+      compute_statistics(HandMade(mesh, {{leaf({0, 1}), leaf({1})}, {}}), mesh, costs, true);
   CHECK(s.duplication == 1.5);
   CHECK(s.epo == Approx(0.5 / 4.0));
   // A third, far from the others, twice within the root's box: it is foreign to neither box.
@@ -206,8 +210,8 @@ TEST_CASE("an inner node pays for what is foreign to it") {
   costs.traversal_cost = 3.0f;
   const StructureStatistics s =
       compute_statistics(HandMade(mesh, {{{{leaf({0}), leaf({1})}, {}}, leaf({2})}, {}}), mesh, costs, true);
-  // The inner node's box holds triangle 2; leaf 0's holds it and half of triangle 1; leaf 1's half of triangle 0; leaf 2's
-  // the square [0,1] x [0,1], all of which triangle 0 covers.
+  // The inner node's box holds triangle 2; leaf 0's holds it and half of triangle 1; leaf 1's half of
+  // triangle 0; leaf 2's the square [0,1] x [0,1], all of which triangle 0 covers.
   CHECK(s.epo == Approx((3.0 * 0.5 + (0.5 + 0.5) + 0.5 + 1.0) / 4.5));
 }
 
@@ -215,7 +219,8 @@ TEST_CASE("a scene without area has costs, not NaN") {
   TriangleMesh line;
   add_triangle(line, {0, 0, 0}, {1, 0, 0}, {2, 0, 0});
   add_triangle(line, {5, 0, 0}, {6, 0, 0}, {7, 0, 0});
-  const StructureStatistics s = compute_statistics(HandMade(line, {{leaf({0}), leaf({1})}, {}}), line, {}, true);
+  const StructureStatistics s =
+      compute_statistics(HandMade(line, {{leaf({0}), leaf({1})}, {}}), line, {}, true);
   CHECK(s.sah_cost == 3.0);
   CHECK(s.epo == 0.0);
 }
