@@ -1,0 +1,122 @@
+#include "experiments/append_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+
+namespace arboretum {
+namespace {
+
+[[noreturn]] void cannot_write(const std::filesystem::path& path, int error) {
+  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
+  throw UserError(fmt::format("{}: cannot be written: {}; {}", path.string(), std::strerror(error),
+                              full ? "free some space, then go on with --resume" : "choose another folder with --out"));
+}
+
+/// Bytes up to and with the last newline.
+off_t whole_lines(int descriptor, const std::filesystem::path& path) {
+  struct stat status{};
+  if (::fstat(descriptor, &status) != 0) cannot_write(path, errno);
+  off_t end = status.st_size;
+  char c = 0;
+  while (end > 0 && ::pread(descriptor, &c, 1, end - 1) == 1 && c != '\n') --end;
+  return end;
+}
+
+int write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+}  // namespace
+
+AppendFile::AppendFile(std::filesystem::path path, bool keep) : path_(std::move(path)) {
+  descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | (keep ? 0 : O_TRUNC), 0666);
+  if (descriptor_ < 0) cannot_write(path_, errno);
+  struct stat status{};
+  if (keep && ::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode) &&
+      ::ftruncate(descriptor_, whole_lines(descriptor_, path_)) != 0) {
+    cannot_write(path_, errno);
+  }
+}
+
+AppendFile::AppendFile(AppendFile&& other) noexcept
+    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+AppendFile& AppendFile::operator=(AppendFile&& other) noexcept {
+  std::swap(path_, other.path_), std::swap(descriptor_, other.descriptor_);
+  return *this;
+}
+
+AppendFile::~AppendFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void AppendFile::append(std::string_view line) {
+  const off_t before = ::lseek(descriptor_, 0, SEEK_END);
+  if (const int error = write_all(descriptor_, std::string(line) + "\n"); error != 0) {
+    if (before >= 0 && ::ftruncate(descriptor_, before) != 0) errno = error;  // a torn last line is dropped when it is read
+    cannot_write(path_, error);
+  }
+}
+
+std::vector<std::string> read_lines(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::vector<std::string> lines;
+  for (std::size_t begin = 0;;) {
+    const std::size_t end = text.find('\n', begin);
+    if (end == std::string::npos) return lines;
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+}
+
+void write_whole(const std::filesystem::path& path, std::string_view text) {
+  std::filesystem::path beside = path;
+  beside += ".part";
+  const int descriptor = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor < 0) cannot_write(path, errno);
+  int error = write_all(descriptor, text);
+  if (::close(descriptor) != 0 && error == 0) error = errno;
+  if (error == 0 && ::rename(beside.c_str(), path.c_str()) != 0) error = errno;
+  if (error != 0) {
+    ::unlink(beside.c_str());
+    cannot_write(path, error);
+  }
+}
+
+void make_output_folder(const std::filesystem::path& folder) {
+  std::error_code error, ignored;
+  const bool taken = std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored);
+  if (!taken) std::filesystem::create_directories(folder, error);
+  if (taken || !std::filesystem::is_directory(folder, ignored)) {
+    const std::string why = taken ? "there is a file of that name" : error ? error.message() : "it vanished";
+    throw UserError(fmt::format("{}: the output folder cannot be made: {}; choose another with --out", folder.string(), why));
+  }
+  if (::access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
+    throw UserError(fmt::format("{}: the output folder cannot be used: {}; choose another with --out", folder.string(), std::strerror(errno)));
+  }
+  const std::filesystem::path probe = folder / ".arboretum-probe";
+  const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  if (descriptor < 0) cannot_write(folder, errno);
+  ::close(descriptor);
+  ::unlink(probe.c_str());
+}
+
+}  // namespace arboretum

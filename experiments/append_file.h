@@ -1,0 +1,39 @@
+// Files that results go into: every write is checked, and a failed one leaves what was there before whole.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace arboretum {
+
+/// A file of lines that only grows. Each line is handed to the operating system at once, so that a killed process loses
+/// no line that it had appended.
+class AppendFile {
+ public:
+  AppendFile() = default;
+  /// Opens or creates. With `keep`, what the file holds stays, but for a last line cut off in the middle.
+  /// Throws UserError.
+  AppendFile(std::filesystem::path path, bool keep);
+  AppendFile(AppendFile&& other) noexcept;
+  AppendFile& operator=(AppendFile&& other) noexcept;
+  ~AppendFile();
+
+  /// Appends `line` and a newline. When that fails (a full disk), takes the part that was written back and throws
+  /// UserError.
+  void append(std::string_view line);
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+};
+
+/// Whole lines of a file; a last line without its newline is left out. Empty when there is no such file.
+[[nodiscard]] std::vector<std::string> read_lines(const std::filesystem::path& path);
+/// Writes beside `path` and renames over it, so that a failure leaves the old file. Throws UserError.
+void write_whole(const std::filesystem::path& path, std::string_view text);
+/// Creates the folder, if need be, and tries whether files can be made in it. Throws UserError.
+void make_output_folder(const std::filesystem::path& folder);
+
+}  // namespace arboretum

@@ -1,0 +1,180 @@
+#include "experiments/axes.h"
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include "rendering/workload.h"
+
+namespace arboretum {
+namespace {
+
+struct Summary {
+  std::string_view key, line;
+};
+
+constexpr Summary kBuilders[] = {
+    {"in_order", "nothing is sorted: triangles in the mesh's order"},
+    {"binned_sah", "top-down, surface area heuristic over bins of centroids, then collapsed to the structure's width"},
+    {"sweep_sah", "top-down, surface area heuristic at every candidate plane"},
+    {"spatial_sah", "binned SAH with spatial splits (references may be duplicated)"},
+    {"morton", "sorted along a Morton curve (linear BVH)"},
+    {"ploc", "bottom-up, parallel locally-ordered clustering"},
+    {"low", "Embree's low quality (Morton)"},
+    {"medium", "Embree's medium quality (binned SAH)"},
+    {"high", "Embree's high quality (spatial splits)"},
+    {"auto", "the first that the structure takes"},
+};
+constexpr Summary kIntersectors[] = {
+    {"moller_trumbore", "Moeller and Trumbore 1997, on precomputed edges; may miss along edges"},
+    {"pluecker", "edge functions relative to the ray's origin, edge times sum of vertices"},
+    {"watertight", "Woop, Benthin, Wald 2013: no cracks on closed meshes with padded boxes"},
+    {"baldwin_weber", "Baldwin and Weber 2016: precomputed transformation to the unit triangle"},
+    {"havel_herout", "Havel and Herout 2010: precomputed planes"},
+    {"exact", "filtered, then exact arithmetic: hit or miss, nearest and t proved right"},
+};
+constexpr Summary kBoxes[] = {
+    {"fast", "slab test as rounded: may miss a box that the exact ray touches"},
+    {"padded", "slab test widened by its error bound: never misses a box that the exact ray touches"},
+    {"auto", "padded for intersectors that promise to lose no hit, fast for moller_trumbore and its like"},
+};
+constexpr Summary kTraversals[] = {
+    {"single", "one ray at a time, boxes and triangles in the lanes"},
+    {"packet", "rays in the lanes, as many as the instruction set has"},
+    {"hybrid", "packets that fall apart into single rays, as wide as the instruction set"},
+    {"stream", "a whole batch goes down together"},
+};
+constexpr Summary kIsas[] = {
+    {"scalar", "no vector instructions: the reference that every machine runs"},
+    {"sse", "SSE4.2, four lanes"},
+    {"avx2", "AVX2, FMA and BMI, eight lanes (avx is a synonym)"},
+    {"avx512", "AVX-512 F, VL, DQ and BW, sixteen lanes"},
+};
+constexpr Summary kWorkloads[] = {
+    {"primary", "closest hit, one ray a pixel from the camera"},
+    {"shadow", "any hit, from the primary hits towards a point light"},
+    {"ambient_occlusion", "any hit, from the primary hits, cosine-distributed, length 0.2 of the diagonal"},
+    {"reflection", "closest hit, from the primary hits along the mirror direction"},
+    {"diffuse", "closest hit, from the primary hits, cosine-distributed"},
+    {"random", "closest hit, between two uniform points of the bounding sphere"},
+};
+
+std::string_view look_up(std::span<const Summary> table, std::string_view key) {
+  for (const Summary& s : table)
+    if (s.key == key) return s.line;
+  return {};
+}
+
+/// Splits `packet16` into `packet` and `16`.
+std::pair<std::string_view, std::string_view> split_number(std::string_view name) {
+  std::size_t end = name.size();
+  while (end > 0 && std::isdigit(static_cast<unsigned char>(name[end - 1]))) --end;
+  return {name.substr(0, end), name.substr(end)};
+}
+
+std::string leaf_summary(std::string_view leaf) {
+  if (leaf == kAuto) return "the block that suits structure, intersector and instruction set";
+  if (!leaf.starts_with("triangle")) return {};
+  std::string_view rest = leaf.substr(8);
+  std::string_view what = "a vertex and precomputed edges";
+  if (rest.ends_with('v')) what = "three vertices", rest.remove_suffix(1);
+  else if (rest.ends_with('i')) what = "indices of vertices", rest.remove_suffix(1);
+  if (rest.empty() || split_number(rest).second != rest) return {};
+  return "blocks of " + std::string(rest) + (rest == "1" ? " triangle: " : " triangles: ") + std::string(what);
+}
+
+std::string traversal_summary(std::string_view traversal) {
+  if (const auto line = look_up(kTraversals, traversal); !line.empty()) return std::string(line);
+  const auto [kind, number] = split_number(traversal);
+  if (kind == "packet") return "packets of " + std::string(number) + " rays";
+  if (kind == "hybrid") return "packets of " + std::string(number) + " rays that fall apart into single rays";
+  if (kind == "queued") return std::string(number) + " rays in flight";
+  return {};
+}
+
+void append_new(std::vector<std::string>& list, std::string_view value) {
+  if (std::ranges::find(list, value) == list.end()) list.emplace_back(value);
+}
+
+}  // namespace
+
+std::optional<Axis> parse_axis(std::string_view name) noexcept {
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (kAxisNames[i] == name) return static_cast<Axis>(i);
+  return std::nullopt;
+}
+
+std::vector<std::string> known_values(Axis axis, const Registry& registry) {
+  std::vector<std::string> list;
+  switch (axis) {
+    case Axis::structure:
+      for (const StructureEntry& e : registry.structures) append_new(list, e.info.name);
+      append_new(list, "embree");
+      break;
+    case Axis::builder:
+      for (const StructureEntry& e : registry.structures)
+        for (std::string_view builder : e.info.builders) append_new(list, builder);
+      for (std::string_view builder : {"low", "medium", "high"}) append_new(list, builder);
+      append_new(list, kAuto);
+      break;
+    case Axis::leaf:
+      for (const StructureEntry& e : registry.structures)
+        for (std::string_view leaf : e.info.leaves) append_new(list, leaf);
+      for (const KernelRow& row : registry.kernels) append_new(list, row.leaf);
+      append_new(list, kAuto);
+      break;
+    case Axis::intersector:
+      for (const KernelRow& row : registry.kernels) append_new(list, row.intersector);
+      break;
+    case Axis::box:
+      for (const KernelRow& row : registry.kernels) append_new(list, row.box);
+      append_new(list, kAuto);
+      break;
+    case Axis::traversal:
+      for (const KernelRow& row : registry.kernels) append_new(list, row.traversal);
+      for (std::string_view family : {"packet", "hybrid"}) {
+        if (std::ranges::any_of(list, [&](const std::string& t) { return split_number(t).first == family; })) {
+          append_new(list, family);
+        }
+      }
+      break;
+    case Axis::isa:
+      for (Isa isa : kAllIsas) append_new(list, to_string(isa));
+      break;
+    case Axis::workload:
+      for (std::string_view name : workload_names()) append_new(list, name);
+      break;
+    case Axis::threads: break;
+  }
+  std::erase(list, std::string(kNone));
+  return list;
+}
+
+std::string resolve_traversal(std::string_view traversal, Isa isa) {
+  if (traversal != "packet" && traversal != "hybrid") return std::string(traversal);
+  return std::string(traversal) + std::to_string(native_width(isa));
+}
+
+std::string_view default_box(std::string_view intersector) noexcept {
+  constexpr std::string_view kLoseNoHit[] = {"watertight", "watertight_refined", "pluecker", "pluecker_double", "exact"};
+  return std::ranges::find(kLoseNoHit, intersector) != std::end(kLoseNoHit) ? "padded" : "fast";
+}
+
+std::string summary_of(Axis axis, std::string_view value, const Registry& registry) {
+  switch (axis) {
+    case Axis::structure:
+      if (const StructureEntry* e = registry.structure(value)) return std::string(e->info.summary);
+      return "not in this build: libembree was not found";
+    case Axis::builder: return std::string(look_up(kBuilders, value));
+    case Axis::leaf: return leaf_summary(value);
+    case Axis::intersector: return std::string(look_up(kIntersectors, value));
+    case Axis::box: return std::string(look_up(kBoxes, value));
+    case Axis::traversal: return traversal_summary(value);
+    case Axis::isa: return std::string(look_up(kIsas, value));
+    case Axis::workload: return std::string(look_up(kWorkloads, value));
+    case Axis::threads: return {};
+  }
+  return {};
+}
+
+}  // namespace arboretum

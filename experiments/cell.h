@@ -1,0 +1,37 @@
+// Cell: one combination of the sweep, and the name that results are known by.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/isa.h"
+#include "structures/accel.h"
+#include "traversal/kernel_table.h"
+
+namespace arboretum {
+
+struct Cell {
+  enum class Metric { trace, build } metric = Metric::trace;
+  std::size_t scene_index = 0;  ///< of the experiment's scenes
+  std::string scene, structure, builder, leaf, intersector, box, traversal, workload;
+  Isa isa = Isa::scalar;
+  unsigned threads = 1;
+  BuilderParameters parameters;
+  std::string parameter_label;  ///< what of `parameters` is swept: ":bins=16"; part of the name
+  const KernelRow* kernel = nullptr;  ///< of a trace cell
+
+  /// `metric/scene/structure/builder/leaf/intersector/box/traversal/isa/workload/threads:N`; `-` where an axis does not
+  /// apply; swept builder parameters follow the builder: `binned_sah:bins=16`.
+  [[nodiscard]] std::string name() const;
+  [[nodiscard]] std::string builder_name() const { return builder + parameter_label; }
+};
+
+struct SkippedCell {
+  std::string name, reason;
+};
+
+[[nodiscard]] inline std::string_view to_string(Cell::Metric metric) noexcept {
+  return metric == Cell::Metric::trace ? "trace" : "build";
+}
+
+}  // namespace arboretum

@@ -1,0 +1,73 @@
+// Experiment: what a configuration file asks for, checked. Nothing in it is guessed: a key or value that means nothing
+// is an error that names file, line and the nearest valid word.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "experiments/axes.h"
+#include "experiments/parameters.h"
+#include "scenes/scene.h"
+
+namespace arboretum {
+
+inline constexpr std::array<std::string_view, 4> kMetricNames{"trace", "build", "quality", "accuracy"};
+
+struct SceneChoice {
+  SceneSpec spec;
+  std::string name;  ///< as in cell names
+};
+
+/// One entry of `include` or `exclude`. An empty list: the axis is not named.
+struct CellChoice {
+  AxisLists axes;
+  std::vector<std::string> scenes;
+  std::string where;  ///< file:line
+};
+
+struct MeasureSettings {
+  unsigned repetitions = 7;
+  unsigned warmup = 1;      ///< untimed passes over all rays before the first repetition
+  double min_time = 0.2;    ///< seconds that one repetition lasts at least
+  unsigned width = 512, height = 512;
+  std::size_t memory = std::size_t{8} << 30;  ///< bytes of structures held at once
+  std::uint64_t seed = 1;
+};
+
+struct Metrics {
+  bool trace = true, build = true, quality = true, accuracy = true;
+};
+
+struct Experiment {
+  std::string name;
+  std::filesystem::path file;
+  std::vector<SceneChoice> scenes;
+  AxisLists axes;  ///< every axis has a value
+  ParameterSweep parameters;
+  std::vector<CellChoice> include, exclude;
+  MeasureSettings measure;
+  Metrics metrics;
+  std::vector<std::string> plots;
+  bool overridden = false;  ///< the command line changed an axis: an exclude may then match nothing
+};
+
+/// What the command line lays over the file.
+struct Overrides {
+  std::vector<std::string> axes;  ///< `isa=avx2,avx512`, as typed
+  std::optional<unsigned> repetitions = {}, threads = {};
+  std::optional<std::uint64_t> seed = {};
+  std::optional<double> min_time = {};
+};
+
+/// Plots that plots/plot.py draws.
+[[nodiscard]] std::span<const std::string_view> plot_names();
+
+/// Reads and checks. Throws UserError, one line: `file:line: what; mend`.
+[[nodiscard]] Experiment read_experiment(const std::filesystem::path& file, const Registry& registry,
+                                         const Overrides& overrides = {});
+
+}  // namespace arboretum

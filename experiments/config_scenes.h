@@ -1,0 +1,19 @@
+// The `scenes:` list of a configuration, checked before anything is measured: names are known and files exist.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "experiments/config.h"
+#include "experiments/yaml_reader.h"
+
+namespace arboretum {
+
+/// Paths are relative to `folder`, the configuration's own. Throws UserError; no two scenes may share a name.
+[[nodiscard]] std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& node,
+                                                   const std::filesystem::path& folder);
+/// A scene named on the command line.
+[[nodiscard]] SceneChoice scene_of_word(const std::string& word);
+
+}  // namespace arboretum

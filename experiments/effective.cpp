@@ -1,0 +1,101 @@
+#include "experiments/effective.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cstdint>
+
+namespace arboretum {
+namespace {
+
+void emit_list(YAML::Emitter& out, const std::vector<std::string>& values) {
+  out << YAML::Flow << YAML::BeginSeq;
+  for (const std::string& value : values) out << value;
+  out << YAML::EndSeq;
+}
+
+void emit_scene(YAML::Emitter& out, const SceneSpec& spec) {
+  if (!spec.catalogue.empty()) {
+    out << spec.catalogue;
+    return;
+  }
+  out << YAML::Flow << YAML::BeginMap;
+  if (!spec.file.empty()) out << YAML::Key << "file" << YAML::Value << std::filesystem::absolute(spec.file).lexically_normal().string();
+  if (!spec.scene.empty()) out << YAML::Key << "scene" << YAML::Value << std::filesystem::absolute(spec.scene).lexically_normal().string();
+  if (!spec.generator.empty()) {
+    out << YAML::Key << "generate" << YAML::Value << spec.generator << YAML::Key << "triangles" << YAML::Value
+        << spec.triangles << YAML::Key << "seed" << YAML::Value << spec.seed;
+  }
+  out << YAML::EndMap;
+}
+
+void emit_choices(YAML::Emitter& out, std::string_view key, const std::vector<CellChoice>& choices) {
+  if (choices.empty()) return;
+  out << YAML::Key << std::string(key) << YAML::Value << YAML::BeginSeq;
+  for (const CellChoice& choice : choices) {
+    out << YAML::Flow << YAML::BeginMap;
+    if (!choice.scenes.empty()) {
+      out << YAML::Key << "scene" << YAML::Value;
+      emit_list(out, choice.scenes);
+    }
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (choice.axes[i].empty()) continue;
+      out << YAML::Key << std::string(kAxisNames[i]) << YAML::Value;
+      emit_list(out, choice.axes[i]);
+    }
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
+}
+
+std::string text(const Experiment& e, bool with_plots) {
+  YAML::Emitter out;
+  out << YAML::BeginMap << YAML::Key << "experiment" << YAML::Value << e.name;
+  out << YAML::Key << "scenes" << YAML::Value << YAML::BeginSeq;
+  for (const SceneChoice& scene : e.scenes) emit_scene(out, scene.spec);
+  out << YAML::EndSeq << YAML::Key << "axes" << YAML::Value << YAML::BeginMap;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    out << YAML::Key << std::string(kAxisNames[i]) << YAML::Value;
+    emit_list(out, e.axes[i]);
+  }
+  out << YAML::EndMap << YAML::Key << "parameters" << YAML::Value << YAML::BeginMap;
+  for (const std::string& name : parameter_names()) {
+    const auto named = e.parameters.find(name);
+    out << YAML::Key << name << YAML::Value;
+    emit_list(out, named == e.parameters.end() ? std::vector<std::string>{default_parameter(name)} : named->second);
+  }
+  out << YAML::EndMap;
+  emit_choices(out, "include", e.include);
+  emit_choices(out, "exclude", e.exclude);
+  const MeasureSettings& m = e.measure;
+  out << YAML::Key << "measure" << YAML::Value << YAML::BeginMap << YAML::Key << "repetitions" << YAML::Value
+      << m.repetitions << YAML::Key << "warmup" << YAML::Value << m.warmup << YAML::Key << "min_time" << YAML::Value
+      << fmt::format("{}", m.min_time) << YAML::Key << "resolution" << YAML::Value << YAML::Flow << YAML::BeginSeq
+      << m.width << m.height << YAML::EndSeq << YAML::Key << "memory" << YAML::Value << m.memory << YAML::Key << "seed"
+      << YAML::Value << m.seed << YAML::EndMap;
+  std::vector<std::string> metrics;
+  for (const auto& [name, on] : {std::pair{"trace", e.metrics.trace}, {"build", e.metrics.build}, {"quality", e.metrics.quality},
+                                 {"accuracy", e.metrics.accuracy}}) {
+    if (on) metrics.emplace_back(name);
+  }
+  out << YAML::Key << "metrics" << YAML::Value;
+  emit_list(out, metrics);
+  if (with_plots) {
+    out << YAML::Key << "plots" << YAML::Value;
+    emit_list(out, e.plots);
+  }
+  out << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+}  // namespace
+
+std::string effective_yaml(const Experiment& experiment) { return text(experiment, true); }
+
+std::string configuration_hash(const Experiment& experiment) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (unsigned char c : text(experiment, false)) hash = (hash ^ c) * 0x100000001b3u;
+  return fmt::format("{:016x}", hash);
+}
+
+}  // namespace arboretum

@@ -1,0 +1,59 @@
+#include "experiments/journal.h"
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+
+namespace arboretum {
+namespace {
+
+Json parse(const std::string& line) { return Json::parse(line, nullptr, false); }
+
+}  // namespace
+
+Journal::Journal(std::filesystem::path folder, std::string configuration_hash, const Plan& plan, bool resume)
+    : folder_(std::move(folder)), hash_(std::move(configuration_hash)) {
+  const std::filesystem::path cells = folder_ / "cells.jsonl", repetitions = folder_ / "repetitions.jsonl";
+  if (resume) {
+    std::map<std::string, const Cell*> wanted;
+    for (const Cell& cell : plan.cells) wanted.emplace(cell.name(), &cell);
+    for (const auto& path : {cells, repetitions}) {
+      for (const std::string& text : read_lines(path)) {
+        const Json line = parse(text);
+        if (!line.is_object()) continue;  // torn by a kill
+        const std::string hash = line.value("configuration_hash", "");
+        if (hash != hash_) {
+          throw UserError(fmt::format("{}: holds another configuration (hash {}, this one is {}); resume with the command that began it, or choose another folder with --out",
+                                      folder_.string(), hash.empty() ? "unknown" : hash, hash_));
+        }
+        const auto found = wanted.find(line.value("name", ""));
+        if (found == wanted.end()) continue;
+        if (path == cells) {
+          if (auto result = parse_cell_line(line, *found->second, hash_)) done_.insert_or_assign(found->first, std::move(*result));
+        } else if (const auto entry = parse_journal_line(line)) {
+          started_[entry->first].insert_or_assign(entry->second.index, entry->second);
+        }
+      }
+    }
+  }
+  cells_ = AppendFile(cells, resume);
+  repetitions_ = AppendFile(repetitions, resume);
+}
+
+std::vector<Repetition> Journal::started(const std::string& name) const {
+  std::vector<Repetition> list;
+  if (const auto found = started_.find(name); found != started_.end()) {
+    for (const auto& [index, repetition] : found->second) list.push_back(repetition);
+  }
+  return list;
+}
+
+void Journal::add(const std::string& name, const Repetition& repetition) {
+  Json line = journal_line(name, repetition);
+  line["configuration_hash"] = hash_;
+  repetitions_.append(line.dump());
+}
+
+void Journal::finish(const CellResult& result) { cells_.append(cell_line(result, hash_).dump()); }
+
+}  // namespace arboretum

@@ -1,0 +1,95 @@
+#include "experiments/machine_info.h"
+
+#include <benchmark/benchmark.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <ctime>
+#include <fstream>
+#include <memory>
+#include <thread>
+
+#include "experiments/build_info.h"
+
+namespace arboretum {
+namespace {
+
+/// First line of a file whose key matches, as in `model name : AMD`; empty where there is none.
+std::string field_of(const char* path, std::string_view key) {
+  std::ifstream stream(path);
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.starts_with(key)) continue;
+    const std::size_t value = line.find_first_not_of(" \t", line.find(':') + 1);
+    return value == std::string::npos ? "" : line.substr(value);
+  }
+  return {};
+}
+
+std::string first_line(const char* path) {
+  std::ifstream stream(path);
+  std::string line;
+  std::getline(stream, line);
+  return line;
+}
+
+/// Output of git in the source folder; empty when there is no git or no repository. Arguments are constants of ours.
+std::string git(const std::string& arguments) {
+  std::string quoted = build_info::kSourceDirectory;
+  for (std::size_t i = 0; (i = quoted.find('\'', i)) != std::string::npos; i += 4) quoted.replace(i, 1, "'\\''");
+  const std::string command = fmt::format("git -c safe.directory='*' -C '{}' {} 2>/dev/null", quoted, arguments);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
+  std::string text;
+  char buffer[256];
+  while (pipe && std::fgets(buffer, sizeof buffer, pipe.get())) text += buffer;
+  while (text.ends_with('\n')) text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+Json machine_context(const Experiment& experiment, const std::string& configuration_hash, const std::string& command) {
+  Json context = Json::object();
+  const std::time_t now = std::time(nullptr);
+  const benchmark::CPUInfo& cpu = benchmark::CPUInfo::Get();
+  context["date"] = fmt::format("{:%Y-%m-%dT%H:%M:%S+00:00}", fmt::gmtime(now));
+  context["host_name"] = benchmark::SystemInfo::Get().name;
+  context["executable"] = "arboretum";
+  context["num_cpus"] = cpu.num_cpus;
+  context["mhz_per_cpu"] = static_cast<int>(cpu.cycles_per_second / 1e6);
+  context["cpu_scaling_enabled"] = cpu.scaling == benchmark::CPUInfo::ENABLED;
+  Json& caches = context["caches"] = Json::array();
+  for (const auto& cache : cpu.caches) {
+    caches.push_back({{"type", cache.type}, {"level", cache.level}, {"size", cache.size}, {"num_sharing", cache.num_sharing}});
+  }
+  context["load_avg"] = cpu.load_avg;
+
+  context["experiment"] = experiment.name;
+  context["command"] = command;
+  const std::string model = field_of("/proc/cpuinfo", "model name");
+  context["cpu"] = model.empty() ? "unknown" : model;
+  Json& isas = context["isa"] = Json::array();
+  for (Isa isa : available_isas()) isas.push_back(to_string(isa));
+  context["cores"] = std::max(1u, std::thread::hardware_concurrency());
+  const std::string governor = first_line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+  context["governor"] = governor.empty() ? "unknown" : governor;
+  context["load"] = first_line("/proc/loadavg");
+  context["memory_bytes"] = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
+  utsname system{};
+  if (::uname(&system) == 0) context["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
+  context["compiler"] = build_info::kCompiler;
+  context["compiler_flags"] = build_info::kFlags;
+  context["build_type"] = build_info::kBuildType;
+  context["version"] = build_info::kVersion;
+  const std::string revision = git("rev-parse HEAD");
+  context["git_revision"] = revision.empty() ? "unknown" : revision;
+  context["git_dirty"] = !revision.empty() && !git("status --porcelain --untracked-files=no").empty();
+  context["configuration_hash"] = configuration_hash;
+  context["seed"] = experiment.measure.seed;
+  context["plots"] = experiment.plots;
+  return context;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,96 @@
+#include "experiments/parameters.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <span>
+
+namespace arboretum {
+namespace {
+
+struct Field {
+  std::string_view name;
+  double low, high;  ///< inclusive
+  unsigned BuilderParameters::*integer = nullptr;
+  float BuilderParameters::*real = nullptr;
+  std::string BuilderParameters::*word = nullptr;
+  std::span<const std::string_view> words = {};
+};
+
+constexpr std::string_view kCollapses[] = {"optimal", "greedy"};
+
+const std::vector<Field>& fields() {
+  static const std::vector<Field> table{
+      {.name = "bins", .low = 4, .high = 64, .integer = &BuilderParameters::bins},
+      {.name = "traversal_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::traversal_cost},
+      {.name = "intersection_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::intersection_cost},
+      {.name = "max_leaf_blocks", .low = 1, .high = 7, .integer = &BuilderParameters::max_leaf_blocks},
+      {.name = "collapse", .low = 0, .high = 0, .word = &BuilderParameters::collapse, .words = kCollapses},
+  };
+  return table;
+}
+
+const Field& field(std::string_view name) {
+  return *std::ranges::find_if(fields(), [&](const Field& f) { return f.name == name; });
+}
+
+std::string expectation(const Field& f) {
+  if (f.word) return fmt::format("one of {}", fmt::join(f.words, ", "));
+  return fmt::format("{} from {} to {}", f.integer ? "an integer" : "a number", f.low, f.high);
+}
+
+template <class T>
+bool parse_within(const std::string& text, double low, double high, T& out) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high)) return false;
+  out = value;
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::string> parameter_names() {
+  std::vector<std::string> names;
+  for (const Field& f : fields()) names.emplace_back(f.name);
+  return names;
+}
+
+std::string default_parameter(std::string_view name) {
+  const BuilderParameters defaults;
+  const Field& f = field(name);
+  if (f.word) return defaults.*f.word;
+  return f.integer ? fmt::format("{}", defaults.*f.integer) : fmt::format("{}", defaults.*f.real);
+}
+
+std::string set_parameter(BuilderParameters& parameters, std::string_view name, const std::string& value) {
+  const Field& f = field(name);
+  bool done = false;
+  if (f.word) {
+    done = std::ranges::find(f.words, value) != f.words.end();
+    if (done) parameters.*f.word = value;
+  } else {
+    done = f.integer ? parse_within(value, f.low, f.high, parameters.*f.integer)
+                     : parse_within(value, f.low, f.high, parameters.*f.real);
+  }
+  return done ? std::string() : expectation(f);
+}
+
+std::vector<ParameterPoint> parameter_points(const ParameterSweep& sweep) {
+  std::vector<ParameterPoint> points(1);
+  for (const auto& [name, values] : sweep) {
+    std::vector<ParameterPoint> next;
+    for (const ParameterPoint& point : points) {
+      for (const std::string& value : values) {
+        next.push_back(point);
+        (void)set_parameter(next.back().parameters, name, value);
+        if (values.size() > 1) next.back().label += ":" + name + "=" + value;
+      }
+    }
+    points = std::move(next);
+  }
+  return points;
+}
+
+}  // namespace arboretum

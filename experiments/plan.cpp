@@ -1,0 +1,222 @@
+#include "experiments/plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "core/error.h"
+
+namespace arboretum {
+
+std::string Cell::name() const {
+  return fmt::format("{}/{}/{}/{}/{}/{}/{}/{}/{}/{}/threads:{}", to_string(metric), scene, structure, builder_name(), leaf,
+                     intersector, box, traversal, to_string(isa), workload, threads);
+}
+
+namespace {
+
+constexpr std::string_view kEmbreeMissing = "this build has no embree: install libembree-dev and build again";
+
+bool contains(const std::vector<std::string>& list, std::string_view value) { return std::ranges::find(list, value) != list.end(); }
+
+class Planner {
+ public:
+  Planner(const Experiment& experiment, const Registry& registry) : experiment_(experiment), registry_(registry) {
+    points_ = parameter_points(experiment.parameters);
+  }
+
+  Plan run() {
+    for (std::size_t scene = 0; scene < experiment_.scenes.size(); ++scene) {
+      std::vector<Cell> traced;
+      product(scene, experiment_.axes, traced);
+      for (std::size_t i = 0; i < experiment_.include.size(); ++i) add_include(i, scene, traced);
+      if (experiment_.metrics.build) add_builds(traced);
+      if (experiment_.metrics.trace) std::ranges::move(traced, std::back_inserter(plan_.cells));
+    }
+    refuse_ineffective();
+    return std::move(plan_);
+  }
+
+ private:
+  void product(std::size_t scene, const AxisLists& lists, std::vector<Cell>& out) {
+    const auto& values = [&](Axis a) -> const std::vector<std::string>& { return lists[index_of(a)]; };
+    for (const std::string& structure : values(Axis::structure))
+      for (const std::string& builder : values(Axis::builder))
+        for (const ParameterPoint& point : points_)
+          for (const std::string& leaf : values(Axis::leaf))
+            for (const std::string& intersector : values(Axis::intersector))
+              for (const std::string& box : values(Axis::box))
+                for (const std::string& traversal : values(Axis::traversal))
+                  for (const std::string& isa : values(Axis::isa))
+                    for (const std::string& workload : values(Axis::workload))
+                      for (const std::string& threads : values(Axis::threads)) {
+                        Cell cell;
+                        cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
+                        cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
+                        cell.intersector = intersector, cell.box = box, cell.traversal = traversal;
+                        cell.isa = *parse_isa(isa), cell.workload = workload;
+                        cell.threads = static_cast<unsigned>(std::stoul(threads));
+                        cell.parameters = point.parameters, cell.parameter_label = point.label;
+                        add(std::move(cell), out);
+                      }
+  }
+
+  /// Fills in `auto` and the ISA's own widths, as far as the structure is known.
+  void resolve(Cell& cell, const StructureEntry* entry) const {
+    cell.traversal = resolve_traversal(cell.traversal, cell.isa);
+    if (cell.box == kAuto) cell.box = default_box(cell.intersector);
+    if (entry && !entry->info.uses_parameters) cell.parameters = {}, cell.parameter_label.clear();
+    if (cell.builder == kAuto) cell.builder = entry && !entry->info.builders.empty() ? entry->info.builders.front() : kNone;
+    if (cell.leaf == kAuto) {
+      const std::string_view leaf = entry ? registry_.default_leaf(cell.structure, cell.intersector, cell.isa) : "";
+      cell.leaf = leaf.empty() ? kNone : leaf;
+    }
+  }
+
+  /// Why the cell cannot be; empty where it can.
+  std::string impossible(Cell& cell, const StructureEntry* entry) const {
+    if (!entry) return std::string(kEmbreeMissing);
+    const auto& builders = entry->info.builders;
+    if (!builders.empty() && std::ranges::find(builders, cell.builder) == builders.end()) {
+      return fmt::format("{} has no builder {} (it takes {})", cell.structure, cell.builder, fmt::join(builders, ", "));
+    }
+    cell.kernel = registry_.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
+    if (!cell.kernel) {
+      const std::string why = registry_.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
+      return why.empty() ? "no such kernel in this build" : why;
+    }
+    if (!registry_.has(cell.isa)) return fmt::format("no {}", to_string(cell.isa));
+    return {};
+  }
+
+  bool matches(const CellChoice& choice, const Cell& cell) const {
+    if (!choice.scenes.empty() && !contains(choice.scenes, cell.scene)) return false;
+    const std::string values[kAxisCount] = {cell.structure, cell.builder, cell.leaf, cell.intersector, cell.box,
+                                            cell.traversal, std::string(to_string(cell.isa)), cell.workload, std::to_string(cell.threads)};
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (choice.axes[i].empty() || contains(choice.axes[i], values[i])) continue;
+      const bool by_width = static_cast<Axis>(i) == Axis::traversal &&
+                            std::ranges::any_of(choice.axes[i], [&](const auto& t) { return resolve_traversal(t, cell.isa) == values[i]; });
+      if (!by_width) return false;
+    }
+    return true;
+  }
+
+  void add(Cell cell, std::vector<Cell>& out) {
+    const StructureEntry* entry = registry_.structure(cell.structure);
+    resolve(cell, entry);
+    for (std::size_t i = 0; i < experiment_.exclude.size(); ++i) {
+      if (!matches(experiment_.exclude[i], cell)) continue;
+      used_excludes_.insert(i);
+      ++plan_.excluded;
+      return;
+    }
+    if (!experiment_.metrics.trace) cell.metric = Cell::Metric::build;
+    std::string name = cell.name();
+    if (!names_.insert(name).second) return;
+    ++added_;
+    const std::string reason = impossible(cell, entry);
+    cell.metric = Cell::Metric::trace;
+    if (reason.empty()) out.push_back(std::move(cell));
+    else plan_.skipped.push_back({std::move(name), reason});
+  }
+
+  /// Axes that an include does not name take the sweep's values where they apply: a builder, leaf or traversal that the
+  /// structure does not take gives way to its own default.
+  void add_include(std::size_t index, std::size_t scene, std::vector<Cell>& out) {
+    const CellChoice& choice = experiment_.include[index];
+    if (!choice.scenes.empty() && !contains(choice.scenes, experiment_.scenes[scene].name)) return;
+    for (const std::string& structure : choice.axes[index_of(Axis::structure)]) {
+      AxisLists lists = choice.axes;
+      lists[index_of(Axis::structure)] = {structure};
+      const StructureEntry* entry = registry_.structure(structure);
+      for (std::size_t i = 0; i < kAxisCount; ++i) {
+        if (!lists[i].empty()) continue;
+        lists[i] = experiment_.axes[i];
+        if (!entry) continue;
+        const auto keep = [&](auto&& taken) {
+          std::erase_if(lists[i], [&](const std::string& v) { return v != kAuto && std::ranges::find(taken, v) == taken.end(); });
+          if (lists[i].empty()) lists[i] = {std::string(kAuto)};
+        };
+        if (static_cast<Axis>(i) == Axis::builder) keep(entry->info.builders);
+        if (static_cast<Axis>(i) == Axis::leaf) keep(entry->info.leaves);
+      }
+      const std::size_t before = added_;
+      const std::size_t excluded_before = plan_.excluded;
+      product(scene, lists, out);
+      if (added_ > before || plan_.excluded > excluded_before) used_includes_.insert(index);
+    }
+  }
+
+  /// One build cell for each structure that the trace cells need, ISA and thread count.
+  void add_builds(const std::vector<Cell>& traced) {
+    std::set<std::string> seen;
+    for (const Cell& trace : traced) {
+      Cell cell = trace;
+      cell.metric = Cell::Metric::build;
+      cell.kernel = nullptr;
+      cell.intersector = cell.box = cell.traversal = cell.workload = kNone;
+      if (seen.insert(cell.name()).second) plan_.cells.push_back(std::move(cell));
+    }
+  }
+
+  void refuse_ineffective() const {
+    if (experiment_.overridden) return;
+    for (std::size_t i = 0; i < experiment_.include.size(); ++i) {
+      if (!used_includes_.contains(i)) {
+        throw UserError(experiment_.include[i].where + ": this include adds no cell: the axes hold all of it; take it out");
+      }
+    }
+    for (std::size_t i = 0; i < experiment_.exclude.size(); ++i) {
+      if (!used_excludes_.contains(i)) {
+        throw UserError(experiment_.exclude[i].where + ": this exclude takes no cell away: nothing of it is in the sweep; take it out");
+      }
+    }
+  }
+
+  const Experiment& experiment_;
+  const Registry& registry_;
+  std::vector<ParameterPoint> points_;
+  Plan plan_;
+  std::set<std::string> names_;
+  std::set<std::size_t> used_includes_, used_excludes_;
+  std::size_t added_ = 0;
+};
+
+std::regex compile(const std::string& expression, std::string_view option) {
+  try {
+    return std::regex(expression);
+  } catch (const std::regex_error&) {
+    throw UserError(fmt::format("{} '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes", option, expression));
+  }
+}
+
+}  // namespace
+
+Plan make_plan(const Experiment& experiment, const Registry& registry) { return Planner(experiment, registry).run(); }
+
+void apply_filter(Plan& plan, const std::string& filter, const std::string& skip) {
+  const std::size_t before = plan.cells.size();
+  if (!filter.empty()) {
+    const std::regex expression = compile(filter, "--filter");
+    std::erase_if(plan.cells, [&](const Cell& cell) { return !std::regex_search(cell.name(), expression); });
+  }
+  if (!skip.empty()) {
+    const std::regex expression = compile(skip, "--skip");
+    std::erase_if(plan.cells, [&](const Cell& cell) { return std::regex_search(cell.name(), expression); });
+  }
+  plan.filtered += before - plan.cells.size();
+}
+
+std::vector<std::pair<std::string, std::size_t>> group_reasons(const std::vector<SkippedCell>& skipped) {
+  std::map<std::string, std::size_t> counts;
+  for (const SkippedCell& cell : skipped) ++counts[cell.reason];
+  std::vector<std::pair<std::string, std::size_t>> groups(counts.begin(), counts.end());
+  std::ranges::stable_sort(groups, std::greater<>{}, &std::pair<std::string, std::size_t>::second);
+  return groups;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,31 @@
+// Plan: the cells of an experiment, and those that cannot be, each with its reason.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "experiments/cell.h"
+#include "experiments/config.h"
+
+namespace arboretum {
+
+struct Plan {
+  std::vector<Cell> cells;  ///< scene by scene; a scene's build cells come first
+  std::vector<SkippedCell> skipped;
+  std::size_t excluded = 0;  ///< by the configuration's `exclude`
+  std::size_t filtered = 0;  ///< by --filter and --skip
+};
+
+/// The product of the axes, with `include`, without `exclude`. A combination that has no kernel, or whose ISA the
+/// machine lacks, is skipped with its reason. Throws UserError for an include that adds nothing and an exclude that
+/// takes nothing away.
+[[nodiscard]] Plan make_plan(const Experiment& experiment, const Registry& registry);
+
+/// Keeps the cells whose name `filter` finds and `skip` does not (ECMAScript regular expressions; empty: all, none).
+/// Throws UserError for a broken expression.
+void apply_filter(Plan& plan, const std::string& filter, const std::string& skip);
+
+/// Skipped cells by reason, most first.
+[[nodiscard]] std::vector<std::pair<std::string, std::size_t>> group_reasons(const std::vector<SkippedCell>& skipped);
+
+}  // namespace arboretum

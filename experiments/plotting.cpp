@@ -1,0 +1,58 @@
+#include "experiments/plotting.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
+#include "experiments/build_info.h"
+
+extern char** environ;
+
+namespace arboretum {
+namespace {
+
+/// Exit status, or -1 when the program could not be started or died.
+int run_program(std::vector<std::string> words, bool quiet_out, bool quiet_error) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  if (quiet_out) posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  if (quiet_error) posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  pid_t pid = 0;
+  const int error = ::posix_spawnp(&pid, arguments[0], &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  int status = 0;
+  if (error != 0 || ::waitpid(pid, &status, 0) != pid || !WIFEXITED(status)) return -1;
+  return WEXITSTATUS(status);
+}
+
+}  // namespace
+
+std::optional<std::string> find_plot_python() {
+  std::vector<std::string> candidates{"/usr/bin/python3", "python3"};
+  if (const char* chosen = std::getenv("ARBORETUM_PYTHON"); chosen && *chosen) candidates.insert(candidates.begin(), chosen);
+  for (const std::string& python : candidates) {
+    const char* kTry = "import sys, importlib.util as u; sys.exit(not (u.find_spec('matplotlib') and u.find_spec('numpy')))";
+    if (run_program({python, "-c", kTry}, true, true) == 0) return python;
+  }
+  return std::nullopt;
+}
+
+std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures, bool quiet) {
+  const std::filesystem::path script = std::filesystem::path(build_info::kSourceDirectory) / "plots" / "plot.py";
+  if (!std::filesystem::exists(script)) return fmt::format("no plots: {} is missing; run from the project's own build", script.string());
+  const std::optional<std::string> python = find_plot_python();
+  if (!python) return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the results";
+  std::vector<std::string> words{*python, script.string(), results.string()};
+  if (!figures.empty()) words.insert(words.end(), {"--only", fmt::format("{}", fmt::join(figures, ","))});
+  const int status = run_program(words, quiet, false);
+  return status == 0 ? "" : fmt::format("no plots: {} ended with status {}", script.filename().string(), status);
+}
+
+}  // namespace arboretum

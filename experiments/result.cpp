@@ -1,0 +1,211 @@
+#include "experiments/result.h"
+
+#include <algorithm>
+#include <map>
+
+#include "experiments/sampling.h"
+
+namespace arboretum {
+namespace {
+
+/// What one iteration works through: rays of a trace, triangles of a build.
+double items(const CellResult& result) { return result.fact(result.is_trace() ? "rays" : "triangles"); }
+
+double per_second(double amount, double seconds) { return seconds > 0.0 ? amount / seconds : 0.0; }
+
+/// The rates and times that change with the repetition.
+void add_measured(Json& entry, const CellResult& result, double wall, double cpu) {
+  entry["real_time"] = wall * 1e3, entry["cpu_time"] = cpu * 1e3, entry["time_unit"] = "ms";
+  if (result.is_trace()) {
+    entry["rays_per_second"] = per_second(items(result), wall);
+    entry["rays_per_cpu_second"] = per_second(items(result), cpu);
+  } else {
+    entry["build_seconds"] = wall;
+    entry["triangles_per_second"] = per_second(items(result), wall);
+  }
+}
+
+Json head(const CellResult& result, const std::string& name, std::string_view run_type) {
+  Json entry = Json::object();
+  entry["name"] = name;
+  entry["run_name"] = result.cell.name();
+  entry["run_type"] = run_type;
+  entry["repetitions"] = result.repetitions.size();
+  return entry;
+}
+
+Json measured_fields(const Repetition& repetition) {
+  Json json = Json::object();
+  json["repetition_index"] = repetition.index;
+  json["iterations"] = repetition.iterations;
+  json["wall_seconds"] = repetition.wall_seconds;
+  json["cpu_seconds"] = repetition.cpu_seconds;
+  if (!repetition.phases.empty()) {
+    Json& phases = json["phase_seconds"] = Json::object();
+    for (const auto& [name, seconds] : repetition.phases) phases[name] = seconds;
+  }
+  return json;
+}
+
+Repetition parse_measured_fields(const Json& json) {
+  Repetition repetition;
+  repetition.index = json.at("repetition_index").get<unsigned>();
+  repetition.iterations = json.at("iterations").get<std::uint64_t>();
+  repetition.wall_seconds = json.at("wall_seconds").get<double>();
+  repetition.cpu_seconds = json.at("cpu_seconds").get<double>();
+  if (const auto phases = json.find("phase_seconds"); phases != json.end()) {
+    for (const auto& [name, seconds] : phases->items()) repetition.phases.emplace_back(name, seconds.get<double>());
+  }
+  return repetition;
+}
+
+}  // namespace
+
+std::vector<double> CellResult::rates(bool cpu) const {
+  std::vector<double> values;
+  for (const Repetition& r : repetitions) {
+    values.push_back(per_second(items(*this) * static_cast<double>(r.iterations), cpu ? r.cpu_seconds : r.wall_seconds));
+  }
+  return values;
+}
+
+double CellResult::fact(const char* name, double otherwise) const {
+  const auto found = facts.find(name);
+  return found != facts.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+void add_facts(Json& facts, const StructureStatistics& s) {
+  if (!s.available) return;
+  facts["sah_cost"] = s.sah_cost, facts["sah_child_cost"] = s.sah_child_cost, facts["epo"] = s.epo;
+  facts["nodes"] = s.nodes, facts["leaves"] = s.leaves, facts["depth"] = s.depth;
+  facts["node_bytes"] = s.node_bytes, facts["leaf_bytes"] = s.leaf_bytes;
+  facts["leaf_fill"] = s.leaf_fill, facts["duplication"] = s.duplication, facts["children_per_node"] = s.children_per_node;
+}
+
+void add_facts(Json& facts, const Counters& c) {
+  if (c.rays == 0) return;
+  const double rays = static_cast<double>(c.rays);
+  facts["nodes_per_ray"] = static_cast<double>(c.nodes) / rays;
+  facts["boxes_per_ray"] = static_cast<double>(c.boxes) / rays;
+  facts["leaves_per_ray"] = static_cast<double>(c.leaves) / rays;
+  facts["triangles_per_ray"] = static_cast<double>(c.triangles) / rays;
+  if (c.lanes > 0) facts["simd_utilization"] = static_cast<double>(c.lanes_active) / static_cast<double>(c.lanes);
+}
+
+void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit) {
+  facts["wrong_answers"] = check.wrong_answers();
+  facts["missed_hits"] = check.missed_hits, facts["false_hits"] = check.false_hits;
+  if (!closest_hit) return;
+  facts["wrong_surface"] = check.wrong_surface, facts["wrong_primitive"] = check.wrong_primitive;
+  facts["cracks"] = check.cracks;
+  facts["t_error_ulp_median"] = check.t_error_ulp_median, facts["t_error_ulp_p99"] = check.t_error_ulp_p99;
+  facts["t_error_ulp_max"] = check.t_error_ulp_max;
+}
+
+void add_axes(Json& json, const Cell& cell) {
+  json["metric"] = to_string(cell.metric), json["scene"] = cell.scene, json["structure"] = cell.structure;
+  json["builder"] = cell.builder_name(), json["leaf"] = cell.leaf, json["intersector"] = cell.intersector;
+  json["box"] = cell.box, json["traversal"] = cell.traversal, json["isa"] = to_string(cell.isa);
+  json["workload"] = cell.workload, json["threads"] = cell.threads;
+}
+
+Json repetition_entry(const CellResult& result, const Repetition& repetition) {
+  Json entry = head(result, result.cell.name(), "iteration");
+  entry["repetition_index"] = repetition.index;
+  entry["iterations"] = repetition.iterations;
+  const double n = static_cast<double>(repetition.iterations);
+  add_measured(entry, result, repetition.wall_seconds / n, repetition.cpu_seconds / n);
+  if (!repetition.phases.empty()) {
+    Json& phases = entry["phase_seconds"] = Json::object();
+    for (const auto& [name, seconds] : repetition.phases) phases[name] = seconds / n;
+  }
+  add_axes(entry, result.cell);
+  entry.update(result.facts);
+  return entry;
+}
+
+std::vector<Json> aggregate_entries(const CellResult& result) {
+  std::vector<double> wall, cpu;
+  for (const Repetition& r : result.repetitions) {
+    wall.push_back(r.wall_seconds / static_cast<double>(r.iterations));
+    cpu.push_back(r.cpu_seconds / static_cast<double>(r.iterations));
+  }
+  const auto cv = [](std::span<const double> v) { return mean(v) > 0.0 ? standard_deviation(v) / mean(v) : 0.0; };
+  std::vector<Json> entries;
+  for (const char* what : {"mean", "median", "stddev", "cv"}) {
+    const std::string_view name = what;
+    Json entry = head(result, result.cell.name() + "_" + what, "aggregate");
+    entry["aggregate_name"] = what;
+    entry["aggregate_unit"] = name == "cv" ? "percentage" : "time";
+    entry["iterations"] = result.repetitions.size();
+    if (name == "mean") add_measured(entry, result, mean(wall), mean(cpu));
+    if (name == "median") {
+      add_measured(entry, result, median(wall), median(cpu));
+      const Interval rate = bootstrap_median(result.rates(false)), cpu_rate = bootstrap_median(result.rates(true));
+      const char* key = result.is_trace() ? "rays_per_second" : "triangles_per_second";
+      entry[key] = rate.median;
+      entry[std::string(key) + "_low"] = rate.low, entry[std::string(key) + "_high"] = rate.high;
+      if (result.is_trace()) {
+        entry["rays_per_cpu_second"] = cpu_rate.median;
+        entry["rays_per_cpu_second_low"] = cpu_rate.low, entry["rays_per_cpu_second_high"] = cpu_rate.high;
+      }
+      entry.update(result.facts);
+    }
+    if (name == "stddev" || name == "cv") {
+      const bool relative = name == "cv";
+      entry["real_time"] = relative ? cv(wall) : standard_deviation(wall) * 1e3;
+      entry["cpu_time"] = relative ? cv(cpu) : standard_deviation(cpu) * 1e3;
+      entry["time_unit"] = "ms";
+    }
+    add_axes(entry, result.cell);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
+Json cell_line(const CellResult& result, const std::string& configuration_hash) {
+  Json line = Json::object();
+  line["name"] = result.cell.name();
+  line["configuration_hash"] = configuration_hash;
+  add_axes(line, result.cell);
+  line.update(result.facts);
+  Json& list = line["repetitions"] = Json::array();
+  for (const Repetition& repetition : result.repetitions) {
+    Json entry = measured_fields(repetition);
+    const double n = static_cast<double>(repetition.iterations);
+    add_measured(entry, result, repetition.wall_seconds / n, repetition.cpu_seconds / n);
+    list.push_back(std::move(entry));
+  }
+  return line;
+}
+
+std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell, const std::string& configuration_hash) {
+  try {
+    if (line.at("name") != cell.name() || line.at("configuration_hash") != configuration_hash) return std::nullopt;
+    CellResult result{.cell = cell, .repetitions = {}, .facts = line};
+    for (const Json& entry : line.at("repetitions")) result.repetitions.push_back(parse_measured_fields(entry));
+    Json axes = Json::object();
+    add_axes(axes, cell);
+    for (const auto& [key, value] : axes.items()) result.facts.erase(key);
+    for (const char* key : {"name", "configuration_hash", "repetitions"}) result.facts.erase(key);
+    return result;
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+Json journal_line(const std::string& name, const Repetition& repetition) {
+  Json line = measured_fields(repetition);
+  line["name"] = name;
+  return line;
+}
+
+std::optional<std::pair<std::string, Repetition>> parse_journal_line(const Json& line) {
+  try {
+    return std::pair{line.at("name").get<std::string>(), parse_measured_fields(line)};
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace arboretum

@@ -1,0 +1,61 @@
+// CellResult: what was measured of a cell, and how it reads as JSON.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiments/cell.h"
+#include "oracle/oracle.h"
+#include "structures/accel.h"
+#include "structures/statistics.h"
+#include "traversal/kernel_table.h"
+
+namespace arboretum {
+
+using Json = nlohmann::ordered_json;
+
+/// One timed repetition: `iterations` passes over all rays, or that many builds.
+struct Repetition {
+  unsigned index = 0;
+  std::uint64_t iterations = 0;
+  double wall_seconds = 0.0;  ///< of all iterations
+  double cpu_seconds = 0.0;   ///< of the thread; of the process where the cell has several threads
+  std::vector<std::pair<std::string, double>> phases;  ///< of builds: wall seconds of all iterations
+};
+
+struct CellResult {
+  Cell cell;
+  std::vector<Repetition> repetitions;  ///< by index
+  /// What does not change between repetitions, under the contract's names: `rays`, `sah_cost`, `wrong_answers`, ...
+  Json facts = Json::object();
+
+  [[nodiscard]] bool is_trace() const noexcept { return cell.metric == Cell::Metric::trace; }
+  /// Of each repetition: rays (trace) or triangles (build) a second of wall time, or of CPU time.
+  [[nodiscard]] std::vector<double> rates(bool cpu) const;
+  /// A number among the facts, or `otherwise`.
+  [[nodiscard]] double fact(const char* name, double otherwise = 0.0) const;
+  [[nodiscard]] bool has_fact(const char* name) const { return facts.contains(name); }
+};
+
+void add_facts(Json& facts, const StructureStatistics& statistics);
+void add_facts(Json& facts, const Counters& counters);
+void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit);
+/// The cell's name as fields of their own; `threads` as a number.
+void add_axes(Json& json, const Cell& cell);
+
+/// One repetition as an entry of results.json, Google Benchmark's fields first. Times are of one iteration, in ms.
+[[nodiscard]] Json repetition_entry(const CellResult& result, const Repetition& repetition);
+/// mean, median, stddev and cv, as Google Benchmark writes them; the median holds the 95 % interval of the rate too.
+[[nodiscard]] std::vector<Json> aggregate_entries(const CellResult& result);
+/// The cell as a line of cells.jsonl.
+[[nodiscard]] Json cell_line(const CellResult& result, const std::string& configuration_hash);
+/// Reads a line of cells.jsonl back. std::nullopt when it is not one, or not of `cell` or the configuration.
+[[nodiscard]] std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell, const std::string& configuration_hash);
+/// One repetition as a line of the journal, and back.
+[[nodiscard]] Json journal_line(const std::string& name, const Repetition& repetition);
+[[nodiscard]] std::optional<std::pair<std::string, Repetition>> parse_journal_line(const Json& line);
+
+}  // namespace arboretum

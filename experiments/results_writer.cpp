@@ -1,0 +1,77 @@
+#include "experiments/results_writer.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace arboretum {
+namespace {
+
+std::string csv_field(const Json& value) {
+  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+/// Nested objects become columns of their own: phase_seconds.collapse.
+Json flattened(const Json& entry) {
+  Json flat = Json::object();
+  for (const auto& [key, value] : entry.items()) {
+    if (!value.is_object()) flat[key] = value;
+    else
+      for (const auto& [inner, number] : value.items()) flat[key + "." + inner] = number;
+  }
+  return flat;
+}
+
+}  // namespace
+
+std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context) {
+  context["cells"] = outcome.results.size();
+  context["excluded_cells"] = plan.excluded;
+  context["filtered_cells"] = plan.filtered;
+  context["skipped_cells"] = plan.skipped.size() + outcome.failed.size();
+  if (!outcome.warnings.empty()) context["warnings"] = outcome.warnings;
+  Json document = Json::object();
+  document["context"] = std::move(context);
+  Json& benchmarks = document["benchmarks"] = Json::array();
+  for (std::size_t i = 0; i < outcome.results.size(); ++i) {
+    const CellResult& result = outcome.results[i];
+    const auto add = [&](Json entry) {
+      entry["family_index"] = i, entry["per_family_instance_index"] = 0;
+      benchmarks.push_back(std::move(entry));
+    };
+    for (const Repetition& repetition : result.repetitions) add(repetition_entry(result, repetition));
+    for (Json& entry : aggregate_entries(result)) add(std::move(entry));
+  }
+  Json& skipped = document["skipped"] = Json::array();
+  for (const auto* list : {&plan.skipped, &outcome.failed})
+    for (const SkippedCell& cell : *list) skipped.push_back({{"name", cell.name}, {"reason", cell.reason}});
+  return document.dump(1) + "\n";
+}
+
+std::string results_csv(const RunOutcome& outcome) {
+  std::vector<Json> rows;
+  std::vector<std::string> columns;
+  for (const CellResult& result : outcome.results) {
+    for (const Repetition& repetition : result.repetitions) {
+      rows.push_back(flattened(repetition_entry(result, repetition)));
+      for (const auto& [key, value] : rows.back().items())
+        if (std::ranges::find(columns, key) == columns.end()) columns.push_back(key);
+    }
+  }
+  std::string text;
+  for (std::size_t i = 0; i < columns.size(); ++i) text += (i ? "," : "") + columns[i];
+  text += "\n";
+  for (const Json& row : rows) {
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      if (i) text += ",";
+      if (const auto value = row.find(columns[i]); value != row.end()) text += csv_field(*value);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace arboretum

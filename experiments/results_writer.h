@@ -1,0 +1,16 @@
+// results.json, readable by Google Benchmark's compare.py, and results.csv, one row a repetition.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "experiments/runner.h"
+
+namespace arboretum {
+
+/// `context`, `benchmarks` (every cell's repetitions, then its aggregates) and `skipped` (name and reason).
+[[nodiscard]] std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context);
+/// One row a repetition; empty where a figure does not apply.
+[[nodiscard]] std::string results_csv(const RunOutcome& outcome);
+
+}  // namespace arboretum

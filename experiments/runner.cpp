@@ -1,0 +1,238 @@
+#include "experiments/runner.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <new>
+#include <thread>
+
+#include "core/error.h"
+#include "experiments/build_job.h"
+#include "experiments/interleave.h"
+#include "experiments/progress.h"
+#include "experiments/sampling.h"
+#include "experiments/scene_data.h"
+#include "experiments/structure_pool.h"
+#include "experiments/trace_job.h"
+
+namespace arboretum {
+namespace {
+
+constexpr unsigned kFewestBuilds = 3;    // repetitions of a build cell at least
+constexpr std::size_t kPrepareUnits = 2; // making a cell ready takes about two repetitions
+
+class Runner {
+ public:
+  Runner(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal, const RunOptions& options)
+      : experiment_(experiment), plan_(plan), registry_(registry), journal_(journal), options_(options),
+        progress_(pending_cells(), pending_units()) {}
+
+  RunOutcome run() {
+    try {
+      for (std::size_t scene = 0; scene < experiment_.scenes.size() && !outcome_.stopped; ++scene) run_scene(scene);
+    } catch (const UserError& e) {
+      outcome_.error = e.what();
+    } catch (const std::bad_alloc&) {
+      outcome_.error = "out of memory; lower `measure: memory`, the resolution or the number of triangles";
+    }
+    for (const Cell& cell : plan_.cells) {
+      const std::string name = cell.name();
+      if (const auto old = journal_.done().find(name); old != journal_.done().end()) outcome_.results.push_back(old->second);
+      else if (const auto fresh = finished_.find(name); fresh != finished_.end()) outcome_.results.push_back(fresh->second);
+    }
+    return std::move(outcome_);
+  }
+
+ private:
+  /// A cell on its way: what is known of it and the repetitions so far.
+  struct Running {
+    CellResult result;
+    std::size_t wanted = 0;
+  };
+
+  unsigned repetitions(const Cell& cell) const {
+    const unsigned n = experiment_.measure.repetitions;
+    return cell.metric == Cell::Metric::build ? std::max(n, kFewestBuilds) : n;
+  }
+
+  bool pending(const Cell& cell) const { return !journal_.done().contains(cell.name()); }
+
+  std::size_t pending_cells() const {
+    return static_cast<std::size_t>(std::ranges::count_if(plan_.cells, [&](const Cell& c) { return pending(c); }));
+  }
+
+  std::size_t pending_units() const {
+    std::size_t units = 0;
+    for (const Cell& cell : plan_.cells)
+      if (pending(cell)) units += kPrepareUnits + repetitions(cell) - journal_.started(cell.name()).size();
+    return units;
+  }
+
+  void run_scene(std::size_t index) {
+    std::vector<const Cell*> builds, traces;
+    for (const Cell& cell : plan_.cells) {
+      if (cell.scene_index != index || !pending(cell)) continue;
+      (cell.metric == Cell::Metric::build ? builds : traces).push_back(&cell);
+    }
+    if (builds.empty() && traces.empty()) return;
+    SceneData data(experiment_.scenes[index], experiment_.measure, [this](const std::string& line) { progress_.note(line); });
+    StructurePool pool(data.mesh(), registry_, experiment_.metrics.quality);
+    if (!builds.empty()) run_builds(builds, data, pool);
+    run_traces(traces, data, pool);
+  }
+
+  /// Cells that share a structure stay together; as many structures are held at once as fit the memory.
+  void run_traces(const std::vector<const Cell*>& traces, SceneData& data, StructurePool& pool) {
+    std::vector<std::string> order;
+    std::map<std::string, std::vector<const Cell*>> by_structure;
+    for (const Cell* cell : traces) {
+      auto& cells = by_structure[pool.key(*cell)];
+      if (cells.empty()) order.push_back(pool.key(*cell));
+      cells.push_back(cell);
+    }
+    for (std::size_t next = 0; next < order.size() && !outcome_.stopped;) {
+      std::vector<const Cell*> batch;
+      do {
+        const auto& cells = by_structure[order[next++]];
+        if (try_for(cells, [&] { (void)pool.get(*cells.front()); })) batch.insert(batch.end(), cells.begin(), cells.end());
+      } while (next < order.size() &&
+               pool.held_bytes() + pool.expected_bytes(*by_structure[order[next]].front()) <= experiment_.measure.memory);
+      run_batch(batch, data, pool);
+    }
+  }
+
+  /// All cells of a batch, one workload after the other; a structure is freed when its last cell has ended.
+  void run_batch(const std::vector<const Cell*>& batch, SceneData& data, StructurePool& pool) {
+    std::vector<std::string> workloads;
+    std::map<std::string, std::size_t> users;
+    for (const Cell* cell : batch) {
+      ++users[pool.key(*cell)];
+      if (std::ranges::find(workloads, cell->workload) == workloads.end()) workloads.push_back(cell->workload);
+    }
+    for (const std::string& name : workloads) {
+      std::vector<const Cell*> cells;
+      std::ranges::copy_if(batch, std::back_inserter(cells), [&](const Cell* c) { return c->workload == name; });
+      if (!outcome_.stopped) trace_workload(cells, data, pool);
+      for (const Cell* cell : cells)
+        if (--users[pool.key(*cell)] == 0) pool.release(pool.key(*cell));
+    }
+  }
+
+  void trace_workload(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {
+    const Workload& workload = data.workload(cells.front()->workload);
+    if (workload.rays.empty()) {
+      for (const Cell* cell : cells) fail(*cell, fmt::format("no {} rays: no primary ray hits the scene", workload.name));
+      return;
+    }
+    AnswerBuffers buffers;
+    std::deque<TraceJob> jobs;
+    std::vector<InterleavedJob> interleaved;
+    for (const Cell* cell : cells) {
+      const Accel& accel = pool.get(*cell);
+      TraceJob& job = jobs.emplace_back(*cell, accel, workload, buffers);
+      Running& running = begin(*cell);
+      running.result.facts.update(pool.facts(*cell, accel));
+      job.prepare(running.result.facts, experiment_.metrics.accuracy ? &data : nullptr, experiment_.measure);
+      interleaved.push_back(interleaved_job(running, job.passes(), [&job](TimedLoop& loop) { return job.measure(loop); }));
+      if (options_.fail_fast && running.result.fact("wrong_answers") > 0) {
+        outcome_.stopped = true;
+        break;
+      }
+    }
+    run_interleaved(std::move(interleaved));
+  }
+
+  void run_builds(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {
+    std::deque<BuildJob> jobs;
+    std::vector<InterleavedJob> interleaved;
+    for (const Cell* cell : cells) {
+      BuildJob& job = jobs.emplace_back(*cell, data.mesh(), registry_);
+      Json facts = Json::object();
+      if (!try_for({cell}, [&] { job.prepare(facts, pool, experiment_.measure); })) continue;
+      Running& running = begin(*cell);
+      running.result.facts.update(facts);
+      interleaved.push_back(interleaved_job(running, job.builds(), [&job](TimedLoop& loop) { return job.measure(loop); }));
+    }
+    run_interleaved(std::move(interleaved));
+  }
+
+  Running& begin(const Cell& cell) {
+    const std::string name = cell.name();
+    Running& running = running_[name];
+    running.result = {.cell = cell, .repetitions = journal_.started(name), .facts = Json::object()};
+    running.wanted = repetitions(cell);
+    std::erase_if(running.result.repetitions, [&](const Repetition& r) { return r.index >= running.wanted; });
+    progress_.step(name, kPrepareUnits);
+    return running;
+  }
+
+  InterleavedJob interleaved_job(Running& running, std::uint64_t iterations, std::function<Repetition(TimedLoop&)> measure) {
+    InterleavedJob job{.name = running.result.cell.name(), .indices = {}, .iterations = iterations, .measure = std::move(measure), .ended = {}};
+    for (unsigned i = 0; i < running.wanted; ++i)
+      if (std::ranges::find(running.result.repetitions, i, &Repetition::index) == running.result.repetitions.end()) job.indices.push_back(i);
+    job.ended = [this, &running, name = job.name](const Repetition& repetition) {
+      journal_.add(name, repetition);
+      running.result.repetitions.push_back(repetition);
+      progress_.step(name, 1);
+      if (running.result.repetitions.size() == running.wanted) finish(running);
+    };
+    if (job.indices.empty()) finish(running);  // killed between the last repetition and the cell's line
+    return job;
+  }
+
+  void finish(Running& running) {
+    CellResult& result = running.result;
+    std::ranges::sort(result.repetitions, {}, &Repetition::index);
+    journal_.finish(result);
+    const std::string name = result.cell.name();
+    const double rate = median(result.rates(false));
+    std::string outcome = fmt::format("{:.1f} {}", rate * 1e-6, result.is_trace() ? "Mray/s" : "Mtriangle/s");
+    if (result.has_fact("wrong_answers")) outcome += fmt::format(", {} wrong", result.facts["wrong_answers"].get<std::uint64_t>());
+    progress_.cell_done(name, outcome);
+    finished_.insert_or_assign(name, std::move(result));
+  }
+
+  /// Runs `work`; a UserError of it fails the cells and is no end of the run.
+  bool try_for(const std::vector<const Cell*>& cells, const std::function<void()>& work) {
+    try {
+      work();
+      return true;
+    } catch (const UserError& e) {
+      for (const Cell* cell : cells) fail(*cell, e.what());
+    } catch (const std::bad_alloc&) {
+      for (const Cell* cell : cells) fail(*cell, "not enough memory to build the structure");
+    }
+    if (options_.fail_fast) throw UserError(outcome_.failed.back().name + ": " + outcome_.failed.back().reason);
+    return false;
+  }
+
+  void fail(const Cell& cell, const std::string& reason) {
+    outcome_.failed.push_back({cell.name(), reason});
+    progress_.note(fmt::format("skipped {}: {}", cell.name(), reason));
+    progress_.step(cell.name(), kPrepareUnits + repetitions(cell));
+  }
+
+  const Experiment& experiment_;
+  const Plan& plan_;
+  const Registry& registry_;
+  Journal& journal_;
+  const RunOptions& options_;
+  Progress progress_;
+  RunOutcome outcome_;
+  std::map<std::string, Running> running_;
+  std::map<std::string, CellResult> finished_;
+};
+
+}  // namespace
+
+RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal, const RunOptions& options) {
+  unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+  for (const Cell& cell : plan.cells) threads = std::max(threads, cell.threads);
+  const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
+  return Runner(experiment, plan, registry, journal, options).run();
+}
+
+}  // namespace arboretum

@@ -1,0 +1,44 @@
+// StructurePool: the structures of one scene that cells share, built once and freed when the last cell has ended.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "experiments/registry.h"
+#include "experiments/result.h"
+#include "experiments/scene_data.h"
+
+namespace arboretum {
+
+/// Build settings of a cell.
+[[nodiscard]] BuildSettings settings_of(const Cell& cell);
+
+class StructurePool {
+ public:
+  /// `quality`: compute statistics (SAH, EPO, depths) of every structure.
+  StructurePool(const TriangleMesh& mesh, const Registry& registry, bool quality);
+
+  /// Cells with the same key trace the same structure: structure, builder, parameters, leaf, and ISA or threads where
+  /// the structure says that its build depends on them.
+  [[nodiscard]] std::string key(const Cell& cell) const;
+  /// Bytes that the cell's structure may take: as measured, else guessed from its triangles.
+  [[nodiscard]] std::size_t expected_bytes(const Cell& cell) const;
+  /// The structure, built at the first call with all threads of the machine (the tree is the same for any number).
+  [[nodiscard]] const Accel& get(const Cell& cell);
+  void release(const std::string& key) { held_.erase(key); }
+  [[nodiscard]] std::size_t held_bytes() const;
+  /// Triangles, bytes, bytes_per_triangle and, with quality, statistics of a structure with this key.
+  [[nodiscard]] const Json& facts(const Cell& cell, const Accel& accel);
+
+ private:
+  const TriangleMesh& mesh_;
+  const Registry& registry_;
+  bool quality_;
+  std::map<std::string, std::unique_ptr<Accel>> held_;
+  std::map<std::string, BuildReport> reports_;
+  std::map<std::string, Json> facts_;
+};
+
+}  // namespace arboretum

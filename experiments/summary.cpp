@@ -1,0 +1,195 @@
+#include "experiments/summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <thread>
+
+#include "experiments/sampling.h"
+
+namespace arboretum {
+namespace {
+
+using Row = std::vector<std::string>;
+
+/// Columns as wide as their widest cell; figures right-aligned from column `figures` on.
+std::string format_table(const std::vector<Row>& rows, std::size_t figures) {
+  std::vector<std::size_t> widths(rows.front().size());
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  std::string text;
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      line += i < figures ? fmt::format("{:<{}}  ", row[i], widths[i]) : fmt::format("{:>{}}  ", row[i], widths[i]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+/// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
+double ratio_rate(const CellResult& r) { return median(r.rates(r.cell.threads == 1)); }
+
+/// The fastest embree cell of the same scene, workload, ISA and threads.
+const CellResult* embree_beside(const CellResult& r, const std::vector<CellResult>& all) {
+  const CellResult* best = nullptr;
+  for (const CellResult& other : all) {
+    const Cell &a = r.cell, &b = other.cell;
+    if (b.structure != "embree" || !other.is_trace() || a.scene != b.scene || a.workload != b.workload || a.isa != b.isa ||
+        a.threads != b.threads) {
+      continue;
+    }
+    if (!best || ratio_rate(other) > ratio_rate(*best)) best = &other;
+  }
+  return best;
+}
+
+std::optional<double> build_milliseconds(const CellResult& r, const std::vector<CellResult>& all) {
+  for (const CellResult& other : all) {
+    const Cell &a = r.cell, &b = other.cell;
+    if (other.is_trace() || a.scene != b.scene || a.structure != b.structure || a.builder_name() != b.builder_name() ||
+        a.leaf != b.leaf || a.isa != b.isa || a.threads != b.threads) {
+      continue;
+    }
+    std::vector<double> seconds;
+    for (const Repetition& rep : other.repetitions) seconds.push_back(rep.wall_seconds / static_cast<double>(rep.iterations));
+    return median(seconds) * 1e3;
+  }
+  return std::nullopt;
+}
+
+std::string optional_figure(const CellResult& r, const char* fact, const char* format) {
+  return r.has_fact(fact) ? fmt::format(fmt::runtime(format), r.fact(fact)) : "-";
+}
+
+Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
+  const Cell& c = r.cell;
+  const Interval rate = bootstrap_median(r.rates(false));
+  const CellResult* embree = embree_beside(r, all);
+  const std::optional<double> build = build_milliseconds(r, all);
+  return {c.structure, c.builder_name(), c.leaf, c.intersector, c.box, c.traversal, std::string(to_string(c.isa)),
+          std::to_string(c.threads), fmt::format("{:.2f}", rate.median * 1e-6),
+          fmt::format("[{:.2f}, {:.2f}]", rate.low * 1e-6, rate.high * 1e-6),
+          embree ? fmt::format("{:.2f}", ratio_rate(r) / std::max(ratio_rate(*embree), 1e-9)) : "-",
+          r.has_fact("wrong_answers") ? fmt::format("{:.1f}", 1e6 * r.fact("wrong_answers") / std::max(r.fact("rays"), 1.0)) : "unchecked",
+          optional_figure(r, "sah_cost", "{:.1f}"), build ? fmt::format("{:.1f}", *build) : "-"};
+}
+
+std::string build_table(const std::vector<CellResult>& all) {
+  std::vector<Row> rows{{"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %", "Mtri/s", "bytes/tri", "SAH"}};
+  for (const CellResult& r : all) {
+    if (r.is_trace()) continue;
+    std::vector<double> ms;
+    for (const Repetition& rep : r.repetitions) ms.push_back(1e3 * rep.wall_seconds / static_cast<double>(rep.iterations));
+    const Interval time = bootstrap_median(ms);
+    const Cell& c = r.cell;
+    rows.push_back({c.scene, c.structure, c.builder_name(), c.leaf, std::string(to_string(c.isa)), std::to_string(c.threads),
+                    fmt::format("{:.2f}", time.median), fmt::format("[{:.2f}, {:.2f}]", time.low, time.high),
+                    fmt::format("{:.2f}", median(r.rates(false)) * 1e-6), optional_figure(r, "bytes_per_triangle", "{:.0f}"),
+                    optional_figure(r, "sah_cost", "{:.1f}")});
+  }
+  return rows.size() == 1 ? "" : "\nbuilds\n" + format_table(rows, 6);
+}
+
+double relative_spread(const CellResult& r) {
+  const std::vector<double> rates = r.rates(r.cell.threads == 1);
+  const double centre = median(rates);
+  if (rates.size() < 3 || centre <= 0.0) return 0.0;
+  std::vector<double> deviations;
+  for (double v : rates) deviations.push_back(std::abs(v - centre));
+  return 1.4826 * median(deviations) / centre;  // comparable to a standard deviation, blind to single outliers
+}
+
+}  // namespace
+
+std::string result_tables(const RunOutcome& outcome) {
+  std::vector<std::pair<std::string, std::vector<const CellResult*>>> groups;
+  for (const CellResult& r : outcome.results) {
+    if (!r.is_trace()) continue;
+    const std::string title = r.cell.scene + ", " + r.cell.workload;
+    auto group = std::ranges::find(groups, title, &std::pair<std::string, std::vector<const CellResult*>>::first);
+    if (group == groups.end()) group = groups.insert(groups.end(), {title, {}});
+    group->second.push_back(&r);
+  }
+  std::string text;
+  for (const auto& [title, results] : groups) {
+    std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads", "Mray/s",
+                           "95 %", "x embree", "wrong/1e6", "SAH", "build ms"}};
+    for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results));
+    const CellResult& first = *results.front();
+    text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"), first.fact("triangles"), format_table(rows, 8));
+  }
+  if (!groups.empty()) {
+    text += "\nMray/s: median of wall time with its 95 % bootstrap interval. x embree: against the fastest embree cell of the same ISA"
+            " and threads, by CPU time with one thread.\n";
+  }
+  return groups.empty() ? build_table(outcome.results) : text;
+}
+
+std::string skipped_lines(const Plan& plan, const RunOutcome& outcome) {
+  std::vector<SkippedCell> all = plan.skipped;
+  all.insert(all.end(), outcome.failed.begin(), outcome.failed.end());
+  if (all.empty()) return {};
+  std::string text = fmt::format("{} combinations skipped:\n", all.size());
+  for (const auto& [reason, count] : group_reasons(all)) text += fmt::format("  {:5}  {}\n", count, reason);
+  return text;
+}
+
+std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan& plan) {
+  constexpr double kWide = 0.05;
+  std::vector<std::string> warnings;
+  std::size_t noisy = 0;
+  const CellResult* worst = nullptr;
+  for (const CellResult& r : outcome.results) {
+    if (relative_spread(r) <= kWide) continue;
+    ++noisy;
+    if (!worst || relative_spread(r) > relative_spread(*worst)) worst = &r;
+  }
+  if (worst) {
+    warnings.push_back(fmt::format("noisy machine: the repetitions of {} of {} cells spread by more than {:.0f} % (most: {:.0f} % in {}); raise min_time or repetitions, or free the machine",
+                                   noisy, outcome.results.size(), kWide * 100, relative_spread(*worst) * 100, worst->cell.name()));
+  }
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  for (const Cell& cell : plan.cells) {
+    if (cell.threads <= cores) continue;
+    warnings.push_back(fmt::format("some cells have more threads than the machine's {} cores", cores));
+    break;
+  }
+  std::set<std::string> lacking;
+  for (const SkippedCell& cell : plan.skipped)
+    for (Isa isa : kAllIsas)
+      if (cell.reason == fmt::format("no {}", to_string(isa))) lacking.insert(std::string(to_string(isa)));
+  for (const std::string& isa : lacking) warnings.push_back(fmt::format("this machine (or ARBORETUM_ISA) has no {}: its cells are skipped", isa));
+  return warnings;
+}
+
+std::pair<ExitStatus, std::string> verdict(const RunOutcome& outcome) {
+  if (outcome.results.empty()) return {ExitStatus::kNothingMeasured, "nothing was measured"};
+  const CellResult* worst = nullptr;
+  std::size_t wrong = 0, checked = 0;
+  std::map<std::string, std::size_t> by_test;
+  for (const CellResult& r : outcome.results) {
+    if (!r.has_fact("wrong_answers")) continue;
+    ++checked;
+    if (r.fact("wrong_answers") == 0.0) continue;
+    ++wrong;
+    ++by_test[r.cell.intersector + "+" + r.cell.box];
+    if (!worst || r.fact("wrong_answers") / r.fact("rays") > worst->fact("wrong_answers") / worst->fact("rays")) worst = &r;
+  }
+  if (wrong == 0) {
+    if (checked == 0) return {ExitStatus::kDone, fmt::format("{} cells measured; answers were not checked", outcome.results.size())};
+    return {ExitStatus::kDone, fmt::format("{} cells measured, all answers right", outcome.results.size())};
+  }
+  std::vector<std::string> tests;
+  for (const auto& [test, count] : by_test) tests.push_back(fmt::format("{} {}", count, test));
+  return {ExitStatus::kWrongAnswers,
+          fmt::format("wrong answers in {} of {} checked cells ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1", wrong,
+                      checked, fmt::join(tests, ", "), worst->fact("wrong_answers"), worst->fact("rays"), worst->cell.name())};
+}
+
+}  // namespace arboretum

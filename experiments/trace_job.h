@@ -1,0 +1,45 @@
+// TraceJob: one trace cell made ready to be timed: its answers are known and checked, its work is counted, and the number
+// of passes that fill a repetition is set.
+#pragma once
+
+#include <tbb/task_arena.h>
+
+#include <vector>
+
+#include "experiments/interleave.h"
+#include "experiments/result.h"
+#include "experiments/scene_data.h"
+
+namespace arboretum {
+
+/// Where answers go; one for all jobs, since repetitions do not overlap.
+struct AnswerBuffers {
+  std::vector<Hit> hits;
+  std::vector<std::uint8_t> occluded;
+};
+
+class TraceJob {
+ public:
+  /// Nothing is traced yet. All arguments must outlive the job.
+  TraceJob(const Cell& cell, const Accel& accel, const Workload& workload, AnswerBuffers& buffers);
+
+  /// Traces all rays once and adds `rays`, `hits` and, with `data`, the check against the exact answers to the facts;
+  /// counts the work with the counting kernel; then warms up and finds how many passes take `min_time` seconds.
+  void prepare(Json& facts, SceneData* data, const MeasureSettings& measure);
+  [[nodiscard]] std::uint64_t passes() const noexcept { return passes_; }
+  /// One repetition: wall time, and CPU time of the thread (of the process where the cell has several).
+  [[nodiscard]] Repetition measure(TimedLoop& loop) const;
+
+ private:
+  void trace(std::size_t rays) const;
+  [[nodiscard]] Counters count() const;
+
+  const Cell& cell_;
+  const Accel& accel_;
+  const Workload& workload_;
+  AnswerBuffers& buffers_;
+  mutable tbb::task_arena arena_;
+  std::uint64_t passes_ = 1;
+};
+
+}  // namespace arboretum

@@ -1,0 +1,150 @@
+#include "experiments/yaml_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <system_error>
+
+#include "core/error.h"
+#include "core/names.h"
+
+namespace arboretum {
+namespace {
+
+std::string read_text(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(status)) {
+    throw UserError(fmt::format("{}: no such file; name a configuration, as in configs/quick.yaml", file.string()));
+  }
+  if (std::filesystem::is_directory(status)) {
+    throw UserError(fmt::format("{}: is a folder; name the YAML file in it", file.string()));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw UserError(fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// A tab outside a comment is refused: YAML forbids it as indentation, and yaml-cpp reads some as something else.
+void refuse_tabs(const std::string& text, const std::filesystem::path& file) {
+  std::size_t line = 1;
+  bool comment = false;
+  char before = '\n';
+  for (char c : text) {
+    if (c == '\n') ++line, comment = false;
+    else if (c == '#' && (before == ' ' || before == '\n' || before == '\t')) comment = true;
+    else if (c == '\t' && !comment) {
+      throw UserError(fmt::format("{}:{}: a tab; YAML is indented with spaces: put spaces in its place", file.string(), line));
+    }
+    before = c;
+  }
+}
+
+std::string shown(const YAML::Node& node) {
+  if (node.IsScalar()) return "'" + node.Scalar() + "'";
+  return node.IsSequence() ? "a list" : node.IsMap() ? "a map" : "nothing";
+}
+
+}  // namespace
+
+YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
+  const std::string text = read_text(file_);
+  refuse_tabs(text, file_);
+  if (text.find('\0') != std::string::npos) {
+    throw UserError(fmt::format("{}: holds zero bytes, so it is no YAML text", file_.string()));
+  }
+  try {
+    root_ = YAML::Load(text);
+  } catch (const YAML::Exception& e) {
+    throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it", file_.string(),
+                                e.mark.line + 1, e.msg));
+  }
+  if (!root_ || root_.IsNull()) throw UserError(fmt::format("{}: empty; a configuration has at least `scenes`", file_.string()));
+}
+
+std::string YamlReader::where(const YAML::Node& node) const {
+  const int line = node.Mark().line;
+  return line < 0 ? file_.string() : fmt::format("{}:{}", file_.string(), line + 1);
+}
+
+void YamlReader::fail(const YAML::Node& node, const std::string& message) const {
+  throw UserError(where(node) + ": " + message);
+}
+
+void YamlReader::check_map(const YAML::Node& node, std::string_view what, std::span<const std::string> keys) const {
+  if (!node.IsMap()) fail(node, fmt::format("{} must be a map of {}, not {}", what, fmt::join(keys, ", "), shown(node)));
+  std::set<std::string> seen;
+  for (const auto& entry : node) {
+    if (!entry.first.IsScalar()) fail(entry.first, fmt::format("{}: a key must be a word, not {}", what, shown(entry.first)));
+    const std::string key = entry.first.Scalar();
+    if (std::ranges::find(keys, key) == keys.end()) fail(entry.first, unknown_name_message(fmt::format("key in {}", what), key, keys));
+    if (!seen.insert(key).second) fail(entry.first, fmt::format("{}: '{}' is given twice; keep one", what, key));
+    if (entry.second.IsNull()) fail(entry.first, fmt::format("'{}' has no value; give one or take the line out", key));
+  }
+}
+
+std::string YamlReader::text(const YAML::Node& node, std::string_view what) const {
+  if (!node.IsScalar() || node.Scalar().empty()) fail(node, fmt::format("{} must be a word, not {}", what, shown(node)));
+  return node.Scalar();
+}
+
+std::uint64_t YamlReader::integer(const YAML::Node& node, std::string_view what, std::uint64_t low, std::uint64_t high) const {
+  std::uint64_t value = 0;
+  const std::string s = node.IsScalar() ? node.Scalar() : "";
+  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
+  if (s.empty() || error != std::errc{} || end != s.data() + s.size() || value < low || value > high) {
+    fail(node, fmt::format("{} must be an integer from {} to {}, not {}", what, low, high, shown(node)));
+  }
+  return value;
+}
+
+double YamlReader::number(const YAML::Node& node, std::string_view what, double low, double high) const {
+  double value = 0;
+  const std::string s = node.IsScalar() ? node.Scalar() : "";
+  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
+  if (s.empty() || error != std::errc{} || end != s.data() + s.size() || !(value >= low && value <= high)) {
+    fail(node, fmt::format("{} must be a number from {} to {}, not {}", what, low, high, shown(node)));
+  }
+  return value;
+}
+
+std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, std::string_view what) const {
+  std::vector<YAML::Node> values;
+  if (node.IsScalar()) {
+    values.push_back(node);
+  } else if (node.IsSequence()) {
+    for (const YAML::Node& value : node) values.push_back(value);
+  } else {
+    fail(node, fmt::format("{} must be a list, not {}", what, shown(node)));
+  }
+  if (values.empty()) fail(node, fmt::format("{} is empty; name at least one value or take the line out", what));
+  std::set<std::string> seen;
+  for (const YAML::Node& value : values) {
+    if (!value.IsScalar() || value.Scalar().empty()) fail(value, fmt::format("{}: a value must be a word, not {}", what, shown(value)));
+    if (!seen.insert(value.Scalar()).second) fail(value, fmt::format("{}: '{}' is given twice; keep one", what, value.Scalar()));
+  }
+  return values;
+}
+
+std::size_t YamlReader::bytes(const YAML::Node& node, std::string_view what) const {
+  constexpr std::pair<std::string_view, int> kUnits[] = {{"", 0}, {"B", 0}, {"KiB", 10}, {"MiB", 20}, {"GiB", 30}, {"TiB", 40}};
+  const std::string s = node.IsScalar() ? node.Scalar() : "";
+  double value = 0;
+  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
+  std::string_view unit(end, static_cast<std::size_t>(s.data() + s.size() - end));
+  while (unit.starts_with(' ')) unit.remove_prefix(1);
+  for (const auto& [name, shift] : kUnits) {
+    if (s.empty() || error != std::errc{} || unit != name) continue;
+    const double total = value * static_cast<double>(std::size_t{1} << shift);
+    if (total >= 1.0 && total < 0x1p60) return static_cast<std::size_t>(total);
+  }
+  fail(node, fmt::format("{} must be a size above zero such as 8GiB or 512MiB, not {}", what, shown(node)));
+}
+
+}  // namespace arboretum

@@ -1,0 +1,258 @@
+#!/usr/bin/env python3
+"""The command line from outside: test_cli.py ARBORETUM. Exit statuses, one-line errors, kill and resume, full disks."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+ARBORETUM = sys.argv.pop(1)
+
+CONFIG = """\
+experiment: small
+scenes: [{generate: sphere_flake, triangles: 2000}]
+axes:
+  structure: [bvh2, bvh4]
+  intersector: [moller_trumbore, watertight]
+  isa: [scalar, sse]
+  workload: [primary, diffuse]
+measure: {repetitions: 3, min_time: 0.001, resolution: [48, 48]}
+"""
+CUBE = """\
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 1 2 3\nf 1 3 4\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 3 4 8\nf 3 8 7\n"""
+
+
+def read_jsonl(path):
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+class CommandLine(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.folder = Path(self.temporary.name)
+        self.config = self.write("small.yaml", CONFIG)
+
+    def tearDown(self):
+        self.temporary.cleanup()
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text)
+        return path
+
+    def call(self, *words, **options):
+        return subprocess.run([ARBORETUM, *map(str, words)], capture_output=True, text=True, cwd=self.folder, timeout=300, **options)
+
+    def run_small(self, *words, **options):
+        return self.call("run", self.config, "--no-plots", *words, **options)
+
+    def assert_error(self, result, *parts, status=2):
+        """One line on stderr beginning with `arboretum: ` and the status."""
+        self.assertEqual(result.returncode, status, result.stderr)
+        lines = [line for line in result.stderr.splitlines() if line.startswith("arboretum: ")]
+        self.assertEqual(len(lines), 1, result.stderr)
+        self.assertEqual(result.stderr.splitlines()[-1], lines[0])
+        for part in parts:
+            self.assertIn(part, lines[0])
+
+    def cells(self, *words):
+        return self.run_small("--list", *words).stdout.splitlines()
+
+    def test_usage_errors_name_the_nearest_word(self):
+        cases = [
+            ((), "no command"),
+            (("rum",), "did you mean 'run'"),
+            (("run",), "CONFIG is required"),
+            (("run", "nowhere.yaml"), "nowhere.yaml: no such file"),
+            (("run", self.config, "--resum"), "did you mean '--resume'"),
+            (("run", self.config, "--repetitions", "0"), "--repetitions"),
+            (("run", self.config, "--repetitions", "many"), "--repetitions"),
+            (("run", self.config, "--threads", "-1"), "--threads"),
+            (("run", self.config, "iza=sse"), "did you mean 'isa'"),
+            (("run", self.config, "isa=ssse"), "did you mean 'sse'"),
+            (("run", self.config, "isa="), "empty"),
+            (("run", self.config, "--filter", "("), "regular expression"),
+            (("run", self.config, "--benchmark_nonsense=1"), "--benchmark_nonsense"),
+            (("list", "structurs"), "did you mean 'structures'"),
+            (("info", "bunni"), "bunny"),
+            (("plot", "nowhere"), "no such folder"),
+            (("fetch", "dragoon"), "dragon"),
+        ]
+        for words, part in cases:
+            with self.subTest(words=words):
+                result = self.call(*words)
+                self.assert_error(result, part)
+                self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+
+    def test_bad_configurations_name_file_and_line(self):
+        cases = [
+            ("", "empty"),
+            ("scenes:\n\t- bunny\n", "bad.yaml:2: a tab"),
+            (CONFIG.replace("axes:", "axis:"), "bad.yaml:3: "),
+            (CONFIG.replace("isa:", "iza:"), "did you mean 'isa'"),
+            (CONFIG.replace("bvh2", "bhv2"), "bad.yaml:4: unknown structure 'bhv2'; did you mean 'bvh2'"),
+            (CONFIG.replace("[scalar, sse]", "[]"), "bad.yaml:6: "),
+            (CONFIG.replace("[48, 48]", "[0, 48]"), "bad.yaml:8: resolution"),
+            (CONFIG.replace("repetitions: 3", "repetitions: -3"), "bad.yaml:8: repetitions"),
+            (CONFIG.replace("generate: sphere_flake, triangles: 2000", "file: none.obj"), "bad.yaml:2: "),
+        ]
+        for text, part in cases:
+            with self.subTest(part=part):
+                self.assert_error(self.call("run", self.write("bad.yaml", text), "--no-plots"), "bad.yaml", part)
+
+    def test_bad_scenes(self):
+        config = "scenes: [{file: model.obj}]\naxes: {structure: bvh4, isa: scalar}\nmeasure: {resolution: [16, 16], min_time: 0.001}\n"
+        path = self.write("scene.yaml", config)
+        cases = [("", "model.obj"), (CUBE + "f 1 2 99\n", "model.obj"), ("not an obj file\n", "model.obj")]
+        for text, part in cases:
+            with self.subTest(text=text[-20:]):
+                self.write("model.obj", text)
+                self.assert_error(self.call("run", path, "--no-plots"), part)
+        self.write("model.obj", CUBE + "v nan 0 0\nf 1 2 9\n")
+        result = self.call("run", path, "--no-plots")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("dropped 1 triangles with NaN", result.stderr)
+
+    def test_a_run_leaves_what_the_contract_says(self):
+        result = self.run_small()
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        self.assertIn("x embree", result.stdout)
+        out = self.folder / "results" / "small"
+        wanted = self.cells()
+        document = json.loads((out / "results.json").read_text())
+        rows = [b for b in document["benchmarks"] if b["run_type"] == "iteration"]
+        self.assertEqual(sorted({b["run_name"] for b in rows}), sorted(wanted))
+        self.assertEqual(sorted(cell["name"] for cell in read_jsonl(out / "cells.jsonl")), sorted(wanted))
+        for row in rows:
+            self.assertGreater(row["real_time"], 0)
+            if row["metric"] == "trace":
+                self.assertGreater(row["rays_per_second"], 0)
+                self.assertEqual(row["wrong_answers"], row["missed_hits"] + row["false_hits"] + row["wrong_surface"])
+                if row["intersector"] == "watertight":
+                    self.assertEqual(row["box"], "padded")
+                    self.assertEqual(row["cracks"], 0)
+            else:
+                self.assertGreater(row["build_seconds"], 0)
+        for key in ("cpu", "isa", "compiler", "git_revision", "git_dirty", "configuration_hash", "seed", "date", "memory_bytes"):
+            self.assertIn(key, document["context"])
+        wrong = any(row.get("wrong_answers") for row in rows)
+        self.assertEqual(result.returncode, 1 if wrong else 0)
+        self.assertEqual(len((out / "results.csv").read_text().splitlines()), len(rows) + 1)
+        again = self.call("run", out / "effective.yaml", "--list")
+        self.assertEqual(again.stdout.splitlines(), wanted)
+
+    def test_listing_filtering_and_overriding(self):
+        every = self.cells()
+        self.assertEqual(len(every), len(set(every)))
+        self.assertTrue(all(name.count("/") == 10 for name in every))
+        self.assertEqual(self.cells("--filter", "bvh4.*sse"), [n for n in every if "bvh4" in n and "/sse/" in n])
+        self.assertEqual(self.cells("--skip", "^build"), [n for n in every if n.startswith("trace")])
+        self.assertTrue(all("/scalar/" in n for n in self.cells("isa=scalar")))
+        dry = self.run_small("--dry-run")
+        self.assertIn(f"{len(every)} cells", dry.stdout)
+        self.assertFalse((self.folder / "results").exists())
+        nothing = self.run_small("--filter", "nothing-has-this-name")
+        self.assert_error(nothing, "nothing to measure", status=4)
+
+    def test_an_isa_that_is_lacking_is_skipped_by_name(self):
+        result = self.run_small("isa=scalar,sse", "workload=primary", env={**os.environ, "ARBORETUM_ISA": "scalar"})
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        self.assertIn("no sse", result.stdout)
+        skipped = json.loads((self.folder / "results/small/results.json").read_text())["skipped"]
+        self.assertEqual({cell["reason"] for cell in skipped}, {"no sse"})
+
+    def test_a_killed_run_resumes_to_the_same_cells(self):
+        slow = ("--repetitions", "8", "--out", "out")
+        whole = sorted(self.cells("--repetitions", "8"))
+        process = subprocess.Popen([ARBORETUM, "run", self.config, "--no-plots", *slow, "--benchmark_min_time=0.02"],
+                                   cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        journal = self.folder / "out" / "repetitions.jsonl"
+        for _ in range(3000):
+            if journal.exists() and journal.read_bytes().count(b"\n") >= 100:
+                break
+            time.sleep(0.01)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        self.assertEqual(process.returncode, -signal.SIGKILL, "the run ended before it could be killed")
+        before = journal.read_text().splitlines()
+        done_before = (self.folder / "out/cells.jsonl").read_text().splitlines()
+        with journal.open("a") as torn:
+            torn.write('{"name": "torn')
+        with (self.folder / "out/cells.jsonl").open("a") as torn:
+            torn.write('{"name": "torn')
+
+        self.assert_error(self.run_small("--out", "out", "--resume"), "another configuration")
+        result = self.run_small(*slow, "--benchmark_min_time=0.02", "--resume")
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        cells = read_jsonl(self.folder / "out/cells.jsonl")
+        self.assertEqual(sorted(c["name"] for c in cells), whole)
+        self.assertTrue(all(len(c["repetitions"]) == 8 for c in cells))
+        self.assertEqual([json.loads(line) for line in done_before], cells[:len(done_before)])
+        times = {(c["name"], r["repetition_index"]): r["wall_seconds"] for c in cells for r in c["repetitions"]}
+        for line in map(json.loads, before):  # nothing was measured twice
+            self.assertEqual(times[line["name"], line["repetition_index"]], line["wall_seconds"])
+
+        result = self.run_small(*slow, "--benchmark_min_time=0.02", "--resume")
+        self.assertIn(result.returncode, (0, 1))
+        self.assertIn(f"({len(whole)} done before)", result.stderr)
+
+    def test_output_that_cannot_be_written(self):
+        self.write("file", "")
+        self.assert_error(self.run_small("--out", self.folder / "file" / "below"), "output folder")
+        self.assert_error(self.run_small("--out", self.folder / "file"), "a file of that name")
+        self.assert_error(self.run_small("--out", "/proc/arboretum"), "/proc/arboretum")
+        with open("/dev/full", "w") as full:
+            result = subprocess.run([ARBORETUM, "list"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        self.assert_error(result, "output cannot be written")
+
+    def test_a_full_disk_keeps_what_was_measured(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (12000, 12000))
+
+        result = self.run_small("--out", "out", preexec_fn=limit)
+        self.assert_error(result, "cannot be written", "--resume")
+        lines = (self.folder / "out/repetitions.jsonl").read_text().splitlines()
+        self.assertGreater(len(lines), 10)
+        for line in lines:
+            json.loads(line)
+        result = self.run_small("--out", "out", "--resume")
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        cells = [cell["name"] for cell in read_jsonl(self.folder / "out/cells.jsonl")]
+        self.assertEqual(sorted(cells), sorted(self.cells()))
+
+        (self.folder / "full").mkdir()
+        (self.folder / "full/cells.jsonl").symlink_to("/dev/full")
+        self.assert_error(self.run_small("--out", "full"), "No space left")
+
+    def test_lists(self):
+        listed = json.loads(self.call("list", "--json").stdout)
+        for title in ("structures", "builders", "leaves", "intersectors", "boxes", "traversals", "isas", "workloads", "scenes"):
+            self.assertTrue(listed[title], title)
+            for entry in listed[title]:
+                self.assertTrue(entry["summary"], f"{title}: {entry['name']} has no summary")
+        self.assertEqual(json.loads(self.call("list", "structures", "--json").stdout), listed["structures"])
+        self.assertIn("bvh8", self.call("list", "structures").stdout)
+
+    def test_info(self):
+        info = json.loads(self.call("info", "sphere_flake:2000", "--json").stdout)
+        self.assertGreater(info["triangles"], 1000)
+        self.assertIn("triangles", self.call("info", "sphere_flake:2000").stdout)
+
+    def test_fail_fast_stops_at_the_first_wrong_answer(self):
+        result = self.run_small("--fail-fast", "--skip", "^build")
+        if result.returncode == 0:
+            self.skipTest("no cell has a wrong answer here")
+        document = json.loads((self.folder / "results/small/results.json").read_text())
+        names = {b["run_name"] for b in document["benchmarks"] if b["run_type"] == "iteration" and b["wrong_answers"]}
+        self.assertEqual(len(names), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()

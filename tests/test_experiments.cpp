@@ -1,0 +1,438 @@
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "core/error.h"
+#include "experiments/append_file.h"
+#include "experiments/benchmark_flags.h"
+#include "experiments/config.h"
+#include "experiments/effective.h"
+#include "experiments/interleave.h"
+#include "experiments/journal.h"
+#include "experiments/plan.h"
+#include "experiments/results_writer.h"
+#include "experiments/runner.h"
+#include "experiments/sampling.h"
+#include "experiments/summary.h"
+#include "tests/catch.h"
+
+using namespace arboretum;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder that goes away with the test.
+struct TemporaryFolder {
+  fs::path path = fs::temp_directory_path() / ("arboretum-test-" + std::to_string(::getpid()));
+  TemporaryFolder() { fs::remove_all(path), fs::create_directories(path); }
+  ~TemporaryFolder() { fs::remove_all(path); }
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(path / name, std::ios::binary) << text;
+    return path / name;
+  }
+};
+
+// Two structures and a handful of kernels that exist on paper alone: what a plan needs.
+const StructureEntry kStructures[] = {
+    {{.name = "tree", .summary = "a tree", .builders = {"binned_sah", "morton"}, .leaves = {"triangle4", "triangle8"}}, nullptr},
+    {{.name = "list", .summary = "a list", .builders = {"none"}, .leaves = {"triangle4"}, .uses_parameters = false}, nullptr},
+};
+
+std::vector<KernelRow> paper_kernels() {
+  std::vector<KernelRow> rows;
+  for (Isa isa : kAllIsas) {
+    for (std::string_view intersector : {"moller_trumbore", "watertight"})
+      for (std::string_view box : {"fast", "padded"})
+        for (std::string_view leaf : {"triangle4", "triangle8"})
+          for (std::string_view traversal : {"single", "packet4", "packet8", "packet16"})
+            rows.push_back({"tree", leaf, intersector, box, traversal, isa});
+    rows.push_back({"list", "triangle4", "moller_trumbore", "fast", "single", isa});
+  }
+  return rows;
+}
+
+Registry paper_registry(std::vector<Isa> isas = {Isa::scalar, Isa::sse, Isa::avx2}) {
+  static const std::vector<KernelRow> rows = paper_kernels();
+  Registry registry;
+  registry.structures = kStructures;
+  registry.kernels = rows;
+  registry.isas = std::move(isas);
+  registry.default_leaf = [](std::string_view structure, std::string_view, Isa isa) -> std::string_view {
+    return structure == "tree" && isa >= Isa::avx2 ? "triangle8" : "triangle4";
+  };
+  registry.why_no_kernel = [](std::string_view structure, auto, std::string_view intersector, auto, auto, Isa) {
+    return std::string(structure) + " has no " + std::string(intersector);
+  };
+  return registry;
+}
+
+std::string error_of(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const UserError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+std::vector<std::string> names(const Plan& plan, Cell::Metric metric) {
+  std::vector<std::string> list;
+  for (const Cell& cell : plan.cells)
+    if (cell.metric == metric) list.push_back(cell.name());
+  return list;
+}
+
+constexpr const char* kSmall = R"(
+scenes: [{generate: sphere, triangles: 500}]
+axes: {structure: [tree], isa: [sse], intersector: [moller_trumbore]}
+)";
+
+}  // namespace
+
+TEST_CASE("every fault of a configuration is one line with file, line and the nearest word") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  struct Case {
+    const char* yaml;
+    const char* line;      ///< "name.yaml:2" or ""
+    const char* expected;  ///< part of the message
+  };
+  const Case cases[] = {
+      {"", "", "empty"},
+      {"scenes:\n\t- bunny\n", ":2", "a tab"},
+      {"scenes: [bunny\n", "", "not valid YAML"},
+      {"scenes: [bunny]\naxis: {}\n", ":2", "did you mean 'axes'"},
+      {"axes: {structure: [tree]}\n", ":1", "no scenes"},
+      {"scenes: []\n", ":1", "scenes is empty"},
+      {"scenes: [buny]\n", ":1", "did you mean 'bunny'"},
+      {"scenes: [bunny, bunny]\n", ":1", "given twice"},
+      {"scenes: [{file: nowhere.obj}]\n", ":1", "is no file"},
+      {"scenes: [{generate: sphere_flak}]\n", ":1", "did you mean 'sphere_flake'"},
+      {"scenes: [{generate: sphere, triangles: 0}]\n", ":1", "triangles must be an integer"},
+      {"scenes: [{file: a.obj, generate: sphere}]\n", ":1", "exactly one of"},
+      {"scenes: [bunny]\naxes:\n  structur: [tree]\n", ":3", "did you mean 'structure'"},
+      {"scenes: [bunny]\naxes:\n  structure: [tre]\n", ":3", "did you mean 'tree'"},
+      {"scenes: [bunny]\naxes:\n  structure: []\n", ":3", "is empty"},
+      {"scenes: [bunny]\naxes:\n  structure:\n", ":3", "has no value"},
+      {"scenes: [bunny]\naxes:\n  structure: [tree, tree]\n", ":3", "given twice"},
+      {"scenes: [bunny]\naxes:\n  isa: [avx, avx2]\n", ":3", "given twice"},
+      {"scenes: [bunny]\naxes:\n  isa: [avx1024]\n", ":3", "did you mean"},
+      {"scenes: [bunny]\naxes:\n  workload: [difuse]\n", ":3", "did you mean 'diffuse'"},
+      {"scenes: [bunny]\naxes:\n  threads: [-1]\n", ":3", "threads must be an integer"},
+      {"scenes: [bunny]\naxes:\n  traversal: [hybrid]\n", ":3", "unknown traversal"},
+      {"scenes: [bunny]\nmeasure: {resolution: [0, 512]}\n", ":2", "resolution: width must be an integer from 1"},
+      {"scenes: [bunny]\nmeasure: {resolution: 512}\n", ":2", "[width, height]"},
+      {"scenes: [bunny]\nmeasure: {repetitions: -3}\n", ":2", "repetitions must be an integer"},
+      {"scenes: [bunny]\nmeasure: {repetitions: 2.5}\n", ":2", "repetitions must be an integer"},
+      {"scenes: [bunny]\nmeasure: {min_time: nan}\n", ":2", "min_time (seconds) must be a number"},
+      {"scenes: [bunny]\nmeasure: {memory: 8GB}\n", ":2", "8GiB"},
+      {"scenes: [bunny]\nmeasure: {repetition: 3}\n", ":2", "did you mean 'repetitions'"},
+      {"scenes: [bunny]\nmeasure: {seed: 1, seed: 2}\n", ":2", "given twice"},
+      {"scenes: [bunny]\naxes: {threads: [2]}\nmeasure: {threads: 1}\n", ":3", "axes too"},
+      {"scenes: [bunny]\nmetrics: [trase]\n", ":2", "did you mean 'trace'"},
+      {"scenes: [bunny]\nmetrics: [build, accuracy]\n", ":2", "no effect without trace"},
+      {"scenes: [bunny]\nplots: [rays]\n", ":2", "did you mean"},
+      {"scenes: [bunny]\nmetrics: [trace]\nplots: [sah_cost]\n", ":3", "has no data"},
+      {"scenes: [bunny]\nparameters: {bins: 1000}\n", ":2", "bins must be an integer from 4 to 64"},
+      {"scenes: [bunny]\nparameters: {colapse: greedy}\n", ":2", "did you mean 'collapse'"},
+      {"scenes: [bunny]\ninclude: [{builder: morton}]\n", ":2", "names its structure"},
+      {"scenes: [bunny]\nexclude: {structure: tree}\n", ":2", "must be a list of maps"},
+      {"scenes: [bunny]\nexclude: [{scene: dragon}]\n", ":2", "unknown scene"},
+      {"scenes: [bunny]\nexperiment: ../up\n", ":2", "names a folder"},
+      {"scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\nexclude: [{isa: avx512}]\n", ":3", "takes no cell away"},
+      {"scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\ninclude: [{structure: tree}]\n", ":3", "adds no cell"},
+  };
+  for (const Case& c : cases) {
+    const fs::path file = folder.write("case.yaml", c.yaml);
+    const std::string message = error_of([&] { (void)make_plan(read_experiment(file, registry), registry); });
+    INFO(c.yaml << "\n-> " << message);
+    CHECK(message.find(c.expected) != std::string::npos);
+    CHECK(message.starts_with((file.string() + c.line)));
+    CHECK(message.find('\n') == std::string::npos);
+  }
+  CHECK(error_of([&] { (void)read_experiment(folder.path / "none.yaml", registry); }).find("no such file") != std::string::npos);
+  CHECK(error_of([&] { (void)read_experiment(folder.path, registry); }).find("is a folder") != std::string::npos);
+}
+
+TEST_CASE("cells are the product, in names that the contract fixes; auto follows the rest") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("plan.yaml", R"(
+scenes: [{generate: sphere, triangles: 500}]
+axes:
+  structure: [tree]
+  intersector: [moller_trumbore, watertight]
+  traversal: [single, packet]
+  isa: [sse, avx2]
+  workload: [primary, shadow]
+)");
+  const Plan plan = make_plan(read_experiment(file, registry), registry);
+  const auto traces = names(plan, Cell::Metric::trace);
+  CHECK(traces.size() == 16);
+  const auto has = [&](const std::string& name) { return std::ranges::find(traces, name) != traces.end(); };
+  CHECK(has("trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/primary/threads:1"));
+  CHECK(has("trace/sphere-500/tree/binned_sah/triangle8/watertight/padded/packet8/avx2/shadow/threads:1"));
+  const auto builds = names(plan, Cell::Metric::build);
+  REQUIRE(builds.size() == 2);
+  CHECK(builds[0] == "build/sphere-500/tree/binned_sah/triangle4/-/-/-/sse/-/threads:1");
+  CHECK(builds[1] == "build/sphere-500/tree/binned_sah/triangle8/-/-/-/avx2/-/threads:1");
+  CHECK(plan.skipped.empty());
+}
+
+TEST_CASE("what cannot be is skipped with its reason, and an ISA that is lacking is never replaced") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("plan.yaml", R"(
+scenes: [{generate: sphere, triangles: 500}]
+axes:
+  structure: [tree, list, embree]
+  builder: [binned_sah, none]
+  intersector: [moller_trumbore, watertight]
+  isa: [sse, avx512]
+)");
+  const Plan plan = make_plan(read_experiment(file, registry), registry);
+  CHECK(names(plan, Cell::Metric::trace).size() == 3);
+  CHECK(plan.skipped.size() == 24 - 3);
+  std::map<std::string, std::size_t> reasons;
+  for (const auto& [reason, count] : group_reasons(plan.skipped)) reasons[reason] = count;
+  CHECK(reasons["no avx512"] == 3);
+  CHECK(reasons["list has no watertight"] == 2);
+  CHECK(reasons["tree has no builder none (it takes binned_sah, morton)"] == 4);
+  CHECK(reasons["this build has no embree: install libembree-dev and build again"] == 8);
+}
+
+TEST_CASE("include adds cells with the sweep's values where they apply, exclude takes cells away") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("plan.yaml", R"(
+scenes: [{generate: sphere, triangles: 500}]
+axes:
+  structure: [tree]
+  builder: [binned_sah, morton]
+  leaf: [triangle8]
+  intersector: [moller_trumbore]
+  isa: [scalar, sse]
+include: [{structure: list}, {structure: tree, builder: morton, box: [padded]}]
+exclude: [{builder: morton, isa: sse, box: fast}]
+metrics: [trace]
+)");
+  const Plan plan = make_plan(read_experiment(file, registry), registry);
+  CHECK(names(plan, Cell::Metric::trace) == std::vector<std::string>{
+      "trace/sphere-500/tree/binned_sah/triangle8/moller_trumbore/fast/single/scalar/primary/threads:1",
+      "trace/sphere-500/tree/binned_sah/triangle8/moller_trumbore/fast/single/sse/primary/threads:1",
+      "trace/sphere-500/tree/morton/triangle8/moller_trumbore/fast/single/scalar/primary/threads:1",
+      "trace/sphere-500/list/none/triangle4/moller_trumbore/fast/single/scalar/primary/threads:1",
+      "trace/sphere-500/list/none/triangle4/moller_trumbore/fast/single/sse/primary/threads:1",
+      "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/scalar/primary/threads:1",
+      "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/sse/primary/threads:1"});
+  CHECK(plan.excluded == 1);
+  CHECK(names(plan, Cell::Metric::build).empty());
+}
+
+TEST_CASE("swept builder parameters are part of the cell where the builder reads them") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("plan.yaml", R"(
+scenes: [{generate: sphere, triangles: 500}]
+axes: {structure: [tree, list], isa: [sse], intersector: [moller_trumbore]}
+parameters: {bins: [8, 16], collapse: greedy}
+metrics: [trace]
+)");
+  const Plan plan = make_plan(read_experiment(file, registry), registry);
+  REQUIRE(plan.cells.size() == 3);
+  CHECK(plan.cells[0].builder_name() == "binned_sah:bins=8");
+  CHECK(plan.cells[0].parameters.bins == 8);
+  CHECK(plan.cells[1].parameters.bins == 16);
+  CHECK(plan.cells[1].parameters.collapse == "greedy");
+  CHECK(plan.cells[2].builder_name() == "none");
+}
+
+TEST_CASE("the command line lays axes over the file") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("small.yaml", kSmall);
+  const auto count = [&](Overrides o) { return names(make_plan(read_experiment(file, registry, o), registry), Cell::Metric::trace).size(); };
+  CHECK(count({}) == 1);
+  CHECK(count({.axes = {"isa=scalar,avx"}}) == 2);
+  CHECK(count({.axes = {"workload=primary,random", "threads=1,2"}}) == 4);
+  CHECK(read_experiment(file, registry, {.axes = {}, .threads = 2}).axes[index_of(Axis::threads)] == std::vector<std::string>{"2"});
+  CHECK(error_of([&] { count({.axes = {"iza=sse"}}); }).find("did you mean 'isa'") != std::string::npos);
+  CHECK(error_of([&] { count({.axes = {"isa=sze"}}); }).find("did you mean 'sse'") != std::string::npos);
+  CHECK(error_of([&] { count({.axes = {"isa="}}); }).find("empty") != std::string::npos);
+  CHECK(error_of([&] { count({.axes = {"isa"}}); }).find("no axis=value") != std::string::npos);
+}
+
+TEST_CASE("filters keep and drop by name; a broken expression is named") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("small.yaml", kSmall);
+  Plan plan = make_plan(read_experiment(file, registry, {.axes = {"isa=scalar,sse,avx2"}}), registry);
+  CHECK(plan.cells.size() == 6);
+  apply_filter(plan, "^trace/", "/avx2/");
+  CHECK(plan.cells.size() == 2);
+  CHECK(plan.filtered == 4);
+  CHECK(error_of([&] { apply_filter(plan, "(", ""); }).find("no regular expression") != std::string::npos);
+}
+
+TEST_CASE("the effective configuration can be run again and means the same") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("first.yaml", R"(
+experiment: first
+scenes: [{generate: sphere, triangles: 500, seed: 3}]
+axes: {structure: [tree], isa: [sse]}
+include: [{structure: list, intersector: moller_trumbore}]
+parameters: {bins: [8, 16]}
+measure: {min_time: 0.125, memory: 512MiB}
+)");
+  const Experiment first = read_experiment(file, registry);
+  const fs::path again = folder.write("again.yaml", effective_yaml(first));
+  const Experiment second = read_experiment(again, registry);
+  CHECK(effective_yaml(second) == effective_yaml(first));
+  CHECK(configuration_hash(second) == configuration_hash(first));
+  CHECK(second.measure.memory == std::size_t{512} << 20);
+  CHECK(configuration_hash(read_experiment(file, registry, {.axes = {}, .seed = 9})) != configuration_hash(first));
+}
+
+TEST_CASE("median and bootstrap interval") {
+  CHECK(median(std::vector{3.0, 1.0, 2.0}) == 2.0);
+  CHECK(median(std::vector{4.0, 1.0, 2.0, 3.0}) == 2.5);
+  const Interval two = bootstrap_median(std::vector{1.0, 3.0});
+  CHECK((two.low == 1.0 && two.median == 2.0 && two.high == 3.0));
+  const Interval many = bootstrap_median(std::vector{9.8, 10.1, 10.0, 9.9, 10.2, 10.0, 50.0});
+  CHECK(many.median == 10.0);
+  CHECK((many.low >= 9.8 && many.low <= 10.0 && many.high >= 10.0 && many.high <= 50.0));
+}
+
+TEST_CASE("files of lines: a torn last line is dropped, an impossible write is one clear line") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write("lines", "{\"a\":1}\n{\"b\":");
+  CHECK(read_lines(file).size() == 1);
+  AppendFile(file, true).append("{\"c\":3}");
+  CHECK(read_lines(file) == std::vector<std::string>{"{\"a\":1}", "{\"c\":3}"});
+  if (fs::exists("/dev/full")) {
+    const std::string message = error_of([] { AppendFile("/dev/full", true).append("x"); });
+    CHECK(message.find("No space left") != std::string::npos);
+    CHECK(message.find("--resume") != std::string::npos);
+  }
+  CHECK(error_of([&] { write_whole(folder.path / "none" / "file", "x"); }).find("cannot be written") != std::string::npos);
+  CHECK(error_of([&] { make_output_folder(file / "below"); }).find("output folder") != std::string::npos);
+  write_whole(file, "whole");
+  CHECK(read_lines(file).empty());
+}
+
+namespace {
+
+Repetition repetition(unsigned index, double seconds) {
+  return {.index = index, .iterations = 2, .wall_seconds = seconds, .cpu_seconds = seconds / 2, .phases = {}};
+}
+
+CellResult result_of(const Cell& cell) {
+  CellResult result{.cell = cell, .repetitions = {}, .facts = {}};
+  for (unsigned i = 0; i < 3; ++i) result.repetitions.push_back(repetition(i, 0.5 + 0.25 * i));
+  result.facts["rays"] = 1000, result.facts["triangles"] = 500, result.facts["hits"] = 700, result.facts["wrong_answers"] = 0;
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("the journal gives back what it was told, and refuses another configuration") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  REQUIRE(plan.cells.size() == 2);
+  const std::string first = plan.cells[0].name(), second = plan.cells[1].name();
+  {
+    Journal journal(folder.path, "hash", plan, false);
+    journal.add(first, repetition(0, 1.0));
+    journal.finish(result_of(plan.cells[0]));
+    journal.add(second, repetition(2, 3.0));
+    journal.add(second, repetition(0, 2.0));
+  }
+  std::ofstream(folder.path / "repetitions.jsonl", std::ios::app) << "{\"name\":\"torn";
+  {
+    Journal journal(folder.path, "hash", plan, true);
+    REQUIRE(journal.done().size() == 1);
+    const CellResult& done = journal.done().at(first);
+    CHECK(done.repetitions.size() == 3);
+    CHECK(done.repetitions[2].wall_seconds == 1.0);
+    CHECK(done.facts == result_of(plan.cells[0]).facts);
+    const auto started = journal.started(second);
+    REQUIRE(started.size() == 2);
+    CHECK((started[0].index == 0 && started[1].index == 2));
+  }
+  CHECK(error_of([&] { Journal(folder.path, "other", plan, true); }).find("another configuration") != std::string::npos);
+  CHECK(Journal(folder.path, "other", plan, false).done().empty());
+}
+
+TEST_CASE("results.json has what Google Benchmark's compare.py reads; the verdict follows the answers") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  plan.skipped.push_back({"some/cell", "no avx512"});
+  RunOutcome outcome;
+  for (const Cell& cell : plan.cells) outcome.results.push_back(result_of(cell));
+  const Json document = Json::parse(results_json(outcome, plan, Json::object()));
+  REQUIRE(document["benchmarks"].size() == 2 * (3 + 4));
+  const Json& first = document["benchmarks"][7];  // the trace cell's first repetition
+  CHECK(first["name"] == plan.cells[1].name());
+  CHECK(first["run_name"] == first["name"]);
+  CHECK(first["run_type"] == "iteration");
+  CHECK(first["repetitions"] == 3);
+  CHECK(first["real_time"].get<double>() == Approx(250.0));
+  CHECK(first["cpu_time"].get<double>() == Approx(125.0));
+  CHECK(first["time_unit"] == "ms");
+  CHECK(first["rays_per_second"].get<double>() == Approx(4000.0));
+  CHECK(first["rays_per_cpu_second"].get<double>() == Approx(8000.0));
+  CHECK(first["structure"] == "tree");
+  CHECK(first["threads"] == 1);
+  const Json& median_entry = document["benchmarks"][11];
+  CHECK(median_entry["run_type"] == "aggregate");
+  CHECK(median_entry["aggregate_name"] == "median");
+  CHECK(median_entry["name"] == plan.cells[1].name() + "_median");
+  CHECK(document["skipped"][0]["reason"] == "no avx512");
+  CHECK(results_csv(outcome).starts_with("name,run_name,run_type"));
+
+  CHECK(verdict(outcome).first == ExitStatus::kDone);
+  outcome.results[1].facts["wrong_answers"] = 2;
+  CHECK(verdict(outcome).first == ExitStatus::kWrongAnswers);
+  CHECK(verdict({}).first == ExitStatus::kNothingMeasured);
+}
+
+TEST_CASE("Google Benchmark's flags: ours are taken, wrong ones are named") {
+  std::vector<std::string> words{"run", "a.yaml", "--benchmark_repetitions=3", "--benchmark_min_time=0.5s", "--benchmark_filter=bvh8", "--benchmark_v=1"};
+  const BenchmarkFlags flags = take_benchmark_flags(words);
+  CHECK(words == std::vector<std::string>{"run", "a.yaml"});
+  CHECK(flags.repetitions == 3u);
+  CHECK(flags.min_time == 0.5);
+  CHECK(flags.filter == "bvh8");
+  CHECK(flags.others == std::vector<std::string>{"--benchmark_v=1"});
+  std::vector<std::string> wrong{"--benchmark_repetitions=many"};
+  CHECK(error_of([&] { (void)take_benchmark_flags(wrong); }).find("a number from 1") != std::string::npos);
+  std::vector<std::string> format{"--benchmark_format=xml"};
+  CHECK(error_of([&] { (void)take_benchmark_flags(format); }).find("one of console, json, csv") != std::string::npos);
+}
+
+TEST_CASE("interleaved jobs run each of their repetitions once, and an error comes out") {
+  initialize_benchmark({});
+  std::map<std::string, std::vector<unsigned>> ended;
+  std::map<std::string, int> loops;
+  std::vector<InterleavedJob> jobs;
+  for (const char* name : {"a/b:1", "c"}) {
+    jobs.push_back({.name = name, .indices = {0, 2, 5}, .iterations = 4,
+                    .measure = [&loops, name](TimedLoop& loop) {
+                      while (loop.next()) ++loops[name];
+                      return Repetition{};
+                    },
+                    .ended = [&ended, name](const Repetition& r) { ended[name].push_back(r.index); }});
+  }
+  run_interleaved(jobs);
+  CHECK(ended["a/b:1"] == std::vector<unsigned>{0, 2, 5});
+  CHECK(ended["c"] == std::vector<unsigned>{0, 2, 5});
+  CHECK(loops["a/b:1"] == 12);
+  jobs[0].ended = [](const Repetition&) { throw UserError("disk full"); };
+  CHECK(error_of([&] { run_interleaved(jobs); }) == "disk full");
+  CHECK_THROWS_AS(initialize_benchmark({"--benchmark_nonsense=1"}), UserError);
+}
