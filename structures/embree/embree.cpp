@@ -42,18 +42,21 @@ bool device_runs(RTCDevice device, Isa isa) {
 /// anything beyond it, NaN and infinities included.
 constexpr float kLargest = 1.844e18f;
 
-/// Whether the ray may be handed to Embree; is_valid() in one pass, and the bound. False with a NaN anywhere.
+/// Whether the ray may be handed to Embree: is_valid() in one pass, the bound, and some t >= 0, since a build with
+/// assertions aborts on tnear < 0 (to_embree() raises it to 0). False with a NaN anywhere.
 inline bool accepts(const Ray& ray) noexcept {
   const auto in_range = [](Vec3f a) {
     return (std::abs(a.x) <= kLargest) & (std::abs(a.y) <= kLargest) & (std::abs(a.z) <= kLargest);
   };
   const Vec3f d = ray.direction;
-  return in_range(ray.origin) & in_range(d) & ((d.x != 0.0f) | (d.y != 0.0f) | (d.z != 0.0f)) & (ray.tnear <= ray.tfar);
+  return in_range(ray.origin) & in_range(d) & ((d.x != 0.0f) | (d.y != 0.0f) | (d.z != 0.0f)) & (ray.tnear <= ray.tfar) &
+         (ray.tfar >= 0.0f);
 }
 
 inline RTCRay to_embree(const Ray& ray) noexcept {
   RTCRay r;
-  r.org_x = ray.origin.x, r.org_y = ray.origin.y, r.org_z = ray.origin.z, r.tnear = ray.tnear;
+  r.org_x = ray.origin.x, r.org_y = ray.origin.y, r.org_z = ray.origin.z;
+  r.tnear = std::max(ray.tnear, 0.0f);
   r.dir_x = ray.direction.x, r.dir_y = ray.direction.y, r.dir_z = ray.direction.z, r.time = 0.0f;
   r.tfar = ray.tfar, r.mask = ~0u, r.id = 0, r.flags = 0;
   return r;
@@ -201,7 +204,7 @@ void EmbreeAccel::occluded_single(std::span<const Ray> rays, std::span<std::uint
 #else
     rtcOccluded1(scene, &ray, nullptr);
 #endif
-    occluded[i] = ray.tfar < 0.0f;  // -infinity when something is hit; it was at least tnear, and tnear is >= 0
+    occluded[i] = ray.tfar < 0.0f;  // -infinity when something is hit; accepts() saw it >= 0
   }
 }
 

@@ -1,0 +1,73 @@
+// Calling rows of the kernel table from tests: the rows that can run here, the structures they need, whole batches.
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "core/isa.h"
+#include "structures/accel.h"
+#include "traversal/kernel_table.h"
+
+namespace arboretum::test {
+
+[[nodiscard]] inline std::string name_of(const KernelRow& row) {
+  std::string name(row.structure);
+  for (std::string_view part : {row.leaf, row.intersector, row.box, row.traversal, to_string(row.isa)}) name.append("/").append(part);
+  return name;
+}
+
+/// The rows of the ISAs that are available here.
+[[nodiscard]] inline std::vector<KernelRow> runnable_rows() {
+  std::vector<KernelRow> rows;
+  for (const KernelRow& row : kernel_table())
+    if (is_available(row.isa)) rows.push_back(row);
+  return rows;
+}
+
+/// The structures of one mesh, each built once with its default builder.
+class Structures {
+ public:
+  explicit Structures(const TriangleMesh& mesh) : mesh_(mesh) {}
+
+  [[nodiscard]] const Accel& get(const KernelRow& row) {
+    const StructureInfo& info = find_structure(row.structure)->info;
+    BuildSettings settings;
+    settings.builder = info.builders.front(), settings.leaf = row.leaf;
+    settings.isa = info.build_depends_on_isa ? row.isa : best_isa();
+    std::unique_ptr<Accel>& accel = built_[{row.structure, row.leaf, settings.isa}];
+    BuildReport report;
+    if (!accel) accel = build_structure(row.structure, mesh_, settings, report);
+    return *accel;
+  }
+
+ private:
+  const TriangleMesh& mesh_;
+  std::map<std::tuple<std::string_view, std::string_view, Isa>, std::unique_ptr<Accel>> built_;
+};
+
+/// With `counters`, the counting kernel. Answers that the kernel leaves unwritten are marked: t is NaN, an id 0xdeadbeef.
+[[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, Counters* counters = nullptr) {
+  std::vector<Hit> hits(rays.size(), Hit{std::numeric_limits<float>::quiet_NaN(), 0, 0, 0xdeadbeefu});
+  (counters ? row.count_closest_hit : row.closest_hit)(accel, rays, hits, counters);
+  return hits;
+}
+
+[[nodiscard]] inline std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, Counters* counters = nullptr) {
+  std::vector<std::uint8_t> occluded(rays.size(), 0xee);
+  (counters ? row.count_any_hit : row.any_hit)(accel, rays, occluded, counters);
+  return occluded;
+}
+
+/// -0 and 0, and any two NaNs of different bits, are told apart.
+[[nodiscard]] inline bool same_bits(std::span<const Hit> a, std::span<const Hit> b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
+}
+
+}  // namespace arboretum::test
