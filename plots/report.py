@@ -66,7 +66,7 @@ def facts(context):
     """The context, flattened to lines that a person reads; long texts come with the reproduction."""
     found = []
     for key, value in context.items():
-        if key in ("experiment", "warnings", "warning", "plots", "executable", "library_build_type", "command"):
+        if key in ("experiment", "warnings", "warning", "plots", "executable", "library_build_type", "command", "load_avg"):
             continue
         if key == "memory_bytes" and isinstance(value, int):
             key, value = "memory", f"{value / 2**30:.1f} GiB"

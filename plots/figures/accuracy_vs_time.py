@@ -23,7 +23,7 @@ def draw(results):
     markers = marker_map(tests)
     smallest = min((wrong for _, _, wrong in points if wrong > 0), default=1.0)
 
-    top = 2.0 * max(wrong for _, _, wrong in points) or 1.0
+    worst = max(wrong for _, _, wrong in points)
     figure, axes = panel_grid(scenes, workloads, 3.9, 3.0, 3)
     for (scene, workload), axis in axes.items():
         here = [p for p in points if p[0]["scene"] == scene and p[0]["workload"] == workload]
@@ -32,8 +32,12 @@ def draw(results):
                       markeredgecolor="white", markeredgewidth=0.6)
         front = pareto_front([(t, w) for _, t, w in here])
         axis.step([t for t, _ in front], [w for _, w in front], where="post", color="#777777", linewidth=1, zorder=1)
-        axis.set_yscale("symlog", linthresh=smallest, linscale=0.5)
-        axis.set_ylim(-0.15 * smallest, top)
+        if worst > 0:
+            axis.set_yscale("symlog", linthresh=smallest, linscale=0.5)
+            axis.set_ylim(-0.15 * smallest, 2.0 * worst)
+        else:
+            axis.set_ylim(-0.1, 1.0)
+            axis.set_yticks([0, 1])
         times = [t for _, t, _ in here]
         if times and max(times) > 6 * min(times):
             axis.set_xscale("log")

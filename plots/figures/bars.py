@@ -32,10 +32,10 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes):
 
 
 def without_doubles(cells, value_of):
-    """A SAH cost that is the same on every ISA and thread count is one bar."""
+    """A SAH cost that is the same for every ISA, thread count and leaf layout is one bar."""
     seen = {}
     for cell in cells:
-        seen.setdefault((*(cell[a] for a in ("scene", "structure", "builder", "leaf")), value_of(cell)), cell)
+        seen.setdefault((*(cell[a] for a in ("scene", "structure", "builder")), value_of(cell)), cell)
     return list(seen.values())
 
 
