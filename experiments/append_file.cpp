@@ -19,13 +19,14 @@ namespace {
 
 [[noreturn]] void cannot_write(const std::filesystem::path& path, int error) {
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
-  throw UserError(fmt::format("{}: cannot be written: {}; {}", path.string(), std::strerror(error),
-                              full ? "free some space, then go on with --resume" : "choose another folder with --out"));
+  throw UserError(
+      fmt::format("{}: cannot be written: {}; {}", path.string(), std::strerror(error),
+                  full ? "free some space, then go on with --resume" : "choose another folder with --out"));
 }
 
 /// Bytes up to and with the last newline.
 off_t whole_lines(int descriptor, const std::filesystem::path& path) {
-  struct stat status{};
+  struct stat status {};
   if (::fstat(descriptor, &status) != 0) cannot_write(path, errno);
   off_t end = status.st_size;
   char c = 0;
@@ -48,7 +49,7 @@ int write_all(int descriptor, std::string_view text) {
 AppendFile::AppendFile(std::filesystem::path path, bool keep) : path_(std::move(path)) {
   descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | (keep ? 0 : O_TRUNC), 0666);
   if (descriptor_ < 0) cannot_write(path_, errno);
-  struct stat status{};
+  struct stat status {};
   if (keep && ::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode) &&
       ::ftruncate(descriptor_, whole_lines(descriptor_, path_)) != 0) {
     cannot_write(path_, errno);
@@ -70,7 +71,8 @@ AppendFile::~AppendFile() {
 void AppendFile::append(std::string_view line) {
   const off_t before = ::lseek(descriptor_, 0, SEEK_END);
   if (const int error = write_all(descriptor_, std::string(line) + "\n"); error != 0) {
-    if (before >= 0 && ::ftruncate(descriptor_, before) != 0) errno = error;  // a torn last line is dropped when it is read
+    if (before >= 0 && ::ftruncate(descriptor_, before) != 0)
+      errno = error;  // a torn last line is dropped when it is read
     cannot_write(path_, error);
   }
 }
@@ -103,14 +105,17 @@ void write_whole(const std::filesystem::path& path, std::string_view text) {
 
 void make_output_folder(const std::filesystem::path& folder) {
   std::error_code error, ignored;
-  const bool taken = std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored);
+  const bool taken =
+      std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored);
   if (!taken) std::filesystem::create_directories(folder, error);
   if (taken || !std::filesystem::is_directory(folder, ignored)) {
     const std::string why = taken ? "there is a file of that name" : error ? error.message() : "it vanished";
-    throw UserError(fmt::format("{}: the output folder cannot be made: {}; choose another with --out", folder.string(), why));
+    throw UserError(fmt::format("{}: the output folder cannot be made: {}; choose another with --out",
+                                folder.string(), why));
   }
   if (::access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
-    throw UserError(fmt::format("{}: the output folder cannot be used: {}; choose another with --out", folder.string(), std::strerror(errno)));
+    throw UserError(fmt::format("{}: the output folder cannot be used: {}; choose another with --out",
+                                folder.string(), std::strerror(errno)));
   }
   const std::filesystem::path probe = folder / ".arboretum-probe";
   const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);

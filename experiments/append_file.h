@@ -8,8 +8,8 @@
 
 namespace arboretum {
 
-/// A file of lines that only grows. Each line is handed to the operating system at once, so that a killed process loses
-/// no line that it had appended.
+/// A file of lines that only grows. Each line is handed to the operating system at once, so that a killed
+/// process loses no line that it had appended.
 class AppendFile {
  public:
   AppendFile() = default;
@@ -20,8 +20,8 @@ class AppendFile {
   AppendFile& operator=(AppendFile&& other) noexcept;
   ~AppendFile();
 
-  /// Appends `line` and a newline. When that fails (a full disk), takes the part that was written back and throws
-  /// UserError.
+  /// Appends `line` and a newline. When that fails (a full disk), takes the part that was written back and
+  /// throws UserError.
   void append(std::string_view line);
 
  private:

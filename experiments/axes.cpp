@@ -15,7 +15,8 @@ struct Summary {
 
 constexpr Summary kBuilders[] = {
     {"in_order", "nothing is sorted: triangles in the mesh's order"},
-    {"binned_sah", "top-down, surface area heuristic over bins of centroids, then collapsed to the structure's width"},
+    {"binned_sah",
+     "top-down, surface area heuristic over bins of centroids, then collapsed to the structure's width"},
     {"sweep_sah", "top-down, surface area heuristic at every candidate plane"},
     {"spatial_sah", "binned SAH with spatial splits (references may be duplicated)"},
     {"morton", "sorted along a Morton curve (linear BVH)"},
@@ -77,10 +78,13 @@ std::string leaf_summary(std::string_view leaf) {
   if (!leaf.starts_with("triangle")) return {};
   std::string_view rest = leaf.substr(8);
   std::string_view what = "a vertex and precomputed edges";
-  if (rest.ends_with('v')) what = "three vertices", rest.remove_suffix(1);
-  else if (rest.ends_with('i')) what = "indices of vertices", rest.remove_suffix(1);
+  if (rest.ends_with('v'))
+    what = "three vertices", rest.remove_suffix(1);
+  else if (rest.ends_with('i'))
+    what = "indices of vertices", rest.remove_suffix(1);
   if (rest.empty() || split_number(rest).second != rest) return {};
-  return "blocks of " + std::string(rest) + (rest == "1" ? " triangle: " : " triangles: ") + std::string(what);
+  return "blocks of " + std::string(rest) + (rest == "1" ? " triangle: " : " triangles: ") +
+         std::string(what);
 }
 
 std::string traversal_summary(std::string_view traversal) {
@@ -133,7 +137,8 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
     case Axis::traversal:
       for (const KernelRow& row : registry.kernels) append_new(list, row.traversal);
       for (std::string_view family : {"packet", "hybrid"}) {
-        if (std::ranges::any_of(list, [&](const std::string& t) { return split_number(t).first == family; })) {
+        if (std::ranges::any_of(list,
+                                [&](const std::string& t) { return split_number(t).first == family; })) {
           append_new(list, family);
         }
       }
@@ -144,7 +149,8 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
     case Axis::workload:
       for (std::string_view name : workload_names()) append_new(list, name);
       break;
-    case Axis::threads: break;
+    case Axis::threads:
+      break;
   }
   std::erase(list, std::string(kNone));
   return list;
@@ -156,7 +162,8 @@ std::string resolve_traversal(std::string_view traversal, Isa isa) {
 }
 
 std::string_view default_box(std::string_view intersector) noexcept {
-  constexpr std::string_view kLoseNoHit[] = {"watertight", "watertight_refined", "pluecker", "pluecker_double", "exact"};
+  constexpr std::string_view kLoseNoHit[] = {"watertight", "watertight_refined", "pluecker",
+                                             "pluecker_double", "exact"};
   return std::ranges::find(kLoseNoHit, intersector) != std::end(kLoseNoHit) ? "padded" : "fast";
 }
 
@@ -165,14 +172,22 @@ std::string summary_of(Axis axis, std::string_view value, const Registry& regist
     case Axis::structure:
       if (const StructureEntry* e = registry.structure(value)) return std::string(e->info.summary);
       return "not in this build: libembree was not found";
-    case Axis::builder: return std::string(look_up(kBuilders, value));
-    case Axis::leaf: return leaf_summary(value);
-    case Axis::intersector: return std::string(look_up(kIntersectors, value));
-    case Axis::box: return std::string(look_up(kBoxes, value));
-    case Axis::traversal: return traversal_summary(value);
-    case Axis::isa: return std::string(look_up(kIsas, value));
-    case Axis::workload: return std::string(look_up(kWorkloads, value));
-    case Axis::threads: return {};
+    case Axis::builder:
+      return std::string(look_up(kBuilders, value));
+    case Axis::leaf:
+      return leaf_summary(value);
+    case Axis::intersector:
+      return std::string(look_up(kIntersectors, value));
+    case Axis::box:
+      return std::string(look_up(kBoxes, value));
+    case Axis::traversal:
+      return traversal_summary(value);
+    case Axis::isa:
+      return std::string(look_up(kIsas, value));
+    case Axis::workload:
+      return std::string(look_up(kWorkloads, value));
+    case Axis::threads:
+      return {};
   }
   return {};
 }

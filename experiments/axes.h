@@ -11,7 +11,17 @@
 
 namespace arboretum {
 
-enum class Axis : unsigned char { structure, builder, leaf, intersector, box, traversal, isa, workload, threads };
+enum class Axis : unsigned char {
+  structure,
+  builder,
+  leaf,
+  intersector,
+  box,
+  traversal,
+  isa,
+  workload,
+  threads
+};
 inline constexpr std::size_t kAxisCount = 9;
 inline constexpr std::array<std::string_view, kAxisCount> kAxisNames{
     "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads"};
@@ -19,18 +29,22 @@ inline constexpr std::array<std::string_view, kAxisCount> kAxisNames{
 /// One list of values an axis.
 using AxisLists = std::array<std::vector<std::string>, kAxisCount>;
 
-[[nodiscard]] constexpr std::size_t index_of(Axis axis) noexcept { return static_cast<std::size_t>(axis); }
-[[nodiscard]] constexpr std::string_view to_string(Axis axis) noexcept { return kAxisNames[index_of(axis)]; }
+[[nodiscard]] constexpr std::size_t index_of(Axis axis) noexcept {
+  return static_cast<std::size_t>(axis);
+}
+[[nodiscard]] constexpr std::string_view to_string(Axis axis) noexcept {
+  return kAxisNames[index_of(axis)];
+}
 [[nodiscard]] std::optional<Axis> parse_axis(std::string_view name) noexcept;
 
-/// Stands for the value that follows from the others: the structure's first builder, the kernel's own leaf, the box
-/// test that the intersector calls for. Builder, leaf and box take it.
+/// Stands for the value that follows from the others: the structure's first builder, the kernel's own leaf,
+/// the box test that the intersector calls for. Builder, leaf and box take it.
 inline constexpr std::string_view kAuto = "auto";
 /// The value of an axis that does not apply.
 inline constexpr std::string_view kNone = "-";
 
-/// What a configuration may name on the axis, in the order of `list`: the registry's values, `auto`, `packet` and
-/// `hybrid` where they exist, and what an optional library would bring (embree). Empty for `threads`.
+/// What a configuration may name on the axis, in the order of `list`: the registry's values, `auto`, `packet`
+/// and `hybrid` where they exist, and what an optional library would bring (embree). Empty for `threads`.
 [[nodiscard]] std::vector<std::string> known_values(Axis axis, const Registry& registry);
 /// `packet` and `hybrid` stand for the width of the ISA's own registers: packet8 on avx2. Others as they are.
 [[nodiscard]] std::string resolve_traversal(std::string_view traversal, Isa isa);

@@ -20,7 +20,8 @@ T number(const std::string& flag, std::string text, T low, T high) {
   return value;
 }
 
-std::string one_of(const std::string& flag, const std::string& value, std::initializer_list<std::string_view> allowed) {
+std::string one_of(const std::string& flag, const std::string& value,
+                   std::initializer_list<std::string_view> allowed) {
   for (std::string_view a : allowed)
     if (a == value) return value;
   throw UserError(fmt::format("{}: one of {}, not '{}'", flag, fmt::join(allowed, ", "), value));
@@ -39,14 +40,22 @@ BenchmarkFlags take_benchmark_flags(std::vector<std::string>& words) {
     const std::size_t equals = word.find('=');
     const std::string flag = word.substr(0, equals);
     const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-    if (flag == "--benchmark_repetitions") flags.repetitions = number<unsigned>(flag, value, 1, 100000);
-    else if (flag == "--benchmark_min_time") flags.min_time = number<double>(flag, value, 0.0, 3600.0);
-    else if (flag == "--benchmark_filter") flags.filter = value;
-    else if (flag == "--benchmark_out") flags.out = value;
-    else if (flag == "--benchmark_out_format") flags.out_format = one_of(flag, value, {"json", "csv"});
-    else if (flag == "--benchmark_format") flags.format = one_of(flag, value, {"console", "json", "csv"});
-    else if (flag == "--benchmark_list_tests") flags.list = one_of(flag, value.empty() ? "true" : value, {"true", "false"}) == "true";
-    else flags.others.push_back(word);
+    if (flag == "--benchmark_repetitions")
+      flags.repetitions = number<unsigned>(flag, value, 1, 100000);
+    else if (flag == "--benchmark_min_time")
+      flags.min_time = number<double>(flag, value, 0.0, 3600.0);
+    else if (flag == "--benchmark_filter")
+      flags.filter = value;
+    else if (flag == "--benchmark_out")
+      flags.out = value;
+    else if (flag == "--benchmark_out_format")
+      flags.out_format = one_of(flag, value, {"json", "csv"});
+    else if (flag == "--benchmark_format")
+      flags.format = one_of(flag, value, {"console", "json", "csv"});
+    else if (flag == "--benchmark_list_tests")
+      flags.list = one_of(flag, value.empty() ? "true" : value, {"true", "false"}) == "true";
+    else
+      flags.others.push_back(word);
   }
   words = std::move(rest);
   return flags;

@@ -1,4 +1,5 @@
-// Google Benchmark's flags on our command line: those that mean something of ours are taken, the rest handed on.
+// Google Benchmark's flags on our command line: those that mean something of ours are taken, the rest handed
+// on.
 #pragma once
 
 #include <optional>

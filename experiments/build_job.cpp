@@ -6,7 +6,8 @@
 namespace arboretum {
 
 void BuildJob::prepare(Json& facts, StructurePool& pool, const MeasureSettings& measure) {
-  // A build is long beside the clock's grain; one that takes less than this is repeated within the repetition.
+  // A build is long beside the clock's grain; one that takes less than this is repeated within the
+  // repetition.
   constexpr double kEnoughSeconds = 0.02;
   constexpr double kMostBuilds = 10'000;
   BuildReport report;
@@ -14,7 +15,8 @@ void BuildJob::prepare(Json& facts, StructurePool& pool, const MeasureSettings& 
   facts.update(pool.facts(cell_, *accel));
   facts["peak_build_bytes"] = report.peak_bytes;
   const double enough = std::min(kEnoughSeconds, measure.min_time);
-  builds_ = static_cast<std::uint64_t>(std::clamp(std::ceil(enough / std::max(report.seconds, 1e-9)), 1.0, kMostBuilds));
+  builds_ = static_cast<std::uint64_t>(
+      std::clamp(std::ceil(enough / std::max(report.seconds, 1e-9)), 1.0, kMostBuilds));
 }
 
 Repetition BuildJob::measure(TimedLoop& loop) const {
@@ -26,8 +28,10 @@ Repetition BuildJob::measure(TimedLoop& loop) const {
     repetition.cpu_seconds += report.cpu_seconds;
     for (const auto& [name, seconds] : report.phases) {
       const auto known = std::ranges::find(repetition.phases, name, &std::pair<std::string, double>::first);
-      if (known == repetition.phases.end()) repetition.phases.emplace_back(name, seconds);
-      else known->second += seconds;
+      if (known == repetition.phases.end())
+        repetition.phases.emplace_back(name, seconds);
+      else
+        known->second += seconds;
     }
   }
   return repetition;

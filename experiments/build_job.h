@@ -8,10 +8,11 @@ namespace arboretum {
 
 class BuildJob {
  public:
-  BuildJob(const Cell& cell, const TriangleMesh& mesh, const Registry& registry) : cell_(cell), mesh_(mesh), registry_(registry) {}
+  BuildJob(const Cell& cell, const TriangleMesh& mesh, const Registry& registry)
+      : cell_(cell), mesh_(mesh), registry_(registry) {}
 
-  /// The first build is the warm-up: its time says how many builds fill a repetition, its structure gives the facts.
-  /// Throws what the build throws.
+  /// The first build is the warm-up: its time says how many builds fill a repetition, its structure gives the
+  /// facts. Throws what the build throws.
   void prepare(Json& facts, StructurePool& pool, const MeasureSettings& measure);
   [[nodiscard]] std::uint64_t builds() const noexcept { return builds_; }
   [[nodiscard]] Repetition measure(TimedLoop& loop) const;

@@ -17,11 +17,11 @@ struct Cell {
   Isa isa = Isa::scalar;
   unsigned threads = 1;
   BuilderParameters parameters;
-  std::string parameter_label;  ///< what of `parameters` is swept: ":bins=16"; part of the name
+  std::string parameter_label;        ///< what of `parameters` is swept: ":bins=16"; part of the name
   const KernelRow* kernel = nullptr;  ///< of a trace cell
 
-  /// `metric/scene/structure/builder/leaf/intersector/box/traversal/isa/workload/threads:N`; `-` where an axis does not
-  /// apply; swept builder parameters follow the builder: `binned_sah:bins=16`.
+  /// `metric/scene/structure/builder/leaf/intersector/box/traversal/isa/workload/threads:N`; `-` where an
+  /// axis does not apply; swept builder parameters follow the builder: `binned_sah:bins=16`.
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::string builder_name() const { return builder + parameter_label; }
 };

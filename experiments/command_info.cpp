@@ -12,13 +12,18 @@ Json as_json(const std::string& name, const SceneInfo& info) {
   Json json = {{"name", name}, {"triangles", info.triangles}, {"vertices", info.vertices}};
   json["bounds"] = {{"lower", point(info.bounds.lower)}, {"upper", point(info.bounds.upper)}};
   json["triangles_read"] = info.report.triangles_read;
-  json["dropped"] = {{"non_finite", info.report.non_finite}, {"out_of_range", info.report.out_of_range}, {"degenerate", info.report.degenerate}};
+  json["dropped"] = {{"non_finite", info.report.non_finite},
+                     {"out_of_range", info.report.out_of_range},
+                     {"degenerate", info.report.degenerate}};
   json["duplicates"] = info.duplicates, json["slivers"] = info.slivers;
-  json["edges"] = info.edges, json["boundary_edges"] = info.boundary_edges, json["non_manifold_edges"] = info.non_manifold_edges;
-  json["closed"] = info.closed, json["materials"] = info.materials, json["emissive_triangles"] = info.emissive_triangles;
+  json["edges"] = info.edges, json["boundary_edges"] = info.boundary_edges,
+  json["non_manifold_edges"] = info.non_manifold_edges;
+  json["closed"] = info.closed, json["materials"] = info.materials,
+  json["emissive_triangles"] = info.emissive_triangles;
   json["lights"] = info.lights, json["warnings"] = info.report.warnings;
   Json& effects = json["effects"] = Json::array();
-  for (const Effect& e : info.effects) effects.push_back({{"name", e.name}, {"called_for", e.called_for}, {"reason", e.reason}});
+  for (const Effect& e : info.effects)
+    effects.push_back({{"name", e.name}, {"called_for", e.called_for}, {"reason", e.reason}});
   return json;
 }
 
@@ -34,18 +39,20 @@ ExitStatus command_info(const std::string& word, bool json) {
   const Vec3f lower = info.bounds.lower, upper = info.bounds.upper;
   fmt::print("scene         {}\n", scene.name);
   fmt::print("triangles     {} ({} vertices)\n", info.triangles, info.vertices);
-  fmt::print("bounds        [{:.6g} {:.6g} {:.6g}] to [{:.6g} {:.6g} {:.6g}]\n", lower.x, lower.y, lower.z, upper.x, upper.y, upper.z);
-  fmt::print("dropped       {} with NaN or infinity, {} out of range, {} of zero area (degenerate)\n", info.report.non_finite,
-             info.report.out_of_range, info.report.degenerate);
+  fmt::print("bounds        [{:.6g} {:.6g} {:.6g}] to [{:.6g} {:.6g} {:.6g}]\n", lower.x, lower.y, lower.z,
+             upper.x, upper.y, upper.z);
+  fmt::print("dropped       {} with NaN or infinity, {} out of range, {} of zero area (degenerate)\n",
+             info.report.non_finite, info.report.out_of_range, info.report.degenerate);
   fmt::print("duplicates    {}\n", info.duplicates);
   fmt::print("slivers       {}\n", info.slivers);
-  fmt::print("surface       {} ({} edges, {} at a border, {} of more than two triangles)\n", info.closed ? "closed" : "open", info.edges,
-             info.boundary_edges, info.non_manifold_edges);
+  fmt::print("surface       {} ({} edges, {} at a border, {} of more than two triangles)\n",
+             info.closed ? "closed" : "open", info.edges, info.boundary_edges, info.non_manifold_edges);
   fmt::print("materials     {}\n", info.materials);
   fmt::print("lights        {}, {} emissive triangles\n", info.lights, info.emissive_triangles);
   for (const std::string& warning : info.report.warnings) fmt::print("warning       {}\n", warning);
   fmt::print("effects\n");
-  for (const Effect& e : info.effects) fmt::print("  {} {:<14} {}\n", e.called_for ? "+" : "-", e.name, e.reason);
+  for (const Effect& e : info.effects)
+    fmt::print("  {} {:<14} {}\n", e.called_for ? "+" : "-", e.name, e.reason);
   return ExitStatus::kDone;
 }
 

@@ -14,9 +14,12 @@ namespace {
 
 std::string plural(Axis axis) {
   switch (axis) {
-    case Axis::leaf: return "leaves";
-    case Axis::box: return "boxes";
-    default: return std::string(to_string(axis)) + "s";
+    case Axis::leaf:
+      return "leaves";
+    case Axis::box:
+      return "boxes";
+    default:
+      return std::string(to_string(axis)) + "s";
   }
 }
 
@@ -39,7 +42,10 @@ Json scene_entries() {
   Json entries = Json::array();
   for (const CatalogueEntry& scene : catalogue()) {
     const bool generated = scene.source == CatalogueEntry::Source::generator;
-    Json entry = {{"name", scene.name}, {"summary", scene.description}, {"generator", generated}, {"triangles", scene.triangles},
+    Json entry = {{"name", scene.name},
+                  {"summary", scene.description},
+                  {"generator", generated},
+                  {"triangles", scene.triangles},
                   {"available", scene.is_present()}};
     if (!generated) entry["package"] = scene.package, entry["licence"] = scene.licence;
     entries.push_back(std::move(entry));
@@ -49,15 +55,23 @@ Json scene_entries() {
 
 Json effect_entries() {
   constexpr std::pair<std::string_view, std::string_view> kSummaries[] = {
-      {"shadow_hard", "shadows of point, directional and spot lights"}, {"shadow_soft", "shadows of light-emitting triangles"},
-      {"env_light", "light of the surroundings"}, {"mirror", "perfect reflection"}, {"glossy", "blurred reflection"},
-      {"dielectric", "glass and water: reflection and refraction"}, {"diffuse_gi", "light from surface to surface"},
-      {"dof", "depth of field of a thin lens"}, {"motion_blur", "movement while the shutter is open"},
-      {"alpha_cutout", "holes cut by an opacity map"}, {"instancing", "a mesh in several places"},
-      {"texture", "colours from images"}, {"multi_light", "more than one light"}};
+      {"shadow_hard", "shadows of point, directional and spot lights"},
+      {"shadow_soft", "shadows of light-emitting triangles"},
+      {"env_light", "light of the surroundings"},
+      {"mirror", "perfect reflection"},
+      {"glossy", "blurred reflection"},
+      {"dielectric", "glass and water: reflection and refraction"},
+      {"diffuse_gi", "light from surface to surface"},
+      {"dof", "depth of field of a thin lens"},
+      {"motion_blur", "movement while the shutter is open"},
+      {"alpha_cutout", "holes cut by an opacity map"},
+      {"instancing", "a mesh in several places"},
+      {"texture", "colours from images"},
+      {"multi_light", "more than one light"}};
   Json entries = Json::array();
   for (std::string_view name : kEffectNames) {
-    const auto found = std::ranges::find(kSummaries, name, &std::pair<std::string_view, std::string_view>::first);
+    const auto found =
+        std::ranges::find(kSummaries, name, &std::pair<std::string_view, std::string_view>::first);
     entries.push_back({{"name", name}, {"summary", found == std::end(kSummaries) ? "" : found->second}});
   }
   return entries;
@@ -70,10 +84,14 @@ std::string remark(const Json& entry) {
     line += fmt::format(" [builders: {}]", fmt::join(entry["builders"].get<std::vector<std::string>>(), " "));
   }
   if (entry.contains("generator")) {
-    line += entry["generator"].get<bool>() ? " (generated, any triangle count)" : fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>());
+    line += entry["generator"].get<bool>()
+                ? " (generated, any triangle count)"
+                : fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>());
   }
   if (entry.contains("available") && !entry["available"].get<bool>()) {
-    line += entry.contains("generator") ? fmt::format(" - not here: arboretum fetch {}", entry["name"].get<std::string>()) : " - not available here";
+    line += entry.contains("generator")
+                ? fmt::format(" - not here: arboretum fetch {}", entry["name"].get<std::string>())
+                : " - not available here";
   }
   return line;
 }
@@ -83,17 +101,19 @@ std::string remark(const Json& entry) {
 ExitStatus command_list(const std::string& wanted, bool json) {
   const Registry registry = this_registry();
   std::vector<std::string> titles;
-  for (std::size_t i = 0; i + 1 < kAxisCount; ++i) titles.push_back(plural(static_cast<Axis>(i)));  // threads are no list
+  for (std::size_t i = 0; i + 1 < kAxisCount; ++i)
+    titles.push_back(plural(static_cast<Axis>(i)));  // threads are no list
   titles.emplace_back("scenes");
   titles.emplace_back("effects");
-  const bool known = std::ranges::any_of(titles, [&](const std::string& t) { return t == wanted; }) || wanted == "scene" || wanted == "effect" ||
-                     (parse_axis(wanted) && wanted != "threads");
+  const bool known = std::ranges::any_of(titles, [&](const std::string& t) { return t == wanted; }) ||
+                     wanted == "scene" || wanted == "effect" || (parse_axis(wanted) && wanted != "threads");
   if (!wanted.empty() && !known) throw UserError(unknown_name_message("axis", wanted, titles));
 
   Json document = Json::object();
   for (std::size_t i = 0; i + 1 < kAxisCount; ++i) {
     const Axis axis = static_cast<Axis>(i);
-    if (wanted.empty() || wanted == plural(axis) || wanted == to_string(axis)) document[plural(axis)] = axis_entries(axis, registry);
+    if (wanted.empty() || wanted == plural(axis) || wanted == to_string(axis))
+      document[plural(axis)] = axis_entries(axis, registry);
   }
   if (wanted.empty() || wanted == "scenes" || wanted == "scene") document["scenes"] = scene_entries();
   if (wanted.empty() || wanted == "effects" || wanted == "effect") document["effects"] = effect_entries();
@@ -106,9 +126,11 @@ ExitStatus command_list(const std::string& wanted, bool json) {
   for (const auto& [title, entries] : document.items()) {
     if (wanted.empty()) fmt::print("{}\n", title);
     std::size_t width = 0;
-    for (const Json& entry : entries) width = std::max(width, entry["name"].get_ref<const std::string&>().size());
+    for (const Json& entry : entries)
+      width = std::max(width, entry["name"].get_ref<const std::string&>().size());
     for (const Json& entry : entries) {
-      fmt::print("{}{:<{}}  {}\n", wanted.empty() ? "  " : "", entry["name"].get<std::string>(), width, remark(entry));
+      fmt::print("{}{:<{}}  {}\n", wanted.empty() ? "  " : "", entry["name"].get<std::string>(), width,
+                 remark(entry));
     }
   }
   return ExitStatus::kDone;

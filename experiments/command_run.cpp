@@ -19,16 +19,26 @@
 namespace arboretum {
 namespace {
 
-/// A rough one: repetitions last min_time, making a cell ready takes a few passes at ten million rays a second.
+/// What a scene is likely to hold, without loading it.
+std::size_t expected_triangles(const SceneSpec& spec) {
+  constexpr std::size_t kUnknown = 200'000;
+  if (!spec.generator.empty()) return spec.triangles;
+  return spec.catalogue.empty() ? kUnknown : find_catalogue_entry(spec.catalogue).triangles;
+}
+
+/// A rough one: repetitions last min_time, making a cell ready takes a few passes at ten million rays a
+/// second, a build two million triangles a second.
 double estimate_seconds(const Experiment& experiment, const Plan& plan) {
   const MeasureSettings& m = experiment.measure;
   const double pass = double(m.width) * double(m.height) / 1e7;
+  std::vector<double> build;
+  for (const SceneChoice& scene : experiment.scenes)
+    build.push_back(double(expected_triangles(scene.spec)) / 2e6);
   double seconds = 0.0;
   for (const Cell& cell : plan.cells) {
-    const double triangles = 1e5;
-    const double repetition = cell.metric == Cell::Metric::build ? triangles / 2e6 : std::max(m.min_time, pass);
-    const double prepare = cell.metric == Cell::Metric::build ? repetition : (3.0 + m.warmup) * pass;
-    seconds += m.repetitions * repetition + prepare;
+    const bool is_build = cell.metric == Cell::Metric::build;
+    const double repetition = is_build ? build[cell.scene_index] : std::max(m.min_time, pass);
+    seconds += m.repetitions * repetition + (is_build ? repetition : (3.0 + m.warmup) * pass);
   }
   return seconds;
 }
@@ -41,8 +51,9 @@ ExitStatus print_list(const Plan& plan) {
 ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
   for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.name());
   for (const SkippedCell& cell : plan.skipped) fmt::print("{}  skipped: {}\n", cell.name, cell.reason);
-  fmt::print("\n{} cells, {} skipped, {} excluded, {} filtered out; about {}\n", plan.cells.size(), plan.skipped.size(),
-             plan.excluded, plan.filtered, format_duration(estimate_seconds(experiment, plan)));
+  fmt::print("\n{} cells, {} skipped, {} excluded, {} filtered out; about {}\n", plan.cells.size(),
+             plan.skipped.size(), plan.excluded, plan.filtered,
+             format_duration(estimate_seconds(experiment, plan)));
   fmt::print("{}", skipped_lines(plan, {}));
   return ExitStatus::kDone;
 }
@@ -62,12 +73,14 @@ void refuse_other_configuration(const std::filesystem::path& folder, const std::
   if (!stream || !std::getline(stream, line)) return;
   constexpr std::string_view kHead = "# configuration hash: ";
   if (line.starts_with(kHead) && line.substr(kHead.size()) == hash) return;
-  throw UserError(fmt::format("{}: holds the results of another configuration; resume with the command that began it, or choose another folder with --out",
-                              folder.string()));
+  throw UserError(
+      fmt::format("{}: holds the results of another configuration; resume with the command that began it, or "
+                  "choose another folder with --out",
+                  folder.string()));
 }
 
-void write_results(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan, const Json& context,
-                   const BenchmarkFlags& flags) {
+void write_results(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan,
+                   const Json& context, const BenchmarkFlags& flags) {
   const std::string json = results_json(outcome, plan, context), csv = results_csv(outcome);
   write_whole(folder / "results.json", json);
   write_whole(folder / "results.csv", csv);
@@ -76,7 +89,8 @@ void write_results(const std::filesystem::path& folder, const RunOutcome& outcom
   if (flags.format == "csv") fmt::print("{}", csv);
 }
 
-ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registry& registry, const RunCommand& command) {
+ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registry& registry,
+                   const RunCommand& command) {
   const std::filesystem::path folder =
       command.out.empty() ? std::filesystem::path("results") / experiment.name : command.out;
   const std::string hash = configuration_hash(experiment);
@@ -84,15 +98,19 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registr
   require_scenes(experiment);
   make_output_folder(folder);
   if (command.resume) refuse_other_configuration(folder, hash);
+  if (!command.benchmark.out.empty())
+    AppendFile(command.benchmark.out, true);  // cannot be written: say so now
   Journal journal(folder, hash, plan, command.resume);
   for (const char* stale : {"results.json", "results.csv", "report.html"}) {
     std::error_code ignored;
     std::filesystem::remove(folder / stale, ignored);
   }
-  write_whole(folder / "effective.yaml", fmt::format("# configuration hash: {}\n{}", hash, effective_yaml(experiment)));
+  write_whole(folder / "effective.yaml",
+              fmt::format("# configuration hash: {}\n{}", hash, effective_yaml(experiment)));
   const Json context = machine_context(experiment, hash, command.command_line);
-  fmt::print(stderr, "{}: {} cells ({} done before), {} skipped; about {}\n", experiment.name, plan.cells.size(),
-             journal.done().size(), plan.skipped.size(), format_duration(estimate_seconds(experiment, plan)));
+  fmt::print(stderr, "{}: {} cells ({} done before), {} skipped; about {}\n", experiment.name,
+             plan.cells.size(), journal.done().size(), plan.skipped.size(),
+             format_duration(estimate_seconds(experiment, plan)));
 
   RunOutcome outcome = run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast});
   outcome.warnings = machine_warnings(outcome, plan);
@@ -118,7 +136,8 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registr
     if (!problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
     report = problem.empty();
   }
-  fmt::print("{}: {}\n", report ? "report" : "results", (folder / (report ? "report.html" : "results.json")).string());
+  fmt::print("{}: {}\n", report ? "report" : "results",
+             (folder / (report ? "report.html" : "results.json")).string());
   if (outcome.stopped) fmt::print("stopped at the first wrong answer (--fail-fast)\n");
   fmt::print("{}\n", why);
   return status;
@@ -127,7 +146,8 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registr
 }  // namespace
 
 ExitStatus command_run(RunCommand command) {
-  if (command.benchmark.repetitions && !command.overrides.repetitions) command.overrides.repetitions = command.benchmark.repetitions;
+  if (command.benchmark.repetitions && !command.overrides.repetitions)
+    command.overrides.repetitions = command.benchmark.repetitions;
   if (command.benchmark.min_time) command.overrides.min_time = command.benchmark.min_time;
   const Registry registry = this_registry();
   const Experiment experiment = read_experiment(command.config, registry, command.overrides);
@@ -139,7 +159,8 @@ ExitStatus command_run(RunCommand command) {
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
     std::fflush(stdout);
-    fmt::print(stderr, "arboretum: nothing to measure: {} combinations skipped, {} excluded, {} filtered out\n",
+    fmt::print(stderr,
+               "arboretum: nothing to measure: {} combinations skipped, {} excluded, {} filtered out\n",
                plan.skipped.size(), plan.excluded, plan.filtered);
     return ExitStatus::kNothingMeasured;
   }

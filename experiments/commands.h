@@ -18,7 +18,7 @@ struct RunCommand {
   std::string filter, skip;
   bool list = false, dry_run = false, resume = false, fail_fast = false, no_plots = false;
   BenchmarkFlags benchmark;
-  std::string command_line;   ///< as typed, for the results
+  std::string command_line;  ///< as typed, for the results
 };
 
 ExitStatus command_run(RunCommand command);

@@ -16,9 +16,12 @@ namespace arboretum {
 namespace {
 
 constexpr unsigned kMaxThreads = 4096;
-constexpr std::string_view kPlots[] = {"rays_per_second", "sah_cost", "build_time", "sah_vs_time", "accuracy_vs_time"};
+constexpr std::string_view kPlots[] = {"rays_per_second", "sah_cost", "build_time", "sah_vs_time",
+                                       "accuracy_vs_time"};
 
-std::vector<std::string> strings(std::span<const std::string_view> views) { return {views.begin(), views.end()}; }
+std::vector<std::string> strings(std::span<const std::string_view> views) {
+  return {views.begin(), views.end()};
+}
 
 /// Checks one value of an axis and brings it to its one spelling. Returns why not, or empty.
 std::string check_value(Axis axis, std::string& value, const Registry& registry) {
@@ -41,17 +44,20 @@ std::string check_value(Axis axis, std::string& value, const Registry& registry)
 
 class ConfigReader {
  public:
-  ConfigReader(const std::filesystem::path& file, const Registry& registry) : yaml_(file), registry_(registry) {
+  ConfigReader(const std::filesystem::path& file, const Registry& registry)
+      : yaml_(file), registry_(registry) {
     experiment_.file = file;
   }
 
   Experiment read(const Overrides& overrides) {
     const YAML::Node& root = yaml_.root();
     yaml_.check_map(root, "the configuration",
-                    std::vector<std::string>{"experiment", "scenes", "axes", "parameters", "include", "exclude", "measure", "metrics", "plots"});
+                    std::vector<std::string>{"experiment", "scenes", "axes", "parameters", "include",
+                                             "exclude", "measure", "metrics", "plots"});
     experiment_.name = experiment_.file.stem().string();
     if (const auto node = root["experiment"]) read_name(node);
-    if (!root["scenes"]) yaml_.fail(root, "no scenes; add `scenes: [bunny]` or another of `arboretum list scenes`");
+    if (!root["scenes"])
+      yaml_.fail(root, "no scenes; add `scenes: [bunny]` or another of `arboretum list scenes`");
     experiment_.scenes = read_scenes(yaml_, root["scenes"], experiment_.file.parent_path());
     if (const auto node = root["measure"]) read_measure(node);
     if (const auto node = root["axes"]) experiment_.axes = read_axes(node, "axes", false, nullptr);
@@ -64,8 +70,10 @@ class ConfigReader {
     if (const auto node = root["metrics"]) read_metrics(node);
     apply(overrides);
     fill_defaults();
-    if (const auto node = root["plots"]) read_plots(node);
-    else experiment_.plots = default_plots();
+    if (const auto node = root["plots"])
+      read_plots(node);
+    else
+      experiment_.plots = default_plots();
     return std::move(experiment_);
   }
 
@@ -74,9 +82,12 @@ class ConfigReader {
 
   void read_name(const YAML::Node& node) {
     experiment_.name = yaml_.text(node, "experiment");
-    const bool plain = std::ranges::all_of(experiment_.name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-' || c == '.'; });
+    const bool plain = std::ranges::all_of(experiment_.name, [](unsigned char c) {
+      return std::isalnum(c) || c == '_' || c == '-' || c == '.';
+    });
     if (!plain || experiment_.name.front() == '.') {
-      yaml_.fail(node, fmt::format("experiment '{}' names a folder: use letters, digits, '_', '-' and '.'", experiment_.name));
+      yaml_.fail(node, fmt::format("experiment '{}' names a folder: use letters, digits, '_', '-' and '.'",
+                                   experiment_.name));
     }
   }
 
@@ -96,9 +107,11 @@ class ConfigReader {
       const Axis a = *parse_axis(key);
       for (const YAML::Node& node : nodes) {
         std::string value = node.Scalar();
-        if (const std::string wrong = check_value(a, value, registry_); !wrong.empty()) yaml_.fail(node, wrong);
+        if (const std::string wrong = check_value(a, value, registry_); !wrong.empty())
+          yaml_.fail(node, wrong);
         auto& list = lists[index_of(a)];
-        if (std::ranges::find(list, value) != list.end()) yaml_.fail(node, fmt::format("{}: '{}' is given twice; keep one", key, value));
+        if (std::ranges::find(list, value) != list.end())
+          yaml_.fail(node, fmt::format("{}: '{}' is given twice; keep one", key, value));
         list.push_back(value);
       }
     }
@@ -108,13 +121,15 @@ class ConfigReader {
   std::string known_scene(const YAML::Node& node) {
     std::vector<std::string> names;
     for (const SceneChoice& s : experiment_.scenes) names.push_back(s.name);
-    if (std::ranges::find(names, node.Scalar()) == names.end()) yaml_.fail(node, unknown_name_message("scene", node.Scalar(), names));
+    if (std::ranges::find(names, node.Scalar()) == names.end())
+      yaml_.fail(node, unknown_name_message("scene", node.Scalar(), names));
     return node.Scalar();
   }
 
   std::vector<CellChoice> read_choices(const YAML::Node& node, std::string_view what) {
     if (!node.IsSequence() || node.size() == 0) {
-      yaml_.fail(node, fmt::format("{} must be a list of maps, as in {}: [{{structure: embree}}]", what, what));
+      yaml_.fail(node,
+                 fmt::format("{} must be a list of maps, as in {}: [{{structure: embree}}]", what, what));
     }
     std::vector<CellChoice> choices;
     for (const YAML::Node& entry : node) {
@@ -123,7 +138,8 @@ class ConfigReader {
       choice.axes = read_axes(entry, what, true, &choice);
       if (entry.size() == 0) yaml_.fail(entry, fmt::format("{}: an entry names no axis", what));
       if (what == "include" && choice.axes[index_of(Axis::structure)].empty()) {
-        yaml_.fail(entry, "include: an entry names its structure, as in {structure: embree, builder: medium}");
+        yaml_.fail(entry,
+                   "include: an entry names its structure, as in {structure: embree, builder: medium}");
       }
       choices.push_back(std::move(choice));
     }
@@ -146,16 +162,19 @@ class ConfigReader {
 
   void read_measure(const YAML::Node& map) {
     yaml_.check_map(map, "measure",
-                    std::vector<std::string>{"repetitions", "warmup", "min_time", "resolution", "threads", "memory", "seed"});
+                    std::vector<std::string>{"repetitions", "warmup", "min_time", "resolution", "threads",
+                                             "memory", "seed"});
     MeasureSettings& m = experiment_.measure;
-    if (const auto n = map["repetitions"]) m.repetitions = static_cast<unsigned>(yaml_.integer(n, "repetitions", 1, 100000));
+    if (const auto n = map["repetitions"])
+      m.repetitions = static_cast<unsigned>(yaml_.integer(n, "repetitions", 1, 100000));
     if (const auto n = map["warmup"]) m.warmup = static_cast<unsigned>(yaml_.integer(n, "warmup", 0, 1000));
     if (const auto n = map["min_time"]) m.min_time = yaml_.number(n, "min_time (seconds)", 0.0, 3600.0);
     if (const auto n = map["threads"]) threads_ = std::to_string(yaml_.integer(n, "threads", 1, kMaxThreads));
     if (const auto n = map["memory"]) m.memory = yaml_.bytes(n, "memory");
     if (const auto n = map["seed"]) m.seed = yaml_.integer(n, "seed", 0, ~std::uint64_t{0});
     if (const auto n = map["resolution"]) {
-      if (!n.IsSequence() || n.size() != 2) yaml_.fail(n, "resolution must be [width, height], as in [512, 512]");
+      if (!n.IsSequence() || n.size() != 2)
+        yaml_.fail(n, "resolution must be [width, height], as in [512, 512]");
       m.width = static_cast<unsigned>(yaml_.integer(n[0], "resolution: width", 1, 32768));
       m.height = static_cast<unsigned>(yaml_.integer(n[1], "resolution: height", 1, 32768));
     }
@@ -167,11 +186,17 @@ class ConfigReader {
     const std::vector<std::string> known = strings(kMetricNames);
     for (const YAML::Node& value : yaml_.list(node, "metrics")) {
       const std::string name = value.Scalar();
-      if (std::ranges::find(known, name) == known.end()) yaml_.fail(value, unknown_name_message("metric", name, known));
-      (name == "trace" ? m.trace : name == "build" ? m.build : name == "quality" ? m.quality : m.accuracy) = true;
+      if (std::ranges::find(known, name) == known.end())
+        yaml_.fail(value, unknown_name_message("metric", name, known));
+      (name == "trace"     ? m.trace
+       : name == "build"   ? m.build
+       : name == "quality" ? m.quality
+                           : m.accuracy) = true;
     }
-    if (m.accuracy && !m.trace) yaml_.fail(node, "metric accuracy has no effect without trace: add trace or take accuracy out");
-    if (m.quality && !m.trace && !m.build) yaml_.fail(node, "metric quality has no effect without trace or build: add one of them");
+    if (m.accuracy && !m.trace)
+      yaml_.fail(node, "metric accuracy has no effect without trace: add trace or take accuracy out");
+    if (m.quality && !m.trace && !m.build)
+      yaml_.fail(node, "metric quality has no effect without trace or build: add one of them");
   }
 
   bool plot_has_data(std::string_view plot) const {
@@ -195,8 +220,10 @@ class ConfigReader {
     const std::vector<std::string> known = strings(kPlots);
     for (const YAML::Node& value : yaml_.list(node, "plots")) {
       const std::string name = value.Scalar();
-      if (std::ranges::find(known, name) == known.end()) yaml_.fail(value, unknown_name_message("plot", name, known));
-      if (!plot_has_data(name)) yaml_.fail(value, fmt::format("plot {} has no data: a metric that it shows is not in metrics", name));
+      if (std::ranges::find(known, name) == known.end())
+        yaml_.fail(value, unknown_name_message("plot", name, known));
+      if (!plot_has_data(name))
+        yaml_.fail(value, fmt::format("plot {} has no data: a metric that it shows is not in metrics", name));
       experiment_.plots.push_back(name);
     }
   }
@@ -205,7 +232,8 @@ class ConfigReader {
     for (const std::string& word : overrides.axes) apply_axis(word);
     if (overrides.threads) {
       if (*overrides.threads < 1 || *overrides.threads > kMaxThreads) {
-        throw UserError(fmt::format("--threads: an integer from 1 to {}, not {}", kMaxThreads, *overrides.threads));
+        throw UserError(
+            fmt::format("--threads: an integer from 1 to {}, not {}", kMaxThreads, *overrides.threads));
       }
       axis(Axis::threads) = {std::to_string(*overrides.threads)};
       experiment_.overridden = true;
@@ -218,27 +246,35 @@ class ConfigReader {
   void apply_axis(const std::string& word) {
     const std::size_t equals = word.find('=');
     if (equals == std::string::npos) {
-      throw UserError(fmt::format("command line: '{}' is no axis=value,value; for example isa=avx2,avx512", word));
+      throw UserError(
+          fmt::format("command line: '{}' is no axis=value,value; for example isa=avx2,avx512", word));
     }
     const std::string key = word.substr(0, equals);
     std::vector<std::string> names = strings(kAxisNames);
     names.emplace_back("scene");
-    if (std::ranges::find(names, key) == names.end()) throw UserError("command line: " + unknown_name_message("axis", key, names));
+    if (std::ranges::find(names, key) == names.end())
+      throw UserError("command line: " + unknown_name_message("axis", key, names));
     std::vector<std::string> values;
     for (std::size_t begin = equals + 1; begin <= word.size();) {
       const std::size_t comma = std::min(word.find(',', begin), word.size());
       std::string value = word.substr(begin, comma - begin);
       begin = comma + 1;
-      if (value.empty()) throw UserError(fmt::format("command line: '{}' holds an empty value; give {}=value,value", word, key));
+      if (value.empty())
+        throw UserError(
+            fmt::format("command line: '{}' holds an empty value; give {}=value,value", word, key));
       if (key != "scene") {
-        if (const std::string wrong = check_value(*parse_axis(key), value, registry_); !wrong.empty()) throw UserError("command line: " + wrong);
+        if (const std::string wrong = check_value(*parse_axis(key), value, registry_); !wrong.empty())
+          throw UserError("command line: " + wrong);
       }
-      if (std::ranges::find(values, value) != values.end()) throw UserError(fmt::format("command line: {}: '{}' is given twice; keep one", key, value));
+      if (std::ranges::find(values, value) != values.end())
+        throw UserError(fmt::format("command line: {}: '{}' is given twice; keep one", key, value));
       values.push_back(value);
     }
     experiment_.overridden = true;
-    if (key == "scene") choose_scenes(values);
-    else axis(*parse_axis(key)) = values;
+    if (key == "scene")
+      choose_scenes(values);
+    else
+      axis(*parse_axis(key)) = values;
   }
 
   /// A scene on the command line is one of the configuration's by its name, or any other that the word names.
@@ -279,9 +315,12 @@ class ConfigReader {
 
 }  // namespace
 
-std::span<const std::string_view> plot_names() { return kPlots; }
+std::span<const std::string_view> plot_names() {
+  return kPlots;
+}
 
-Experiment read_experiment(const std::filesystem::path& file, const Registry& registry, const Overrides& overrides) {
+Experiment read_experiment(const std::filesystem::path& file, const Registry& registry,
+                           const Overrides& overrides) {
   return ConfigReader(file, registry).read(overrides);
 }
 

@@ -1,5 +1,5 @@
-// Experiment: what a configuration file asks for, checked. Nothing in it is guessed: a key or value that means nothing
-// is an error that names file, line and the nearest valid word.
+// Experiment: what a configuration file asks for, checked. Nothing in it is guessed: a key or value that
+// means nothing is an error that names file, line and the nearest valid word.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +31,8 @@ struct CellChoice {
 
 struct MeasureSettings {
   unsigned repetitions = 7;
-  unsigned warmup = 1;      ///< untimed passes over all rays before the first repetition
-  double min_time = 0.2;    ///< seconds that one repetition lasts at least
+  unsigned warmup = 1;    ///< untimed passes over all rays before the first repetition
+  double min_time = 0.2;  ///< seconds that one repetition lasts at least
   unsigned width = 512, height = 512;
   std::size_t memory = std::size_t{8} << 30;  ///< bytes of structures held at once
   std::uint64_t seed = 1;

@@ -23,16 +23,20 @@ std::vector<std::string> generator_names() {
 SceneSpec named(const std::string& name) {
   const CatalogueEntry entry = find_catalogue_entry(name);
   SceneSpec spec;
-  if (entry.source == CatalogueEntry::Source::generator) spec.generator = name, spec.triangles = entry.triangles;
-  else spec.catalogue = name;
+  if (entry.source == CatalogueEntry::Source::generator)
+    spec.generator = name, spec.triangles = entry.triangles;
+  else
+    spec.catalogue = name;
   return spec;
 }
 
-std::filesystem::path existing(const YamlReader& yaml, const YAML::Node& node, std::string_view what, const std::filesystem::path& folder) {
+std::filesystem::path existing(const YamlReader& yaml, const YAML::Node& node, std::string_view what,
+                               const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / yaml.text(node, what);
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
-    yaml.fail(node, fmt::format("{} '{}' is no file; paths are relative to the configuration", what, path.string()));
+    yaml.fail(node, fmt::format("{} '{}' is no file; paths are relative to the configuration", what,
+                                path.string()));
   }
   return path;
 }
@@ -54,14 +58,18 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
   if (const auto n = node["generate"]) {
     spec.generator = yaml.text(n, "generate");
     const std::vector<std::string> known = generator_names();
-    if (std::ranges::find(known, spec.generator) == known.end()) yaml.fail(n, unknown_name_message("generator", spec.generator, known));
+    if (std::ranges::find(known, spec.generator) == known.end())
+      yaml.fail(n, unknown_name_message("generator", spec.generator, known));
     spec.triangles = find_catalogue_entry(spec.generator).triangles;
   }
   for (const char* key : {"triangles", "seed"}) {
-    if (node[key] && spec.generator.empty()) yaml.fail(node[key], fmt::format("{} has no effect without generate: take it out", key));
+    if (node[key] && spec.generator.empty())
+      yaml.fail(node[key], fmt::format("{} has no effect without generate: take it out", key));
   }
-  if (const auto n = node["triangles"]) spec.triangles = yaml.integer(n, "triangles", 1, std::uint64_t{1} << 31);
-  if (const auto n = node["seed"]) spec.seed = yaml.integer(n, "seed", 0, std::numeric_limits<std::uint64_t>::max());
+  if (const auto n = node["triangles"])
+    spec.triangles = yaml.integer(n, "triangles", 1, std::uint64_t{1} << 31);
+  if (const auto n = node["seed"])
+    spec.seed = yaml.integer(n, "seed", 0, std::numeric_limits<std::uint64_t>::max());
   return spec;
 }
 
@@ -74,7 +82,8 @@ std::string cell_word(std::string name) {
 
 }  // namespace
 
-std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& node, const std::filesystem::path& folder) {
+std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& node,
+                                     const std::filesystem::path& folder) {
   if (!node.IsSequence()) yaml.fail(node, "scenes must be a list, as in scenes: [bunny]");
   if (node.size() == 0) yaml.fail(node, "scenes is empty; name at least one, as in scenes: [bunny]");
   std::vector<SceneChoice> scenes;
@@ -82,7 +91,8 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
     SceneSpec spec = read_scene(yaml, entry, folder);
     std::string name = cell_word(spec.name());
     if (std::ranges::find(scenes, name, &SceneChoice::name) != scenes.end()) {
-      yaml.fail(entry, fmt::format("scene '{}' is given twice; keep one, or give the files different names", name));
+      yaml.fail(entry,
+                fmt::format("scene '{}' is given twice; keep one, or give the files different names", name));
     }
     scenes.push_back({std::move(spec), std::move(name)});
   }

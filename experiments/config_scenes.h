@@ -1,4 +1,5 @@
-// The `scenes:` list of a configuration, checked before anything is measured: names are known and files exist.
+// The `scenes:` list of a configuration, checked before anything is measured: names are known and files
+// exist.
 #pragma once
 
 #include <filesystem>

@@ -20,8 +20,12 @@ void emit_scene(YAML::Emitter& out, const SceneSpec& spec) {
     return;
   }
   out << YAML::Flow << YAML::BeginMap;
-  if (!spec.file.empty()) out << YAML::Key << "file" << YAML::Value << std::filesystem::absolute(spec.file).lexically_normal().string();
-  if (!spec.scene.empty()) out << YAML::Key << "scene" << YAML::Value << std::filesystem::absolute(spec.scene).lexically_normal().string();
+  if (!spec.file.empty())
+    out << YAML::Key << "file" << YAML::Value
+        << std::filesystem::absolute(spec.file).lexically_normal().string();
+  if (!spec.scene.empty())
+    out << YAML::Key << "scene" << YAML::Value
+        << std::filesystem::absolute(spec.scene).lexically_normal().string();
   if (!spec.generator.empty()) {
     out << YAML::Key << "generate" << YAML::Value << spec.generator << YAML::Key << "triangles" << YAML::Value
         << spec.triangles << YAML::Key << "seed" << YAML::Value << spec.seed;
@@ -62,19 +66,22 @@ std::string text(const Experiment& e, bool with_plots) {
   for (const std::string& name : parameter_names()) {
     const auto named = e.parameters.find(name);
     out << YAML::Key << name << YAML::Value;
-    emit_list(out, named == e.parameters.end() ? std::vector<std::string>{default_parameter(name)} : named->second);
+    emit_list(
+        out, named == e.parameters.end() ? std::vector<std::string>{default_parameter(name)} : named->second);
   }
   out << YAML::EndMap;
   emit_choices(out, "include", e.include);
   emit_choices(out, "exclude", e.exclude);
   const MeasureSettings& m = e.measure;
   out << YAML::Key << "measure" << YAML::Value << YAML::BeginMap << YAML::Key << "repetitions" << YAML::Value
-      << m.repetitions << YAML::Key << "warmup" << YAML::Value << m.warmup << YAML::Key << "min_time" << YAML::Value
-      << fmt::format("{}", m.min_time) << YAML::Key << "resolution" << YAML::Value << YAML::Flow << YAML::BeginSeq
-      << m.width << m.height << YAML::EndSeq << YAML::Key << "memory" << YAML::Value << m.memory << YAML::Key << "seed"
-      << YAML::Value << m.seed << YAML::EndMap;
+      << m.repetitions << YAML::Key << "warmup" << YAML::Value << m.warmup << YAML::Key << "min_time"
+      << YAML::Value << fmt::format("{}", m.min_time) << YAML::Key << "resolution" << YAML::Value
+      << YAML::Flow << YAML::BeginSeq << m.width << m.height << YAML::EndSeq << YAML::Key << "memory"
+      << YAML::Value << m.memory << YAML::Key << "seed" << YAML::Value << m.seed << YAML::EndMap;
   std::vector<std::string> metrics;
-  for (const auto& [name, on] : {std::pair{"trace", e.metrics.trace}, {"build", e.metrics.build}, {"quality", e.metrics.quality},
+  for (const auto& [name, on] : {std::pair{"trace", e.metrics.trace},
+                                 {"build", e.metrics.build},
+                                 {"quality", e.metrics.quality},
                                  {"accuracy", e.metrics.accuracy}}) {
     if (on) metrics.emplace_back(name);
   }
@@ -90,7 +97,9 @@ std::string text(const Experiment& e, bool with_plots) {
 
 }  // namespace
 
-std::string effective_yaml(const Experiment& experiment) { return text(experiment, true); }
+std::string effective_yaml(const Experiment& experiment) {
+  return text(experiment, true);
+}
 
 std::string configuration_hash(const Experiment& experiment) {
   std::uint64_t hash = 0xcbf29ce484222325u;

@@ -38,7 +38,9 @@ void initialize_benchmark(const std::vector<std::string>& flags) {
   for (std::string& word : words) arguments.push_back(word.data());
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
-  if (count > 1) throw UserError("Google Benchmark does not take '" + std::string(arguments[1]) + "'; see its user guide for the --benchmark_* flags");
+  if (count > 1)
+    throw UserError("Google Benchmark does not take '" + std::string(arguments[1]) +
+                    "'; see its user guide for the --benchmark_* flags");
 }
 
 void run_interleaved(std::vector<InterleavedJob> jobs) {
@@ -46,24 +48,28 @@ void run_interleaved(std::vector<InterleavedJob> jobs) {
   benchmark::ClearRegisteredBenchmarks();
   for (InterleavedJob& job : jobs) {
     if (job.indices.empty()) continue;
-    benchmark::RegisterBenchmark(job.name.c_str(), [&job, &thrown, done = std::size_t{0}](benchmark::State& state) mutable {
-      StateLoop loop(state);
-      // After an error the loops still run, empty: Google Benchmark insists on equal iterations of all repetitions.
-      const auto run_empty = [&loop] {
-        while (loop.next()) {
-        }
-      };
-      if (thrown) return run_empty();
-      try {
-        Repetition repetition = job.measure(loop);
-        repetition.index = job.indices.at(done++);
-        repetition.iterations = job.iterations;
-        job.ended(repetition);
-      } catch (...) {  // Google Benchmark is no place to throw through; rethrown below
-        thrown = std::current_exception();
-        run_empty();
-      }
-    })->Iterations(static_cast<benchmark::IterationCount>(job.iterations))
+    benchmark::RegisterBenchmark(
+        job.name.c_str(),
+        [&job, &thrown, done = std::size_t{0}](benchmark::State& state) mutable {
+          StateLoop loop(state);
+          // After an error the loops still run, empty: Google Benchmark insists on equal iterations of all
+          // repetitions.
+          const auto run_empty = [&loop] {
+            while (loop.next()) {
+            }
+          };
+          if (thrown) return run_empty();
+          try {
+            Repetition repetition = job.measure(loop);
+            repetition.index = job.indices.at(done++);
+            repetition.iterations = job.iterations;
+            job.ended(repetition);
+          } catch (...) {  // Google Benchmark is no place to throw through; rethrown below
+            thrown = std::current_exception();
+            run_empty();
+          }
+        })
+        ->Iterations(static_cast<benchmark::IterationCount>(job.iterations))
         ->Repetitions(static_cast<int>(job.indices.size()))
         ->Unit(benchmark::kMillisecond);
   }

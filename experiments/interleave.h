@@ -1,5 +1,5 @@
-// Repetitions of many jobs in random order, through Google Benchmark, so that a machine that slows down for a while
-// slows all of them alike.
+// Repetitions of many jobs in random order, through Google Benchmark, so that a machine that slows down for a
+// while slows all of them alike.
 #pragma once
 
 #include <functional>
@@ -19,14 +19,14 @@ class TimedLoop {
 
 struct InterleavedJob {
   std::string name;
-  std::vector<unsigned> indices;  ///< of the repetitions to run
-  std::uint64_t iterations = 1;   ///< of each repetition
+  std::vector<unsigned> indices;                  ///< of the repetitions to run
+  std::uint64_t iterations = 1;                   ///< of each repetition
   std::function<Repetition(TimedLoop&)> measure;  ///< one repetition; fills in the times
   std::function<void(const Repetition&)> ended;   ///< called right after each
 };
 
-/// Hands Google Benchmark its own `--benchmark_*` flags, random interleaving on unless they say otherwise. Call once,
-/// before run_interleaved. Throws UserError for a flag that it does not know.
+/// Hands Google Benchmark its own `--benchmark_*` flags, random interleaving on unless they say otherwise.
+/// Call once, before run_interleaved. Throws UserError for a flag that it does not know.
 void initialize_benchmark(const std::vector<std::string>& flags);
 
 /// Runs every repetition of every job. What a job throws ends the run and comes out here.

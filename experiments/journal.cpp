@@ -7,7 +7,9 @@
 namespace arboretum {
 namespace {
 
-Json parse(const std::string& line) { return Json::parse(line, nullptr, false); }
+Json parse(const std::string& line) {
+  return Json::parse(line, nullptr, false);
+}
 
 }  // namespace
 
@@ -23,13 +25,16 @@ Journal::Journal(std::filesystem::path folder, std::string configuration_hash, c
         if (!line.is_object()) continue;  // torn by a kill
         const std::string hash = line.value("configuration_hash", "");
         if (hash != hash_) {
-          throw UserError(fmt::format("{}: holds another configuration (hash {}, this one is {}); resume with the command that began it, or choose another folder with --out",
-                                      folder_.string(), hash.empty() ? "unknown" : hash, hash_));
+          throw UserError(
+              fmt::format("{}: holds another configuration (hash {}, this one is {}); resume with the "
+                          "command that began it, or choose another folder with --out",
+                          folder_.string(), hash.empty() ? "unknown" : hash, hash_));
         }
         const auto found = wanted.find(line.value("name", ""));
         if (found == wanted.end()) continue;
         if (path == cells) {
-          if (auto result = parse_cell_line(line, *found->second, hash_)) done_.insert_or_assign(found->first, std::move(*result));
+          if (auto result = parse_cell_line(line, *found->second, hash_))
+            done_.insert_or_assign(found->first, std::move(*result));
         } else if (const auto entry = parse_journal_line(line)) {
           started_[entry->first].insert_or_assign(entry->second.index, entry->second);
         }
@@ -54,6 +59,8 @@ void Journal::add(const std::string& name, const Repetition& repetition) {
   repetitions_.append(line.dump());
 }
 
-void Journal::finish(const CellResult& result) { cells_.append(cell_line(result, hash_).dump()); }
+void Journal::finish(const CellResult& result) {
+  cells_.append(cell_line(result, hash_).dump());
+}
 
 }  // namespace arboretum

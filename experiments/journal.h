@@ -1,5 +1,5 @@
-// Journal: what a run has measured so far, on disk. cells.jsonl holds the cells that are done, repetitions.jsonl every
-// repetition as it ended; --resume reads both.
+// Journal: what a run has measured so far, on disk. cells.jsonl holds the cells that are done,
+// repetitions.jsonl every repetition as it ended; --resume reads both.
 #pragma once
 
 #include <filesystem>
@@ -15,8 +15,8 @@ namespace arboretum {
 
 class Journal {
  public:
-  /// Opens the files in `folder`. With `resume`, takes up what they hold of `plan`; without, starts them anew.
-  /// Throws UserError when the folder holds another configuration's results, or cannot be written.
+  /// Opens the files in `folder`. With `resume`, takes up what they hold of `plan`; without, starts them
+  /// anew. Throws UserError when the folder holds another configuration's results, or cannot be written.
   Journal(std::filesystem::path folder, std::string configuration_hash, const Plan& plan, bool resume);
 
   /// Results of the cells that are done, by name.

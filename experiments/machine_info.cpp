@@ -35,11 +35,14 @@ std::string first_line(const char* path) {
   return line;
 }
 
-/// Output of git in the source folder; empty when there is no git or no repository. Arguments are constants of ours.
+/// Output of git in the source folder; empty when there is no git or no repository. Arguments are constants
+/// of ours.
 std::string git(const std::string& arguments) {
   std::string quoted = build_info::kSourceDirectory;
-  for (std::size_t i = 0; (i = quoted.find('\'', i)) != std::string::npos; i += 4) quoted.replace(i, 1, "'\\''");
-  const std::string command = fmt::format("git -c safe.directory='*' -C '{}' {} 2>/dev/null", quoted, arguments);
+  for (std::size_t i = 0; (i = quoted.find('\'', i)) != std::string::npos; i += 4)
+    quoted.replace(i, 1, "'\\''");
+  const std::string command =
+      fmt::format("git -c safe.directory='*' -C '{}' {} 2>/dev/null", quoted, arguments);
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
   std::string text;
   char buffer[256];
@@ -50,7 +53,8 @@ std::string git(const std::string& arguments) {
 
 }  // namespace
 
-Json machine_context(const Experiment& experiment, const std::string& configuration_hash, const std::string& command) {
+Json machine_context(const Experiment& experiment, const std::string& configuration_hash,
+                     const std::string& command) {
   Json context = Json::object();
   const std::time_t now = std::time(nullptr);
   const benchmark::CPUInfo& cpu = benchmark::CPUInfo::Get();
@@ -62,7 +66,10 @@ Json machine_context(const Experiment& experiment, const std::string& configurat
   context["cpu_scaling_enabled"] = cpu.scaling == benchmark::CPUInfo::ENABLED;
   Json& caches = context["caches"] = Json::array();
   for (const auto& cache : cpu.caches) {
-    caches.push_back({{"type", cache.type}, {"level", cache.level}, {"size", cache.size}, {"num_sharing", cache.num_sharing}});
+    caches.push_back({{"type", cache.type},
+                      {"level", cache.level},
+                      {"size", cache.size},
+                      {"num_sharing", cache.num_sharing}});
   }
   context["load_avg"] = cpu.load_avg;
 
@@ -76,9 +83,11 @@ Json machine_context(const Experiment& experiment, const std::string& configurat
   const std::string governor = first_line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
   context["governor"] = governor.empty() ? "unknown" : governor;
   context["load"] = first_line("/proc/loadavg");
-  context["memory_bytes"] = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
+  context["memory_bytes"] = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
+                            static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
   utsname system{};
-  if (::uname(&system) == 0) context["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
+  if (::uname(&system) == 0)
+    context["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
   context["compiler"] = build_info::kCompiler;
   context["compiler_flags"] = build_info::kFlags;
   context["build_type"] = build_info::kBuildType;

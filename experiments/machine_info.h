@@ -1,4 +1,5 @@
-// The `context` of results.json: the machine, the build, the revision and the configuration that figures come from.
+// The `context` of results.json: the machine, the build, the revision and the configuration that figures come
+// from.
 #pragma once
 
 #include <string>
@@ -9,6 +10,7 @@
 namespace arboretum {
 
 /// Google Benchmark's own context fields and ours. `command` is the command line as typed.
-[[nodiscard]] Json machine_context(const Experiment& experiment, const std::string& configuration_hash, const std::string& command);
+[[nodiscard]] Json machine_context(const Experiment& experiment, const std::string& configuration_hash,
+                                   const std::string& command);
 
 }  // namespace arboretum

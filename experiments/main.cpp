@@ -25,17 +25,22 @@ struct Arguments {
 };
 
 void declare_run(CLI::App& app, RunCommand& run) {
-  CLI::App* c = app.add_subcommand("run", "Run the sweep of a configuration; table, results, plots and report");
+  CLI::App* c =
+      app.add_subcommand("run", "Run the sweep of a configuration; table, results, plots and report");
   c->add_option("CONFIG", run.config, "The configuration, a YAML file")->required();
-  c->add_option("AXIS", run.overrides.axes, "axis=value,value in place of the configuration's (isa=avx2,avx512)");
+  c->add_option("AXIS", run.overrides.axes,
+                "axis=value,value in place of the configuration's (isa=avx2,avx512)");
   c->add_option("--out", run.out, "Result folder (default: results/<experiment>)");
   c->add_flag("--list", run.list, "Print the cells' names and measure nothing");
-  c->add_flag("--dry-run", run.dry_run, "Print cells, skipped ones with reasons and a time estimate; measure nothing");
+  c->add_flag("--dry-run", run.dry_run,
+              "Print cells, skipped ones with reasons and a time estimate; measure nothing");
   c->add_option("--filter", run.filter, "Only cells whose name this regular expression finds");
   c->add_option("--skip", run.skip, "No cells whose name this regular expression finds");
   c->add_flag("--resume", run.resume, "Go on with a run that was cut off");
-  c->add_option("--repetitions", run.overrides.repetitions, "Timed repetitions of each cell")->check(CLI::Range(1, 100000));
-  c->add_option("--threads", run.overrides.threads, "Threads, in place of the configuration's")->check(CLI::Range(1, 4096));
+  c->add_option("--repetitions", run.overrides.repetitions, "Timed repetitions of each cell")
+      ->check(CLI::Range(1, 100000));
+  c->add_option("--threads", run.overrides.threads, "Threads, in place of the configuration's")
+      ->check(CLI::Range(1, 4096));
   c->add_option("--seed", run.overrides.seed, "Seed of the workloads' random numbers");
   c->add_flag("--fail-fast", run.fail_fast, "Stop at the first wrong answer");
   c->add_flag("--no-plots", run.no_plots, "Draw no plots and write no report");
@@ -47,7 +52,9 @@ void declare(CLI::App& app, Arguments& a) {
   app.set_version_flag("--version", std::string(build_info::kVersion));
   declare_run(app, a.run);
   CLI::App* list = app.add_subcommand("list", "What can be swept");
-  list->add_option("AXIS", a.axis, "structures, builders, leaves, intersectors, boxes, traversals, isas, workloads, scenes, effects");
+  list->add_option(
+      "AXIS", a.axis,
+      "structures, builders, leaves, intersectors, boxes, traversals, isas, workloads, scenes, effects");
   list->add_flag("--json", a.json, "As JSON");
   CLI::App* info = app.add_subcommand("info", "What a scene holds");
   info->add_option("SCENE", a.scene, "A catalogue name, a file, or generator:triangles[:seed]")->required();
@@ -57,7 +64,8 @@ void declare(CLI::App& app, Arguments& a) {
   plot->add_option("--only", a.figures, "These figures alone")->delimiter(',');
   CLI::App* fetch = app.add_subcommand("fetch", "Bring catalogue scenes from their packages");
   fetch->add_option("SCENE", a.fetched, "Names of `list scenes`")->required();
-  for (CLI::App* c : app.get_subcommands({})) c->allow_extras();  // unknown options are named by us, with the nearest
+  for (CLI::App* c : app.get_subcommands({}))
+    c->allow_extras();  // unknown options are named by us, with the nearest
 }
 
 std::vector<std::string> command_names(const CLI::App& app) {
@@ -68,12 +76,15 @@ std::vector<std::string> command_names(const CLI::App& app) {
 
 void refuse_extras(const CLI::App& command) {
   for (const std::string& word : command.remaining()) {
-    if (!word.starts_with("-")) throw UserError(fmt::format("{}: '{}' is one word too many; see `arboretum {} --help`", command.get_name(), word, command.get_name()));
+    if (!word.starts_with("-"))
+      throw UserError(fmt::format("{}: '{}' is one word too many; see `arboretum {} --help`",
+                                  command.get_name(), word, command.get_name()));
     std::vector<std::string> options;
     for (const CLI::Option* option : command.get_options({})) {
       for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
     }
-    throw UserError(fmt::format("{}: {}", command.get_name(), unknown_name_message("option", word.substr(0, word.find('=')), options)));
+    throw UserError(fmt::format("{}: {}", command.get_name(),
+                                unknown_name_message("option", word.substr(0, word.find('=')), options)));
   }
 }
 
@@ -83,7 +94,9 @@ ExitStatus dispatch(std::vector<std::string> words) {
   CLI::App app("Arboretum: a research testbed of ray-tracing acceleration structures", "arboretum");
   declare(app, a);
   const std::vector<std::string> commands = command_names(app);
-  if (words.empty()) throw UserError(fmt::format("no command; one of {} (arboretum --help says more)", fmt::join(commands, ", ")));
+  if (words.empty())
+    throw UserError(
+        fmt::format("no command; one of {} (arboretum --help says more)", fmt::join(commands, ", ")));
   if (!words.front().starts_with("-") && std::ranges::find(commands, words.front()) == commands.end()) {
     throw UserError(unknown_name_message("command", words.front(), commands));
   }
@@ -128,7 +141,8 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   try {
     const int status = static_cast<int>(dispatch({argv + 1, argv + argc}));
-    if (std::fflush(stdout) != 0 || std::ferror(stdout)) return fail("output cannot be written: stdout is full or closed");
+    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+      return fail("output cannot be written: stdout is full or closed");
     return status;
   } catch (const UserError& e) {
     std::fflush(stdout);
@@ -136,7 +150,8 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return fail("out of memory; lower the number of triangles or the resolution");
   } catch (const std::system_error& e) {
-    return fail(fmt::format("output cannot be written: {}; free some space or write elsewhere", e.code().message()));
+    return fail(
+        fmt::format("output cannot be written: {}; free some space or write elsewhere", e.code().message()));
   } catch (const std::exception& e) {
     return fail(fmt::format("internal error: {}; please report it with the command line", e.what()));
   }

@@ -44,7 +44,8 @@ template <class T>
 bool parse_within(const std::string& text, double low, double high, T& out) {
   T value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high)) return false;
+  if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high))
+    return false;
   out = value;
   return true;
 }

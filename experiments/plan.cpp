@@ -12,19 +12,22 @@
 namespace arboretum {
 
 std::string Cell::name() const {
-  return fmt::format("{}/{}/{}/{}/{}/{}/{}/{}/{}/{}/threads:{}", to_string(metric), scene, structure, builder_name(), leaf,
-                     intersector, box, traversal, to_string(isa), workload, threads);
+  return fmt::format("{}/{}/{}/{}/{}/{}/{}/{}/{}/{}/threads:{}", to_string(metric), scene, structure,
+                     builder_name(), leaf, intersector, box, traversal, to_string(isa), workload, threads);
 }
 
 namespace {
 
 constexpr std::string_view kEmbreeMissing = "this build has no embree: install libembree-dev and build again";
 
-bool contains(const std::vector<std::string>& list, std::string_view value) { return std::ranges::find(list, value) != list.end(); }
+bool contains(const std::vector<std::string>& list, std::string_view value) {
+  return std::ranges::find(list, value) != list.end();
+}
 
 class Planner {
  public:
-  Planner(const Experiment& experiment, const Registry& registry) : experiment_(experiment), registry_(registry) {
+  Planner(const Experiment& experiment, const Registry& registry)
+      : experiment_(experiment), registry_(registry) {
     points_ = parameter_points(experiment.parameters);
   }
 
@@ -69,9 +72,11 @@ class Planner {
     cell.traversal = resolve_traversal(cell.traversal, cell.isa);
     if (cell.box == kAuto) cell.box = default_box(cell.intersector);
     if (entry && !entry->info.uses_parameters) cell.parameters = {}, cell.parameter_label.clear();
-    if (cell.builder == kAuto) cell.builder = entry && !entry->info.builders.empty() ? entry->info.builders.front() : kNone;
+    if (cell.builder == kAuto)
+      cell.builder = entry && !entry->info.builders.empty() ? entry->info.builders.front() : kNone;
     if (cell.leaf == kAuto) {
-      const std::string_view leaf = entry ? registry_.default_leaf(cell.structure, cell.intersector, cell.isa) : "";
+      const std::string_view leaf =
+          entry ? registry_.default_leaf(cell.structure, cell.intersector, cell.isa) : "";
       cell.leaf = leaf.empty() ? kNone : leaf;
     }
   }
@@ -81,11 +86,14 @@ class Planner {
     if (!entry) return std::string(kEmbreeMissing);
     const auto& builders = entry->info.builders;
     if (!builders.empty() && std::ranges::find(builders, cell.builder) == builders.end()) {
-      return fmt::format("{} has no builder {} (it takes {})", cell.structure, cell.builder, fmt::join(builders, ", "));
+      return fmt::format("{} has no builder {} (it takes {})", cell.structure, cell.builder,
+                         fmt::join(builders, ", "));
     }
-    cell.kernel = registry_.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
+    cell.kernel =
+        registry_.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
     if (!cell.kernel) {
-      const std::string why = registry_.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
+      const std::string why = registry_.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box,
+                                                      cell.traversal, cell.isa);
       return why.empty() ? "no such kernel in this build" : why;
     }
     if (!registry_.has(cell.isa)) return fmt::format("no {}", to_string(cell.isa));
@@ -94,12 +102,21 @@ class Planner {
 
   bool matches(const CellChoice& choice, const Cell& cell) const {
     if (!choice.scenes.empty() && !contains(choice.scenes, cell.scene)) return false;
-    const std::string values[kAxisCount] = {cell.structure, cell.builder, cell.leaf, cell.intersector, cell.box,
-                                            cell.traversal, std::string(to_string(cell.isa)), cell.workload, std::to_string(cell.threads)};
+    const std::string values[kAxisCount] = {cell.structure,
+                                            cell.builder,
+                                            cell.leaf,
+                                            cell.intersector,
+                                            cell.box,
+                                            cell.traversal,
+                                            std::string(to_string(cell.isa)),
+                                            cell.workload,
+                                            std::to_string(cell.threads)};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       if (choice.axes[i].empty() || contains(choice.axes[i], values[i])) continue;
-      const bool by_width = static_cast<Axis>(i) == Axis::traversal &&
-                            std::ranges::any_of(choice.axes[i], [&](const auto& t) { return resolve_traversal(t, cell.isa) == values[i]; });
+      const bool by_width =
+          static_cast<Axis>(i) == Axis::traversal && std::ranges::any_of(choice.axes[i], [&](const auto& t) {
+            return resolve_traversal(t, cell.isa) == values[i];
+          });
       if (!by_width) return false;
     }
     return true;
@@ -120,12 +137,14 @@ class Planner {
     ++added_;
     const std::string reason = impossible(cell, entry);
     cell.metric = Cell::Metric::trace;
-    if (reason.empty()) out.push_back(std::move(cell));
-    else plan_.skipped.push_back({std::move(name), reason});
+    if (reason.empty())
+      out.push_back(std::move(cell));
+    else
+      plan_.skipped.push_back({std::move(name), reason});
   }
 
-  /// Axes that an include does not name take the sweep's values where they apply: a builder, leaf or traversal that the
-  /// structure does not take gives way to its own default.
+  /// Axes that an include does not name take the sweep's values where they apply: a builder, leaf or
+  /// traversal that the structure does not take gives way to its own default.
   void add_include(std::size_t index, std::size_t scene, std::vector<Cell>& out) {
     const CellChoice& choice = experiment_.include[index];
     if (!choice.scenes.empty() && !contains(choice.scenes, experiment_.scenes[scene].name)) return;
@@ -138,7 +157,9 @@ class Planner {
         lists[i] = experiment_.axes[i];
         if (!entry) continue;
         const auto keep = [&](auto&& taken) {
-          std::erase_if(lists[i], [&](const std::string& v) { return v != kAuto && std::ranges::find(taken, v) == taken.end(); });
+          std::erase_if(lists[i], [&](const std::string& v) {
+            return v != kAuto && std::ranges::find(taken, v) == taken.end();
+          });
           if (lists[i].empty()) lists[i] = {std::string(kAuto)};
         };
         if (static_cast<Axis>(i) == Axis::builder) keep(entry->info.builders);
@@ -167,12 +188,14 @@ class Planner {
     if (experiment_.overridden) return;
     for (std::size_t i = 0; i < experiment_.include.size(); ++i) {
       if (!used_includes_.contains(i)) {
-        throw UserError(experiment_.include[i].where + ": this include adds no cell: the axes hold all of it; take it out");
+        throw UserError(experiment_.include[i].where +
+                        ": this include adds no cell: the axes hold all of it; take it out");
       }
     }
     for (std::size_t i = 0; i < experiment_.exclude.size(); ++i) {
       if (!used_excludes_.contains(i)) {
-        throw UserError(experiment_.exclude[i].where + ": this exclude takes no cell away: nothing of it is in the sweep; take it out");
+        throw UserError(experiment_.exclude[i].where +
+                        ": this exclude takes no cell away: nothing of it is in the sweep; take it out");
       }
     }
   }
@@ -190,13 +213,17 @@ std::regex compile(const std::string& expression, std::string_view option) {
   try {
     return std::regex(expression);
   } catch (const std::regex_error&) {
-    throw UserError(fmt::format("{} '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes", option, expression));
+    throw UserError(
+        fmt::format("{} '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes",
+                    option, expression));
   }
 }
 
 }  // namespace
 
-Plan make_plan(const Experiment& experiment, const Registry& registry) { return Planner(experiment, registry).run(); }
+Plan make_plan(const Experiment& experiment, const Registry& registry) {
+  return Planner(experiment, registry).run();
+}
 
 void apply_filter(Plan& plan, const std::string& filter, const std::string& skip) {
   const std::size_t before = plan.cells.size();

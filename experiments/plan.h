@@ -16,16 +16,17 @@ struct Plan {
   std::size_t filtered = 0;  ///< by --filter and --skip
 };
 
-/// The product of the axes, with `include`, without `exclude`. A combination that has no kernel, or whose ISA the
-/// machine lacks, is skipped with its reason. Throws UserError for an include that adds nothing and an exclude that
-/// takes nothing away.
+/// The product of the axes, with `include`, without `exclude`. A combination that has no kernel, or whose ISA
+/// the machine lacks, is skipped with its reason. Throws UserError for an include that adds nothing and an
+/// exclude that takes nothing away.
 [[nodiscard]] Plan make_plan(const Experiment& experiment, const Registry& registry);
 
-/// Keeps the cells whose name `filter` finds and `skip` does not (ECMAScript regular expressions; empty: all, none).
-/// Throws UserError for a broken expression.
+/// Keeps the cells whose name `filter` finds and `skip` does not (ECMAScript regular expressions; empty: all,
+/// none). Throws UserError for a broken expression.
 void apply_filter(Plan& plan, const std::string& filter, const std::string& skip);
 
 /// Skipped cells by reason, most first.
-[[nodiscard]] std::vector<std::pair<std::string, std::size_t>> group_reasons(const std::vector<SkippedCell>& skipped);
+[[nodiscard]] std::vector<std::pair<std::string, std::size_t>> group_reasons(
+    const std::vector<SkippedCell>& skipped);
 
 }  // namespace arboretum

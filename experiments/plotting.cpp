@@ -36,23 +36,31 @@ int run_program(std::vector<std::string> words, bool quiet_out, bool quiet_error
 
 std::optional<std::string> find_plot_python() {
   std::vector<std::string> candidates{"/usr/bin/python3", "python3"};
-  if (const char* chosen = std::getenv("ARBORETUM_PYTHON"); chosen && *chosen) candidates.insert(candidates.begin(), chosen);
+  if (const char* chosen = std::getenv("ARBORETUM_PYTHON"); chosen && *chosen)
+    candidates.insert(candidates.begin(), chosen);
   for (const std::string& python : candidates) {
-    const char* kTry = "import sys, importlib.util as u; sys.exit(not (u.find_spec('matplotlib') and u.find_spec('numpy')))";
+    const char* kTry =
+        "import sys, importlib.util as u; sys.exit(not (u.find_spec('matplotlib') and u.find_spec('numpy')))";
     if (run_program({python, "-c", kTry}, true, true) == 0) return python;
   }
   return std::nullopt;
 }
 
-std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures, bool quiet) {
-  const std::filesystem::path script = std::filesystem::path(build_info::kSourceDirectory) / "plots" / "plot.py";
-  if (!std::filesystem::exists(script)) return fmt::format("no plots: {} is missing; run from the project's own build", script.string());
+std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures,
+                       bool quiet) {
+  const std::filesystem::path script =
+      std::filesystem::path(build_info::kSourceDirectory) / "plots" / "plot.py";
+  if (!std::filesystem::exists(script))
+    return fmt::format("no plots: {} is missing; run from the project's own build", script.string());
   const std::optional<std::string> python = find_plot_python();
-  if (!python) return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the results";
+  if (!python)
+    return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the "
+           "results";
   std::vector<std::string> words{*python, script.string(), results.string()};
   if (!figures.empty()) words.insert(words.end(), {"--only", fmt::format("{}", fmt::join(figures, ","))});
   const int status = run_program(words, quiet, false);
-  return status == 0 ? "" : fmt::format("no plots: {} ended with status {}", script.filename().string(), status);
+  return status == 0 ? ""
+                     : fmt::format("no plots: {} ended with status {}", script.filename().string(), status);
 }
 
 }  // namespace arboretum

@@ -28,14 +28,21 @@ std::string format_duration(double seconds) {
 }
 
 Progress::Progress(std::size_t cells, std::size_t units)
-    : terminal_(::isatty(STDERR_FILENO) == 1), cells_(cells), units_(std::max<std::size_t>(units, 1)), begin_(wall_seconds()) {}
+    : terminal_(::isatty(STDERR_FILENO) == 1),
+      cells_(cells),
+      units_(std::max<std::size_t>(units, 1)),
+      begin_(wall_seconds()) {}
 
-Progress::~Progress() { wipe(); }
+Progress::~Progress() {
+  wipe();
+}
 
 std::string Progress::time_left() const {
   if (units_done_ == 0) return "";
   const double elapsed = wall_seconds() - begin_;
-  return format_duration(elapsed / static_cast<double>(units_done_) * static_cast<double>(units_ - units_done_)) + " left";
+  return format_duration(elapsed / static_cast<double>(units_done_) *
+                         static_cast<double>(units_ - units_done_)) +
+         " left";
 }
 
 void Progress::wipe() {
@@ -49,7 +56,8 @@ void Progress::draw() {
   drawn_ = now;
   constexpr std::size_t kWidth = 20;
   const std::size_t filled = kWidth * units_done_ / units_;
-  std::string line = fmt::format("[{:<{}}] {:3}% {:>15}  {}", std::string(filled, '#'), kWidth, 100 * units_done_ / units_, time_left(), cell_);
+  std::string line = fmt::format("[{:<{}}] {:3}% {:>15}  {}", std::string(filled, '#'), kWidth,
+                                 100 * units_done_ / units_, time_left(), cell_);
   if (const std::size_t width = terminal_width() - 1; line.size() > width) line.resize(width);
   fmt::print(stderr, "\r\033[K{}", line);
   std::fflush(stderr);

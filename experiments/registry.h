@@ -1,4 +1,5 @@
-// Registry: what can be swept: structures, kernels and instruction sets. Tests hand in small ones of their own.
+// Registry: what can be swept: structures, kernels and instruction sets. Tests hand in small ones of their
+// own.
 #pragma once
 
 #include <functional>
@@ -20,14 +21,17 @@ struct Registry {
   std::vector<Isa> isas;  ///< those that can be used here
   std::function<std::string_view(std::string_view structure, std::string_view intersector, Isa)> default_leaf;
   std::function<std::string(std::string_view structure, std::string_view leaf, std::string_view intersector,
-                            std::string_view box, std::string_view traversal, Isa)> why_no_kernel;
-  std::function<std::unique_ptr<Accel>(std::string_view structure, const TriangleMesh&, const BuildSettings&, BuildReport&)>
+                            std::string_view box, std::string_view traversal, Isa)>
+      why_no_kernel;
+  std::function<std::unique_ptr<Accel>(std::string_view structure, const TriangleMesh&, const BuildSettings&,
+                                       BuildReport&)>
       build;
 
   /// nullptr where there is none.
   [[nodiscard]] const StructureEntry* structure(std::string_view name) const;
-  [[nodiscard]] const KernelRow* kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
-                                        std::string_view box, std::string_view traversal, Isa isa) const;
+  [[nodiscard]] const KernelRow* kernel(std::string_view structure, std::string_view leaf,
+                                        std::string_view intersector, std::string_view box,
+                                        std::string_view traversal, Isa isa) const;
   [[nodiscard]] bool has(Isa isa) const;
 };
 

@@ -9,9 +9,13 @@ namespace arboretum {
 namespace {
 
 /// What one iteration works through: rays of a trace, triangles of a build.
-double items(const CellResult& result) { return result.fact(result.is_trace() ? "rays" : "triangles"); }
+double items(const CellResult& result) {
+  return result.fact(result.is_trace() ? "rays" : "triangles");
+}
 
-double per_second(double amount, double seconds) { return seconds > 0.0 ? amount / seconds : 0.0; }
+double per_second(double amount, double seconds) {
+  return seconds > 0.0 ? amount / seconds : 0.0;
+}
 
 /// The rates and times that change with the repetition.
 void add_measured(Json& entry, const CellResult& result, double wall, double cpu) {
@@ -54,7 +58,8 @@ Repetition parse_measured_fields(const Json& json) {
   repetition.wall_seconds = json.at("wall_seconds").get<double>();
   repetition.cpu_seconds = json.at("cpu_seconds").get<double>();
   if (const auto phases = json.find("phase_seconds"); phases != json.end()) {
-    for (const auto& [name, seconds] : phases->items()) repetition.phases.emplace_back(name, seconds.get<double>());
+    for (const auto& [name, seconds] : phases->items())
+      repetition.phases.emplace_back(name, seconds.get<double>());
   }
   return repetition;
 }
@@ -64,7 +69,8 @@ Repetition parse_measured_fields(const Json& json) {
 std::vector<double> CellResult::rates(bool cpu) const {
   std::vector<double> values;
   for (const Repetition& r : repetitions) {
-    values.push_back(per_second(items(*this) * static_cast<double>(r.iterations), cpu ? r.cpu_seconds : r.wall_seconds));
+    values.push_back(
+        per_second(items(*this) * static_cast<double>(r.iterations), cpu ? r.cpu_seconds : r.wall_seconds));
   }
   return values;
 }
@@ -79,7 +85,8 @@ void add_facts(Json& facts, const StructureStatistics& s) {
   facts["sah_cost"] = s.sah_cost, facts["sah_child_cost"] = s.sah_child_cost, facts["epo"] = s.epo;
   facts["nodes"] = s.nodes, facts["leaves"] = s.leaves, facts["depth"] = s.depth;
   facts["node_bytes"] = s.node_bytes, facts["leaf_bytes"] = s.leaf_bytes;
-  facts["leaf_fill"] = s.leaf_fill, facts["duplication"] = s.duplication, facts["children_per_node"] = s.children_per_node;
+  facts["leaf_fill"] = s.leaf_fill, facts["duplication"] = s.duplication,
+  facts["children_per_node"] = s.children_per_node;
 }
 
 void add_facts(Json& facts, const Counters& c) {
@@ -89,7 +96,8 @@ void add_facts(Json& facts, const Counters& c) {
   facts["boxes_per_ray"] = static_cast<double>(c.boxes) / rays;
   facts["leaves_per_ray"] = static_cast<double>(c.leaves) / rays;
   facts["triangles_per_ray"] = static_cast<double>(c.triangles) / rays;
-  if (c.lanes > 0) facts["simd_utilization"] = static_cast<double>(c.lanes_active) / static_cast<double>(c.lanes);
+  if (c.lanes > 0)
+    facts["simd_utilization"] = static_cast<double>(c.lanes_active) / static_cast<double>(c.lanes);
 }
 
 void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit) {
@@ -130,7 +138,9 @@ std::vector<Json> aggregate_entries(const CellResult& result) {
     wall.push_back(r.wall_seconds / static_cast<double>(r.iterations));
     cpu.push_back(r.cpu_seconds / static_cast<double>(r.iterations));
   }
-  const auto cv = [](std::span<const double> v) { return mean(v) > 0.0 ? standard_deviation(v) / mean(v) : 0.0; };
+  const auto cv = [](std::span<const double> v) {
+    return mean(v) > 0.0 ? standard_deviation(v) / mean(v) : 0.0;
+  };
   std::vector<Json> entries;
   for (const char* what : {"mean", "median", "stddev", "cv"}) {
     const std::string_view name = what;
@@ -141,7 +151,8 @@ std::vector<Json> aggregate_entries(const CellResult& result) {
     if (name == "mean") add_measured(entry, result, mean(wall), mean(cpu));
     if (name == "median") {
       add_measured(entry, result, median(wall), median(cpu));
-      const Interval rate = bootstrap_median(result.rates(false)), cpu_rate = bootstrap_median(result.rates(true));
+      const Interval rate = bootstrap_median(result.rates(false)),
+                     cpu_rate = bootstrap_median(result.rates(true));
       const char* key = result.is_trace() ? "rays_per_second" : "triangles_per_second";
       entry[key] = rate.median;
       entry[std::string(key) + "_low"] = rate.low, entry[std::string(key) + "_high"] = rate.high;
@@ -179,11 +190,14 @@ Json cell_line(const CellResult& result, const std::string& configuration_hash) 
   return line;
 }
 
-std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell, const std::string& configuration_hash) {
+std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell,
+                                          const std::string& configuration_hash) {
   try {
-    if (line.at("name") != cell.name() || line.at("configuration_hash") != configuration_hash) return std::nullopt;
+    if (line.at("name") != cell.name() || line.at("configuration_hash") != configuration_hash)
+      return std::nullopt;
     CellResult result{.cell = cell, .repetitions = {}, .facts = line};
-    for (const Json& entry : line.at("repetitions")) result.repetitions.push_back(parse_measured_fields(entry));
+    for (const Json& entry : line.at("repetitions"))
+      result.repetitions.push_back(parse_measured_fields(entry));
     Json axes = Json::object();
     add_axes(axes, cell);
     for (const auto& [key, value] : axes.items()) result.facts.erase(key);

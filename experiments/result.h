@@ -29,7 +29,8 @@ struct Repetition {
 struct CellResult {
   Cell cell;
   std::vector<Repetition> repetitions;  ///< by index
-  /// What does not change between repetitions, under the contract's names: `rays`, `sah_cost`, `wrong_answers`, ...
+  /// What does not change between repetitions, under the contract's names: `rays`, `sah_cost`,
+  /// `wrong_answers`, ...
   Json facts = Json::object();
 
   [[nodiscard]] bool is_trace() const noexcept { return cell.metric == Cell::Metric::trace; }
@@ -46,14 +47,17 @@ void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit);
 /// The cell's name as fields of their own; `threads` as a number.
 void add_axes(Json& json, const Cell& cell);
 
-/// One repetition as an entry of results.json, Google Benchmark's fields first. Times are of one iteration, in ms.
+/// One repetition as an entry of results.json, Google Benchmark's fields first. Times are of one iteration,
+/// in ms.
 [[nodiscard]] Json repetition_entry(const CellResult& result, const Repetition& repetition);
-/// mean, median, stddev and cv, as Google Benchmark writes them; the median holds the 95 % interval of the rate too.
+/// mean, median, stddev and cv, as Google Benchmark writes them; the median holds the 95 % interval of the
+/// rate too.
 [[nodiscard]] std::vector<Json> aggregate_entries(const CellResult& result);
 /// The cell as a line of cells.jsonl.
 [[nodiscard]] Json cell_line(const CellResult& result, const std::string& configuration_hash);
 /// Reads a line of cells.jsonl back. std::nullopt when it is not one, or not of `cell` or the configuration.
-[[nodiscard]] std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell, const std::string& configuration_hash);
+[[nodiscard]] std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell,
+                                                        const std::string& configuration_hash);
 /// One repetition as a line of the journal, and back.
 [[nodiscard]] Json journal_line(const std::string& name, const Repetition& repetition);
 [[nodiscard]] std::optional<std::pair<std::string, Repetition>> parse_journal_line(const Json& line);

@@ -18,7 +18,8 @@ std::string csv_field(const Json& value) {
 Json flattened(const Json& entry) {
   Json flat = Json::object();
   for (const auto& [key, value] : entry.items()) {
-    if (!value.is_object()) flat[key] = value;
+    if (!value.is_object())
+      flat[key] = value;
     else
       for (const auto& [inner, number] : value.items()) flat[key + "." + inner] = number;
   }

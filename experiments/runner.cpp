@@ -21,18 +21,24 @@
 namespace arboretum {
 namespace {
 
-constexpr unsigned kFewestBuilds = 3;    // repetitions of a build cell at least
-constexpr std::size_t kPrepareUnits = 2; // making a cell ready takes about two repetitions
+constexpr unsigned kFewestBuilds = 3;     // repetitions of a build cell at least
+constexpr std::size_t kPrepareUnits = 2;  // making a cell ready takes about two repetitions
 
 class Runner {
  public:
-  Runner(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal, const RunOptions& options)
-      : experiment_(experiment), plan_(plan), registry_(registry), journal_(journal), options_(options),
+  Runner(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal,
+         const RunOptions& options)
+      : experiment_(experiment),
+        plan_(plan),
+        registry_(registry),
+        journal_(journal),
+        options_(options),
         progress_(pending_cells(), pending_units()) {}
 
   RunOutcome run() {
     try {
-      for (std::size_t scene = 0; scene < experiment_.scenes.size() && !outcome_.stopped; ++scene) run_scene(scene);
+      for (std::size_t scene = 0; scene < experiment_.scenes.size() && !outcome_.stopped; ++scene)
+        run_scene(scene);
     } catch (const UserError& e) {
       outcome_.error = e.what();
     } catch (const std::bad_alloc&) {
@@ -40,8 +46,10 @@ class Runner {
     }
     for (const Cell& cell : plan_.cells) {
       const std::string name = cell.name();
-      if (const auto old = journal_.done().find(name); old != journal_.done().end()) outcome_.results.push_back(old->second);
-      else if (const auto fresh = finished_.find(name); fresh != finished_.end()) outcome_.results.push_back(fresh->second);
+      if (const auto old = journal_.done().find(name); old != journal_.done().end())
+        outcome_.results.push_back(old->second);
+      else if (const auto fresh = finished_.find(name); fresh != finished_.end())
+        outcome_.results.push_back(fresh->second);
     }
     return std::move(outcome_);
   }
@@ -61,7 +69,8 @@ class Runner {
   bool pending(const Cell& cell) const { return !journal_.done().contains(cell.name()); }
 
   std::size_t pending_cells() const {
-    return static_cast<std::size_t>(std::ranges::count_if(plan_.cells, [&](const Cell& c) { return pending(c); }));
+    return static_cast<std::size_t>(
+        std::ranges::count_if(plan_.cells, [&](const Cell& c) { return pending(c); }));
   }
 
   std::size_t pending_units() const {
@@ -78,7 +87,8 @@ class Runner {
       (cell.metric == Cell::Metric::build ? builds : traces).push_back(&cell);
     }
     if (builds.empty() && traces.empty()) return;
-    SceneData data(experiment_.scenes[index], experiment_.measure, [this](const std::string& line) { progress_.note(line); });
+    SceneData data(experiment_.scenes[index], experiment_.measure,
+                   [this](const std::string& line) { progress_.note(line); });
     StructurePool pool(data.mesh(), registry_, experiment_.metrics.quality);
     if (!builds.empty()) run_builds(builds, data, pool);
     run_traces(traces, data, pool);
@@ -97,9 +107,11 @@ class Runner {
       std::vector<const Cell*> batch;
       do {
         const auto& cells = by_structure[order[next++]];
-        if (try_for(cells, [&] { (void)pool.get(*cells.front()); })) batch.insert(batch.end(), cells.begin(), cells.end());
+        if (try_for(cells, [&] { (void)pool.get(*cells.front()); }))
+          batch.insert(batch.end(), cells.begin(), cells.end());
       } while (next < order.size() &&
-               pool.held_bytes() + pool.expected_bytes(*by_structure[order[next]].front()) <= experiment_.measure.memory);
+               pool.held_bytes() + pool.expected_bytes(*by_structure[order[next]].front()) <=
+                   experiment_.measure.memory);
       run_batch(batch, data, pool);
     }
   }
@@ -110,11 +122,13 @@ class Runner {
     std::map<std::string, std::size_t> users;
     for (const Cell* cell : batch) {
       ++users[pool.key(*cell)];
-      if (std::ranges::find(workloads, cell->workload) == workloads.end()) workloads.push_back(cell->workload);
+      if (std::ranges::find(workloads, cell->workload) == workloads.end())
+        workloads.push_back(cell->workload);
     }
     for (const std::string& name : workloads) {
       std::vector<const Cell*> cells;
-      std::ranges::copy_if(batch, std::back_inserter(cells), [&](const Cell* c) { return c->workload == name; });
+      std::ranges::copy_if(batch, std::back_inserter(cells),
+                           [&](const Cell* c) { return c->workload == name; });
       if (!outcome_.stopped) trace_workload(cells, data, pool);
       for (const Cell* cell : cells)
         if (--users[pool.key(*cell)] == 0) pool.release(pool.key(*cell));
@@ -124,7 +138,8 @@ class Runner {
   void trace_workload(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {
     const Workload& workload = data.workload(cells.front()->workload);
     if (workload.rays.empty()) {
-      for (const Cell* cell : cells) fail(*cell, fmt::format("no {} rays: no primary ray hits the scene", workload.name));
+      for (const Cell* cell : cells)
+        fail(*cell, fmt::format("no {} rays: no primary ray hits the scene", workload.name));
       return;
     }
     AnswerBuffers buffers;
@@ -136,7 +151,8 @@ class Runner {
       Running& running = begin(*cell);
       running.result.facts.update(pool.facts(*cell, accel));
       job.prepare(running.result.facts, experiment_.metrics.accuracy ? &data : nullptr, experiment_.measure);
-      interleaved.push_back(interleaved_job(running, job.passes(), [&job](TimedLoop& loop) { return job.measure(loop); }));
+      interleaved.push_back(
+          interleaved_job(running, job.passes(), [&job](TimedLoop& loop) { return job.measure(loop); }));
       if (options_.fail_fast && running.result.fact("wrong_answers") > 0) {
         outcome_.stopped = true;
         break;
@@ -154,7 +170,8 @@ class Runner {
       if (!try_for({cell}, [&] { job.prepare(facts, pool, experiment_.measure); })) continue;
       Running& running = begin(*cell);
       running.result.facts.update(facts);
-      interleaved.push_back(interleaved_job(running, job.builds(), [&job](TimedLoop& loop) { return job.measure(loop); }));
+      interleaved.push_back(
+          interleaved_job(running, job.builds(), [&job](TimedLoop& loop) { return job.measure(loop); }));
     }
     run_interleaved(std::move(interleaved));
   }
@@ -169,10 +186,17 @@ class Runner {
     return running;
   }
 
-  InterleavedJob interleaved_job(Running& running, std::uint64_t iterations, std::function<Repetition(TimedLoop&)> measure) {
-    InterleavedJob job{.name = running.result.cell.name(), .indices = {}, .iterations = iterations, .measure = std::move(measure), .ended = {}};
+  InterleavedJob interleaved_job(Running& running, std::uint64_t iterations,
+                                 std::function<Repetition(TimedLoop&)> measure) {
+    InterleavedJob job{.name = running.result.cell.name(),
+                       .indices = {},
+                       .iterations = iterations,
+                       .measure = std::move(measure),
+                       .ended = {}};
     for (unsigned i = 0; i < running.wanted; ++i)
-      if (std::ranges::find(running.result.repetitions, i, &Repetition::index) == running.result.repetitions.end()) job.indices.push_back(i);
+      if (std::ranges::find(running.result.repetitions, i, &Repetition::index) ==
+          running.result.repetitions.end())
+        job.indices.push_back(i);
     job.ended = [this, &running, name = job.name](const Repetition& repetition) {
       journal_.add(name, repetition);
       running.result.repetitions.push_back(repetition);
@@ -190,7 +214,8 @@ class Runner {
     const std::string name = result.cell.name();
     const double rate = median(result.rates(false));
     std::string outcome = fmt::format("{:.1f} {}", rate * 1e-6, result.is_trace() ? "Mray/s" : "Mtriangle/s");
-    if (result.has_fact("wrong_answers")) outcome += fmt::format(", {} wrong", result.facts["wrong_answers"].get<std::uint64_t>());
+    if (result.has_fact("wrong_answers"))
+      outcome += fmt::format(", {} wrong", result.facts["wrong_answers"].get<std::uint64_t>());
     progress_.cell_done(name, outcome);
     finished_.insert_or_assign(name, std::move(result));
   }
@@ -205,7 +230,8 @@ class Runner {
     } catch (const std::bad_alloc&) {
       for (const Cell* cell : cells) fail(*cell, "not enough memory to build the structure");
     }
-    if (options_.fail_fast) throw UserError(outcome_.failed.back().name + ": " + outcome_.failed.back().reason);
+    if (options_.fail_fast)
+      throw UserError(outcome_.failed.back().name + ": " + outcome_.failed.back().reason);
     return false;
   }
 
@@ -228,7 +254,8 @@ class Runner {
 
 }  // namespace
 
-RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal, const RunOptions& options) {
+RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry,
+                    Journal& journal, const RunOptions& options) {
   unsigned threads = std::max(1u, std::thread::hardware_concurrency());
   for (const Cell& cell : plan.cells) threads = std::max(threads, cell.threads);
   const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);

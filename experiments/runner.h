@@ -16,17 +16,17 @@ struct RunOptions {
 };
 
 struct RunOutcome {
-  std::vector<CellResult> results;   ///< in the plan's order; those that were measured
-  std::vector<SkippedCell> failed;   ///< cells that turned out impossible while running, each with its reason
+  std::vector<CellResult> results;  ///< in the plan's order; those that were measured
+  std::vector<SkippedCell> failed;  ///< cells that turned out impossible while running, each with its reason
   std::vector<std::string> warnings;
-  std::string error;                 ///< what ended the run early; empty when it went through
-  bool stopped = false;              ///< by fail_fast
+  std::string error;     ///< what ended the run early; empty when it went through
+  bool stopped = false;  ///< by fail_fast
 };
 
-/// Cells of one scene and workload whose structures fit the memory together are interleaved. Takes up what the journal
-/// holds. A UserError on the way (a scene that does not load, a full disk) ends the run and is told in the outcome, so
-/// that what was measured can still be written.
-[[nodiscard]] RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal,
-                                  const RunOptions& options);
+/// Cells of one scene and workload whose structures fit the memory together are interleaved. Takes up what
+/// the journal holds. A UserError on the way (a scene that does not load, a full disk) ends the run and is
+/// told in the outcome, so that what was measured can still be written.
+[[nodiscard]] RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry,
+                                  Journal& journal, const RunOptions& options);
 
 }  // namespace arboretum

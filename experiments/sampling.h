@@ -13,8 +13,8 @@ struct Interval {
 [[nodiscard]] double mean(std::span<const double> values);
 /// Sample standard deviation; 0 below two values.
 [[nodiscard]] double standard_deviation(std::span<const double> values);
-/// Median with the 2.5 and 97.5 percentiles of the medians of 1000 resamples (Efron 1979). The same values always give
-/// the same interval. Below three values the interval is their range.
+/// Median with the 2.5 and 97.5 percentiles of the medians of 1000 resamples (Efron 1979). The same values
+/// always give the same interval. Below three values the interval is their range.
 [[nodiscard]] Interval bootstrap_median(std::span<const double> values);
 
 }  // namespace arboretum

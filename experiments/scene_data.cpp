@@ -7,14 +7,16 @@
 namespace arboretum {
 
 SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, NoteFunction note)
-    : name_(choice.name), view_{.width = measure.width, .height = measure.height, .seed = measure.seed}, note_(std::move(note)) {
+    : name_(choice.name),
+      view_{.width = measure.width, .height = measure.height, .seed = measure.seed},
+      note_(std::move(note)) {
   const double begin = wall_seconds();
   scene_ = load_scene(choice.spec);
   note_(fmt::format("{}: {} triangles, loaded in {:.2f} s", name_, mesh().size(), wall_seconds() - begin));
   const LoadReport& report = scene_.report;
   if (report.non_finite + report.out_of_range + report.degenerate > 0) {
-    note_(fmt::format("{}: dropped {} triangles with NaN or infinity, {} out of range, {} of zero area", name_,
-                      report.non_finite, report.out_of_range, report.degenerate));
+    note_(fmt::format("{}: dropped {} triangles with NaN or infinity, {} out of range, {} of zero area",
+                      name_, report.non_finite, report.out_of_range, report.degenerate));
   }
   for (const std::string& warning : report.warnings) note_(fmt::format("{}: {}", name_, warning));
 }
@@ -36,7 +38,8 @@ const Workload& SceneData::workload(const std::string& name) {
   if (is_secondary(name) && primary_hits_.empty()) {
     for (const ExactHit& exact : closest_truth(primary)) primary_hits_.push_back(exact.hit);
   }
-  return workloads_.emplace(name, make_workload(name, scene_, view_, primary.rays, primary_hits_)).first->second;
+  return workloads_.emplace(name, make_workload(name, scene_, view_, primary.rays, primary_hits_))
+      .first->second;
 }
 
 const std::vector<ExactHit>& SceneData::closest_truth(const Workload& workload) {
@@ -45,7 +48,8 @@ const std::vector<ExactHit>& SceneData::closest_truth(const Workload& workload) 
     Oracle& exact = oracle();
     const double begin = wall_seconds();
     entry->second = exact.closest_hit(workload.rays);
-    note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name, workload.rays.size(), wall_seconds() - begin));
+    note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name,
+                      workload.rays.size(), wall_seconds() - begin));
   }
   return entry->second;
 }
@@ -56,7 +60,8 @@ const std::vector<std::uint8_t>& SceneData::any_truth(const Workload& workload) 
     Oracle& exact = oracle();
     const double begin = wall_seconds();
     entry->second = exact.any_hit(workload.rays);
-    note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name, workload.rays.size(), wall_seconds() - begin));
+    note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name,
+                      workload.rays.size(), wall_seconds() - begin));
   }
   return entry->second;
 }

@@ -1,4 +1,5 @@
-// SceneData: a scene with the rays of its workloads and their true answers, each made once and shared by all cells.
+// SceneData: a scene with the rays of its workloads and their true answers, each made once and shared by all
+// cells.
 #pragma once
 
 #include <functional>

@@ -8,7 +8,11 @@
 namespace arboretum {
 
 BuildSettings settings_of(const Cell& cell) {
-  return {.builder = cell.builder, .leaf = cell.leaf, .isa = cell.isa, .threads = cell.threads, .parameters = cell.parameters};
+  return {.builder = cell.builder,
+          .leaf = cell.leaf,
+          .isa = cell.isa,
+          .threads = cell.threads,
+          .parameters = cell.parameters};
 }
 
 StructurePool::StructurePool(const TriangleMesh& mesh, const Registry& registry, bool quality)
@@ -25,7 +29,8 @@ std::string StructurePool::key(const Cell& cell) const {
 std::size_t StructurePool::expected_bytes(const Cell& cell) const {
   constexpr std::size_t kBytesPerTriangle = 200;  // a wide BVH with precomputed edges takes 100 to 160
   const auto known = facts_.find(key(cell));
-  return known != facts_.end() ? known->second.at("bytes").get<std::size_t>() : kBytesPerTriangle * mesh_.size();
+  return known != facts_.end() ? known->second.at("bytes").get<std::size_t>()
+                               : kBytesPerTriangle * mesh_.size();
 }
 
 const Accel& StructurePool::get(const Cell& cell) {

@@ -1,4 +1,5 @@
-// StructurePool: the structures of one scene that cells share, built once and freed when the last cell has ended.
+// StructurePool: the structures of one scene that cells share, built once and freed when the last cell has
+// ended.
 #pragma once
 
 #include <map>
@@ -20,12 +21,13 @@ class StructurePool {
   /// `quality`: compute statistics (SAH, EPO, depths) of every structure.
   StructurePool(const TriangleMesh& mesh, const Registry& registry, bool quality);
 
-  /// Cells with the same key trace the same structure: structure, builder, parameters, leaf, and ISA or threads where
-  /// the structure says that its build depends on them.
+  /// Cells with the same key trace the same structure: structure, builder, parameters, leaf, and ISA or
+  /// threads where the structure says that its build depends on them.
   [[nodiscard]] std::string key(const Cell& cell) const;
   /// Bytes that the cell's structure may take: as measured, else guessed from its triangles.
   [[nodiscard]] std::size_t expected_bytes(const Cell& cell) const;
-  /// The structure, built at the first call with all threads of the machine (the tree is the same for any number).
+  /// The structure, built at the first call with all threads of the machine (the tree is the same for any
+  /// number).
   [[nodiscard]] const Accel& get(const Cell& cell);
   void release(const std::string& key) { held_.erase(key); }
   [[nodiscard]] std::size_t held_bytes() const;

@@ -24,7 +24,8 @@ std::string format_table(const std::vector<Row>& rows, std::size_t figures) {
   for (const Row& row : rows) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i) {
-      line += i < figures ? fmt::format("{:<{}}  ", row[i], widths[i]) : fmt::format("{:>{}}  ", row[i], widths[i]);
+      line += i < figures ? fmt::format("{:<{}}  ", row[i], widths[i])
+                          : fmt::format("{:>{}}  ", row[i], widths[i]);
     }
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + "\n";
@@ -33,15 +34,17 @@ std::string format_table(const std::vector<Row>& rows, std::size_t figures) {
 }
 
 /// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
-double ratio_rate(const CellResult& r) { return median(r.rates(r.cell.threads == 1)); }
+double ratio_rate(const CellResult& r) {
+  return median(r.rates(r.cell.threads == 1));
+}
 
 /// The fastest embree cell of the same scene, workload, ISA and threads.
 const CellResult* embree_beside(const CellResult& r, const std::vector<CellResult>& all) {
   const CellResult* best = nullptr;
   for (const CellResult& other : all) {
     const Cell &a = r.cell, &b = other.cell;
-    if (b.structure != "embree" || !other.is_trace() || a.scene != b.scene || a.workload != b.workload || a.isa != b.isa ||
-        a.threads != b.threads) {
+    if (b.structure != "embree" || !other.is_trace() || a.scene != b.scene || a.workload != b.workload ||
+        a.isa != b.isa || a.threads != b.threads) {
       continue;
     }
     if (!best || ratio_rate(other) > ratio_rate(*best)) best = &other;
@@ -52,12 +55,14 @@ const CellResult* embree_beside(const CellResult& r, const std::vector<CellResul
 std::optional<double> build_milliseconds(const CellResult& r, const std::vector<CellResult>& all) {
   for (const CellResult& other : all) {
     const Cell &a = r.cell, &b = other.cell;
-    if (other.is_trace() || a.scene != b.scene || a.structure != b.structure || a.builder_name() != b.builder_name() ||
-        a.leaf != b.leaf || a.isa != b.isa || a.threads != b.threads) {
+    if (other.is_trace() || a.scene != b.scene || a.structure != b.structure ||
+        a.builder_name() != b.builder_name() || a.leaf != b.leaf || a.isa != b.isa ||
+        a.threads != b.threads) {
       continue;
     }
     std::vector<double> seconds;
-    for (const Repetition& rep : other.repetitions) seconds.push_back(rep.wall_seconds / static_cast<double>(rep.iterations));
+    for (const Repetition& rep : other.repetitions)
+      seconds.push_back(rep.wall_seconds / static_cast<double>(rep.iterations));
     return median(seconds) * 1e3;
   }
   return std::nullopt;
@@ -72,25 +77,39 @@ Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
   const Interval rate = bootstrap_median(r.rates(false));
   const CellResult* embree = embree_beside(r, all);
   const std::optional<double> build = build_milliseconds(r, all);
-  return {c.structure, c.builder_name(), c.leaf, c.intersector, c.box, c.traversal, std::string(to_string(c.isa)),
-          std::to_string(c.threads), fmt::format("{:.2f}", rate.median * 1e-6),
+  return {c.structure,
+          c.builder_name(),
+          c.leaf,
+          c.intersector,
+          c.box,
+          c.traversal,
+          std::string(to_string(c.isa)),
+          std::to_string(c.threads),
+          fmt::format("{:.2f}", rate.median * 1e-6),
           fmt::format("[{:.2f}, {:.2f}]", rate.low * 1e-6, rate.high * 1e-6),
           embree ? fmt::format("{:.2f}", ratio_rate(r) / std::max(ratio_rate(*embree), 1e-9)) : "-",
-          r.has_fact("wrong_answers") ? fmt::format("{:.1f}", 1e6 * r.fact("wrong_answers") / std::max(r.fact("rays"), 1.0)) : "unchecked",
-          optional_figure(r, "sah_cost", "{:.1f}"), build ? fmt::format("{:.1f}", *build) : "-"};
+          r.has_fact("wrong_answers")
+              ? fmt::format("{:.1f}", 1e6 * r.fact("wrong_answers") / std::max(r.fact("rays"), 1.0))
+              : "unchecked",
+          optional_figure(r, "sah_cost", "{:.1f}"),
+          build ? fmt::format("{:.1f}", *build) : "-"};
 }
 
 std::string build_table(const std::vector<CellResult>& all) {
-  std::vector<Row> rows{{"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %", "Mtri/s", "bytes/tri", "SAH"}};
+  std::vector<Row> rows{{"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %",
+                         "Mtri/s", "bytes/tri", "SAH"}};
   for (const CellResult& r : all) {
     if (r.is_trace()) continue;
     std::vector<double> ms;
-    for (const Repetition& rep : r.repetitions) ms.push_back(1e3 * rep.wall_seconds / static_cast<double>(rep.iterations));
+    for (const Repetition& rep : r.repetitions)
+      ms.push_back(1e3 * rep.wall_seconds / static_cast<double>(rep.iterations));
     const Interval time = bootstrap_median(ms);
     const Cell& c = r.cell;
-    rows.push_back({c.scene, c.structure, c.builder_name(), c.leaf, std::string(to_string(c.isa)), std::to_string(c.threads),
-                    fmt::format("{:.2f}", time.median), fmt::format("[{:.2f}, {:.2f}]", time.low, time.high),
-                    fmt::format("{:.2f}", median(r.rates(false)) * 1e-6), optional_figure(r, "bytes_per_triangle", "{:.0f}"),
+    rows.push_back({c.scene, c.structure, c.builder_name(), c.leaf, std::string(to_string(c.isa)),
+                    std::to_string(c.threads), fmt::format("{:.2f}", time.median),
+                    fmt::format("[{:.2f}, {:.2f}]", time.low, time.high),
+                    fmt::format("{:.2f}", median(r.rates(false)) * 1e-6),
+                    optional_figure(r, "bytes_per_triangle", "{:.0f}"),
                     optional_figure(r, "sah_cost", "{:.1f}")});
   }
   return rows.size() == 1 ? "" : "\nbuilds\n" + format_table(rows, 6);
@@ -102,7 +121,8 @@ double relative_spread(const CellResult& r) {
   if (rates.size() < 3 || centre <= 0.0) return 0.0;
   std::vector<double> deviations;
   for (double v : rates) deviations.push_back(std::abs(v - centre));
-  return 1.4826 * median(deviations) / centre;  // comparable to a standard deviation, blind to single outliers
+  return 1.4826 * median(deviations) /
+         centre;  // comparable to a standard deviation, blind to single outliers
 }
 
 }  // namespace
@@ -112,21 +132,25 @@ std::string result_tables(const RunOutcome& outcome) {
   for (const CellResult& r : outcome.results) {
     if (!r.is_trace()) continue;
     const std::string title = r.cell.scene + ", " + r.cell.workload;
-    auto group = std::ranges::find(groups, title, &std::pair<std::string, std::vector<const CellResult*>>::first);
+    auto group =
+        std::ranges::find(groups, title, &std::pair<std::string, std::vector<const CellResult*>>::first);
     if (group == groups.end()) group = groups.insert(groups.end(), {title, {}});
     group->second.push_back(&r);
   }
   std::string text;
   for (const auto& [title, results] : groups) {
-    std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads", "Mray/s",
-                           "95 %", "x embree", "wrong/1e6", "SAH", "build ms"}};
+    std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa",
+                           "threads", "Mray/s", "95 %", "x embree", "wrong/1e6", "SAH", "build ms"}};
     for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results));
     const CellResult& first = *results.front();
-    text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"), first.fact("triangles"), format_table(rows, 8));
+    text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"),
+                        first.fact("triangles"), format_table(rows, 8));
   }
   if (!groups.empty()) {
-    text += "\nMray/s: median of wall time with its 95 % bootstrap interval. x embree: against the fastest embree cell of the same ISA"
-            " and threads, by CPU time with one thread.\n";
+    text +=
+        "\nMray/s: median of wall time with its 95 % bootstrap interval. x embree: against the fastest "
+        "embree cell of the same ISA"
+        " and threads, by CPU time with one thread.\n";
   }
   return groups.empty() ? build_table(outcome.results) : text;
 }
@@ -151,8 +175,10 @@ std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan&
     if (!worst || relative_spread(r) > relative_spread(*worst)) worst = &r;
   }
   if (worst) {
-    warnings.push_back(fmt::format("noisy machine: the repetitions of {} of {} cells spread by more than {:.0f} % (most: {:.0f} % in {}); raise min_time or repetitions, or free the machine",
-                                   noisy, outcome.results.size(), kWide * 100, relative_spread(*worst) * 100, worst->cell.name()));
+    warnings.push_back(fmt::format(
+        "noisy machine: the repetitions of {} of {} cells spread by more than {:.0f} % (most: {:.0f} % in "
+        "{}); raise min_time or repetitions, or free the machine",
+        noisy, outcome.results.size(), kWide * 100, relative_spread(*worst) * 100, worst->cell.name()));
   }
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   for (const Cell& cell : plan.cells) {
@@ -164,7 +190,8 @@ std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan&
   for (const SkippedCell& cell : plan.skipped)
     for (Isa isa : kAllIsas)
       if (cell.reason == fmt::format("no {}", to_string(isa))) lacking.insert(std::string(to_string(isa)));
-  for (const std::string& isa : lacking) warnings.push_back(fmt::format("this machine (or ARBORETUM_ISA) has no {}: its cells are skipped", isa));
+  for (const std::string& isa : lacking)
+    warnings.push_back(fmt::format("this machine (or ARBORETUM_ISA) has no {}: its cells are skipped", isa));
   return warnings;
 }
 
@@ -179,17 +206,24 @@ std::pair<ExitStatus, std::string> verdict(const RunOutcome& outcome) {
     if (r.fact("wrong_answers") == 0.0) continue;
     ++wrong;
     ++by_test[r.cell.intersector + "+" + r.cell.box];
-    if (!worst || r.fact("wrong_answers") / r.fact("rays") > worst->fact("wrong_answers") / worst->fact("rays")) worst = &r;
+    if (!worst ||
+        r.fact("wrong_answers") / r.fact("rays") > worst->fact("wrong_answers") / worst->fact("rays"))
+      worst = &r;
   }
   if (wrong == 0) {
-    if (checked == 0) return {ExitStatus::kDone, fmt::format("{} cells measured; answers were not checked", outcome.results.size())};
+    if (checked == 0)
+      return {ExitStatus::kDone,
+              fmt::format("{} cells measured; answers were not checked", outcome.results.size())};
     return {ExitStatus::kDone, fmt::format("{} cells measured, all answers right", outcome.results.size())};
   }
   std::vector<std::string> tests;
   for (const auto& [test, count] : by_test) tests.push_back(fmt::format("{} {}", count, test));
-  return {ExitStatus::kWrongAnswers,
-          fmt::format("wrong answers in {} of {} checked cells ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1", wrong,
-                      checked, fmt::join(tests, ", "), worst->fact("wrong_answers"), worst->fact("rays"), worst->cell.name())};
+  return {
+      ExitStatus::kWrongAnswers,
+      fmt::format(
+          "wrong answers in {} of {} checked cells ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1",
+          wrong, checked, fmt::join(tests, ", "), worst->fact("wrong_answers"), worst->fact("rays"),
+          worst->cell.name())};
 }
 
 }  // namespace arboretum

@@ -9,8 +9,8 @@
 
 namespace arboretum {
 
-/// A table for each scene and workload: Mray/s with its interval, the ratio to embree, wrong answers, SAH, build time.
-/// A build-only run gets a table of builds.
+/// A table for each scene and workload: Mray/s with its interval, the ratio to embree, wrong answers, SAH,
+/// build time. A build-only run gets a table of builds.
 [[nodiscard]] std::string result_tables(const RunOutcome& outcome);
 /// "12 cells skipped:" with one line a reason; empty when there is none.
 [[nodiscard]] std::string skipped_lines(const Plan& plan, const RunOutcome& outcome);

@@ -16,9 +16,15 @@ constexpr std::uint64_t kMostPasses = 1'000'000;
 }  // namespace
 
 TraceJob::TraceJob(const Cell& cell, const Accel& accel, const Workload& workload, AnswerBuffers& buffers)
-    : cell_(cell), accel_(accel), workload_(workload), buffers_(buffers), arena_(static_cast<int>(cell.threads)) {
-  if (workload.query == Query::closest_hit) buffers.hits.resize(std::max(buffers.hits.size(), workload.rays.size()));
-  else buffers.occluded.resize(std::max(buffers.occluded.size(), workload.rays.size()));
+    : cell_(cell),
+      accel_(accel),
+      workload_(workload),
+      buffers_(buffers),
+      arena_(static_cast<int>(cell.threads)) {
+  if (workload.query == Query::closest_hit)
+    buffers.hits.resize(std::max(buffers.hits.size(), workload.rays.size()));
+  else
+    buffers.occluded.resize(std::max(buffers.occluded.size(), workload.rays.size()));
 }
 
 void TraceJob::trace(std::size_t rays) const {
@@ -61,18 +67,21 @@ void TraceJob::prepare(Json& facts, SceneData* data, const MeasureSettings& meas
   const auto occluded = std::span(buffers_.occluded).first(closest ? 0 : rays);
   facts["rays"] = rays;
   facts["hits"] = closest ? std::ranges::count_if(hits, &Hit::is_hit) : std::ranges::count(occluded, 1);
-  if (data) add_facts(facts, closest ? data->check(workload_, hits) : data->check(workload_, occluded), closest);
+  if (data)
+    add_facts(facts, closest ? data->check(workload_, hits) : data->check(workload_, occluded), closest);
   add_facts(facts, count());
 
   for (unsigned i = 0; i < measure.warmup; ++i) trace(rays);
   const double begin = wall_seconds();
   trace(rays);
   const double pass = std::max(wall_seconds() - begin, 1e-9);
-  passes_ = static_cast<std::uint64_t>(std::clamp(std::ceil(measure.min_time / pass), 1.0, double(kMostPasses)));
+  passes_ =
+      static_cast<std::uint64_t>(std::clamp(std::ceil(measure.min_time / pass), 1.0, double(kMostPasses)));
 }
 
 Repetition TraceJob::measure(TimedLoop& loop) const {
-  // Another cell ran just before: an untimed eighth of the rays brings this structure's upper nodes back into the cache.
+  // Another cell ran just before: an untimed eighth of the rays brings this structure's upper nodes back into
+  // the cache.
   const std::size_t rays = workload_.rays.size();
   trace(std::max<std::size_t>(rays / 8, 1));
   const auto cpu_seconds = cell_.threads == 1 ? thread_cpu_seconds : process_cpu_seconds;

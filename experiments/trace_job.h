@@ -1,5 +1,5 @@
-// TraceJob: one trace cell made ready to be timed: its answers are known and checked, its work is counted, and the number
-// of passes that fill a repetition is set.
+// TraceJob: one trace cell made ready to be timed: its answers are known and checked, its work is counted,
+// and the number of passes that fill a repetition is set.
 #pragma once
 
 #include <tbb/task_arena.h>
@@ -23,8 +23,9 @@ class TraceJob {
   /// Nothing is traced yet. All arguments must outlive the job.
   TraceJob(const Cell& cell, const Accel& accel, const Workload& workload, AnswerBuffers& buffers);
 
-  /// Traces all rays once and adds `rays`, `hits` and, with `data`, the check against the exact answers to the facts;
-  /// counts the work with the counting kernel; then warms up and finds how many passes take `min_time` seconds.
+  /// Traces all rays once and adds `rays`, `hits` and, with `data`, the check against the exact answers to
+  /// the facts; counts the work with the counting kernel; then warms up and finds how many passes take
+  /// `min_time` seconds.
   void prepare(Json& facts, SceneData* data, const MeasureSettings& measure);
   [[nodiscard]] std::uint64_t passes() const noexcept { return passes_; }
   /// One repetition: wall time, and CPU time of the thread (of the process where the cell has several).

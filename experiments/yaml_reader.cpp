@@ -21,7 +21,8 @@ std::string read_text(const std::filesystem::path& file) {
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
   if (!std::filesystem::exists(status)) {
-    throw UserError(fmt::format("{}: no such file; name a configuration, as in configs/quick.yaml", file.string()));
+    throw UserError(
+        fmt::format("{}: no such file; name a configuration, as in configs/quick.yaml", file.string()));
   }
   if (std::filesystem::is_directory(status)) {
     throw UserError(fmt::format("{}: is a folder; name the YAML file in it", file.string()));
@@ -31,16 +32,20 @@ std::string read_text(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// A tab outside a comment is refused: YAML forbids it as indentation, and yaml-cpp reads some as something else.
+/// A tab outside a comment is refused: YAML forbids it as indentation, and yaml-cpp reads some as something
+/// else.
 void refuse_tabs(const std::string& text, const std::filesystem::path& file) {
   std::size_t line = 1;
   bool comment = false;
   char before = '\n';
   for (char c : text) {
-    if (c == '\n') ++line, comment = false;
-    else if (c == '#' && (before == ' ' || before == '\n' || before == '\t')) comment = true;
+    if (c == '\n')
+      ++line, comment = false;
+    else if (c == '#' && (before == ' ' || before == '\n' || before == '\t'))
+      comment = true;
     else if (c == '\t' && !comment) {
-      throw UserError(fmt::format("{}:{}: a tab; YAML is indented with spaces: put spaces in its place", file.string(), line));
+      throw UserError(fmt::format("{}:{}: a tab; YAML is indented with spaces: put spaces in its place",
+                                  file.string(), line));
     }
     before = c;
   }
@@ -62,10 +67,11 @@ YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
   try {
     root_ = YAML::Load(text);
   } catch (const YAML::Exception& e) {
-    throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it", file_.string(),
-                                e.mark.line + 1, e.msg));
+    throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it",
+                                file_.string(), e.mark.line + 1, e.msg));
   }
-  if (!root_ || root_.IsNull()) throw UserError(fmt::format("{}: empty; a configuration has at least `scenes`", file_.string()));
+  if (!root_ || root_.IsNull())
+    throw UserError(fmt::format("{}: empty; a configuration has at least `scenes`", file_.string()));
 }
 
 std::string YamlReader::where(const YAML::Node& node) const {
@@ -77,24 +83,32 @@ void YamlReader::fail(const YAML::Node& node, const std::string& message) const 
   throw UserError(where(node) + ": " + message);
 }
 
-void YamlReader::check_map(const YAML::Node& node, std::string_view what, std::span<const std::string> keys) const {
-  if (!node.IsMap()) fail(node, fmt::format("{} must be a map of {}, not {}", what, fmt::join(keys, ", "), shown(node)));
+void YamlReader::check_map(const YAML::Node& node, std::string_view what,
+                           std::span<const std::string> keys) const {
+  if (!node.IsMap())
+    fail(node, fmt::format("{} must be a map of {}, not {}", what, fmt::join(keys, ", "), shown(node)));
   std::set<std::string> seen;
   for (const auto& entry : node) {
-    if (!entry.first.IsScalar()) fail(entry.first, fmt::format("{}: a key must be a word, not {}", what, shown(entry.first)));
+    if (!entry.first.IsScalar())
+      fail(entry.first, fmt::format("{}: a key must be a word, not {}", what, shown(entry.first)));
     const std::string key = entry.first.Scalar();
-    if (std::ranges::find(keys, key) == keys.end()) fail(entry.first, unknown_name_message(fmt::format("key in {}", what), key, keys));
-    if (!seen.insert(key).second) fail(entry.first, fmt::format("{}: '{}' is given twice; keep one", what, key));
-    if (entry.second.IsNull()) fail(entry.first, fmt::format("'{}' has no value; give one or take the line out", key));
+    if (std::ranges::find(keys, key) == keys.end())
+      fail(entry.first, unknown_name_message(fmt::format("key in {}", what), key, keys));
+    if (!seen.insert(key).second)
+      fail(entry.first, fmt::format("{}: '{}' is given twice; keep one", what, key));
+    if (entry.second.IsNull())
+      fail(entry.first, fmt::format("'{}' has no value; give one or take the line out", key));
   }
 }
 
 std::string YamlReader::text(const YAML::Node& node, std::string_view what) const {
-  if (!node.IsScalar() || node.Scalar().empty()) fail(node, fmt::format("{} must be a word, not {}", what, shown(node)));
+  if (!node.IsScalar() || node.Scalar().empty())
+    fail(node, fmt::format("{} must be a word, not {}", what, shown(node)));
   return node.Scalar();
 }
 
-std::uint64_t YamlReader::integer(const YAML::Node& node, std::string_view what, std::uint64_t low, std::uint64_t high) const {
+std::uint64_t YamlReader::integer(const YAML::Node& node, std::string_view what, std::uint64_t low,
+                                  std::uint64_t high) const {
   std::uint64_t value = 0;
   const std::string s = node.IsScalar() ? node.Scalar() : "";
   const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
@@ -123,17 +137,21 @@ std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, std::string_vie
   } else {
     fail(node, fmt::format("{} must be a list, not {}", what, shown(node)));
   }
-  if (values.empty()) fail(node, fmt::format("{} is empty; name at least one value or take the line out", what));
+  if (values.empty())
+    fail(node, fmt::format("{} is empty; name at least one value or take the line out", what));
   std::set<std::string> seen;
   for (const YAML::Node& value : values) {
-    if (!value.IsScalar() || value.Scalar().empty()) fail(value, fmt::format("{}: a value must be a word, not {}", what, shown(value)));
-    if (!seen.insert(value.Scalar()).second) fail(value, fmt::format("{}: '{}' is given twice; keep one", what, value.Scalar()));
+    if (!value.IsScalar() || value.Scalar().empty())
+      fail(value, fmt::format("{}: a value must be a word, not {}", what, shown(value)));
+    if (!seen.insert(value.Scalar()).second)
+      fail(value, fmt::format("{}: '{}' is given twice; keep one", what, value.Scalar()));
   }
   return values;
 }
 
 std::size_t YamlReader::bytes(const YAML::Node& node, std::string_view what) const {
-  constexpr std::pair<std::string_view, int> kUnits[] = {{"", 0}, {"B", 0}, {"KiB", 10}, {"MiB", 20}, {"GiB", 30}, {"TiB", 40}};
+  constexpr std::pair<std::string_view, int> kUnits[] = {{"", 0},     {"B", 0},    {"KiB", 10},
+                                                         {"MiB", 20}, {"GiB", 30}, {"TiB", 40}};
   const std::string s = node.IsScalar() ? node.Scalar() : "";
   double value = 0;
   const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);

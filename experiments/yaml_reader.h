@@ -1,4 +1,5 @@
-// YamlReader: strict reading of YAML nodes: every error names file and line, every key is checked against a list.
+// YamlReader: strict reading of YAML nodes: every error names file and line, every key is checked against a
+// list.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -14,7 +15,8 @@ namespace arboretum {
 
 class YamlReader {
  public:
-  /// Loads the file. Throws UserError for a missing, unreadable or empty file, a tab, or text that is no YAML.
+  /// Loads the file. Throws UserError for a missing, unreadable or empty file, a tab, or text that is no
+  /// YAML.
   explicit YamlReader(std::filesystem::path file);
 
   [[nodiscard]] const YAML::Node& root() const noexcept { return root_; }

@@ -36,8 +36,17 @@ struct TemporaryFolder {
 
 // Two structures and a handful of kernels that exist on paper alone: what a plan needs.
 const StructureEntry kStructures[] = {
-    {{.name = "tree", .summary = "a tree", .builders = {"binned_sah", "morton"}, .leaves = {"triangle4", "triangle8"}}, nullptr},
-    {{.name = "list", .summary = "a list", .builders = {"none"}, .leaves = {"triangle4"}, .uses_parameters = false}, nullptr},
+    {{.name = "tree",
+      .summary = "a tree",
+      .builders = {"binned_sah", "morton"},
+      .leaves = {"triangle4", "triangle8"}},
+     nullptr},
+    {{.name = "list",
+      .summary = "a list",
+      .builders = {"none"},
+      .leaves = {"triangle4"},
+      .uses_parameters = false},
+     nullptr},
 };
 
 std::vector<KernelRow> paper_kernels() {
@@ -62,9 +71,8 @@ Registry paper_registry(std::vector<Isa> isas = {Isa::scalar, Isa::sse, Isa::avx
   registry.default_leaf = [](std::string_view structure, std::string_view, Isa isa) -> std::string_view {
     return structure == "tree" && isa >= Isa::avx2 ? "triangle8" : "triangle4";
   };
-  registry.why_no_kernel = [](std::string_view structure, auto, std::string_view intersector, auto, auto, Isa) {
-    return std::string(structure) + " has no " + std::string(intersector);
-  };
+  registry.why_no_kernel = [](std::string_view structure, auto, std::string_view intersector, auto, auto,
+                              Isa) { return std::string(structure) + " has no " + std::string(intersector); };
   return registry;
 }
 
@@ -122,7 +130,8 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\naxes:\n  workload: [difuse]\n", ":3", "did you mean 'diffuse'"},
       {"scenes: [bunny]\naxes:\n  threads: [-1]\n", ":3", "threads must be an integer"},
       {"scenes: [bunny]\naxes:\n  traversal: [hybrid]\n", ":3", "unknown traversal"},
-      {"scenes: [bunny]\nmeasure: {resolution: [0, 512]}\n", ":2", "resolution: width must be an integer from 1"},
+      {"scenes: [bunny]\nmeasure: {resolution: [0, 512]}\n", ":2",
+       "resolution: width must be an integer from 1"},
       {"scenes: [bunny]\nmeasure: {resolution: 512}\n", ":2", "[width, height]"},
       {"scenes: [bunny]\nmeasure: {repetitions: -3}\n", ":2", "repetitions must be an integer"},
       {"scenes: [bunny]\nmeasure: {repetitions: 2.5}\n", ":2", "repetitions must be an integer"},
@@ -141,8 +150,12 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\nexclude: {structure: tree}\n", ":2", "must be a list of maps"},
       {"scenes: [bunny]\nexclude: [{scene: dragon}]\n", ":2", "unknown scene"},
       {"scenes: [bunny]\nexperiment: ../up\n", ":2", "names a folder"},
-      {"scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\nexclude: [{isa: avx512}]\n", ":3", "takes no cell away"},
-      {"scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\ninclude: [{structure: tree}]\n", ":3", "adds no cell"},
+      {"scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\nexclude: [{isa: "
+       "avx512}]\n",
+       ":3", "takes no cell away"},
+      {"scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\ninclude: "
+       "[{structure: tree}]\n",
+       ":3", "adds no cell"},
   };
   for (const Case& c : cases) {
     const fs::path file = folder.write("case.yaml", c.yaml);
@@ -152,8 +165,10 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
     CHECK(message.starts_with((file.string() + c.line)));
     CHECK(message.find('\n') == std::string::npos);
   }
-  CHECK(error_of([&] { (void)read_experiment(folder.path / "none.yaml", registry); }).find("no such file") != std::string::npos);
-  CHECK(error_of([&] { (void)read_experiment(folder.path, registry); }).find("is a folder") != std::string::npos);
+  CHECK(error_of([&] { (void)read_experiment(folder.path / "none.yaml", registry); }).find("no such file") !=
+        std::string::npos);
+  CHECK(error_of([&] { (void)read_experiment(folder.path, registry); }).find("is a folder") !=
+        std::string::npos);
 }
 
 TEST_CASE("cells are the product, in names that the contract fixes; auto follows the rest") {
@@ -219,14 +234,15 @@ exclude: [{builder: morton, isa: sse, box: fast}]
 metrics: [trace]
 )");
   const Plan plan = make_plan(read_experiment(file, registry), registry);
-  CHECK(names(plan, Cell::Metric::trace) == std::vector<std::string>{
-      "trace/sphere-500/tree/binned_sah/triangle8/moller_trumbore/fast/single/scalar/primary/threads:1",
-      "trace/sphere-500/tree/binned_sah/triangle8/moller_trumbore/fast/single/sse/primary/threads:1",
-      "trace/sphere-500/tree/morton/triangle8/moller_trumbore/fast/single/scalar/primary/threads:1",
-      "trace/sphere-500/list/none/triangle4/moller_trumbore/fast/single/scalar/primary/threads:1",
-      "trace/sphere-500/list/none/triangle4/moller_trumbore/fast/single/sse/primary/threads:1",
-      "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/scalar/primary/threads:1",
-      "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/sse/primary/threads:1"});
+  CHECK(names(plan, Cell::Metric::trace) ==
+        std::vector<std::string>{
+            "trace/sphere-500/tree/binned_sah/triangle8/moller_trumbore/fast/single/scalar/primary/threads:1",
+            "trace/sphere-500/tree/binned_sah/triangle8/moller_trumbore/fast/single/sse/primary/threads:1",
+            "trace/sphere-500/tree/morton/triangle8/moller_trumbore/fast/single/scalar/primary/threads:1",
+            "trace/sphere-500/list/none/triangle4/moller_trumbore/fast/single/scalar/primary/threads:1",
+            "trace/sphere-500/list/none/triangle4/moller_trumbore/fast/single/sse/primary/threads:1",
+            "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/scalar/primary/threads:1",
+            "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/sse/primary/threads:1"});
   CHECK(plan.excluded == 1);
   CHECK(names(plan, Cell::Metric::build).empty());
 }
@@ -253,11 +269,14 @@ TEST_CASE("the command line lays axes over the file") {
   const TemporaryFolder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("small.yaml", kSmall);
-  const auto count = [&](Overrides o) { return names(make_plan(read_experiment(file, registry, o), registry), Cell::Metric::trace).size(); };
+  const auto count = [&](Overrides o) {
+    return names(make_plan(read_experiment(file, registry, o), registry), Cell::Metric::trace).size();
+  };
   CHECK(count({}) == 1);
   CHECK(count({.axes = {"isa=scalar,avx"}}) == 2);
   CHECK(count({.axes = {"workload=primary,random", "threads=1,2"}}) == 4);
-  CHECK(read_experiment(file, registry, {.axes = {}, .threads = 2}).axes[index_of(Axis::threads)] == std::vector<std::string>{"2"});
+  CHECK(read_experiment(file, registry, {.axes = {}, .threads = 2}).axes[index_of(Axis::threads)] ==
+        std::vector<std::string>{"2"});
   CHECK(error_of([&] { count({.axes = {"iza=sse"}}); }).find("did you mean 'isa'") != std::string::npos);
   CHECK(error_of([&] { count({.axes = {"isa=sze"}}); }).find("did you mean 'sse'") != std::string::npos);
   CHECK(error_of([&] { count({.axes = {"isa="}}); }).find("empty") != std::string::npos);
@@ -293,7 +312,8 @@ measure: {min_time: 0.125, memory: 512MiB}
   CHECK(effective_yaml(second) == effective_yaml(first));
   CHECK(configuration_hash(second) == configuration_hash(first));
   CHECK(second.measure.memory == std::size_t{512} << 20);
-  CHECK(configuration_hash(read_experiment(file, registry, {.axes = {}, .seed = 9})) != configuration_hash(first));
+  CHECK(configuration_hash(read_experiment(file, registry, {.axes = {}, .seed = 9})) !=
+        configuration_hash(first));
 }
 
 TEST_CASE("median and bootstrap interval") {
@@ -317,7 +337,8 @@ TEST_CASE("files of lines: a torn last line is dropped, an impossible write is o
     CHECK(message.find("No space left") != std::string::npos);
     CHECK(message.find("--resume") != std::string::npos);
   }
-  CHECK(error_of([&] { write_whole(folder.path / "none" / "file", "x"); }).find("cannot be written") != std::string::npos);
+  CHECK(error_of([&] { write_whole(folder.path / "none" / "file", "x"); }).find("cannot be written") !=
+        std::string::npos);
   CHECK(error_of([&] { make_output_folder(file / "below"); }).find("output folder") != std::string::npos);
   write_whole(file, "whole");
   CHECK(read_lines(file).empty());
@@ -332,7 +353,8 @@ Repetition repetition(unsigned index, double seconds) {
 CellResult result_of(const Cell& cell) {
   CellResult result{.cell = cell, .repetitions = {}, .facts = {}};
   for (unsigned i = 0; i < 3; ++i) result.repetitions.push_back(repetition(i, 0.5 + 0.25 * i));
-  result.facts["rays"] = 1000, result.facts["triangles"] = 500, result.facts["hits"] = 700, result.facts["wrong_answers"] = 0;
+  result.facts["rays"] = 1000, result.facts["triangles"] = 500, result.facts["hits"] = 700,
+  result.facts["wrong_answers"] = 0;
   return result;
 }
 
@@ -363,7 +385,8 @@ TEST_CASE("the journal gives back what it was told, and refuses another configur
     REQUIRE(started.size() == 2);
     CHECK((started[0].index == 0 && started[1].index == 2));
   }
-  CHECK(error_of([&] { Journal(folder.path, "other", plan, true); }).find("another configuration") != std::string::npos);
+  CHECK(error_of([&] { Journal(folder.path, "other", plan, true); }).find("another configuration") !=
+        std::string::npos);
   CHECK(Journal(folder.path, "other", plan, false).done().empty());
 }
 
@@ -402,7 +425,12 @@ TEST_CASE("results.json has what Google Benchmark's compare.py reads; the verdic
 }
 
 TEST_CASE("Google Benchmark's flags: ours are taken, wrong ones are named") {
-  std::vector<std::string> words{"run", "a.yaml", "--benchmark_repetitions=3", "--benchmark_min_time=0.5s", "--benchmark_filter=bvh8", "--benchmark_v=1"};
+  std::vector<std::string> words{"run",
+                                 "a.yaml",
+                                 "--benchmark_repetitions=3",
+                                 "--benchmark_min_time=0.5s",
+                                 "--benchmark_filter=bvh8",
+                                 "--benchmark_v=1"};
   const BenchmarkFlags flags = take_benchmark_flags(words);
   CHECK(words == std::vector<std::string>{"run", "a.yaml"});
   CHECK(flags.repetitions == 3u);
@@ -412,7 +440,8 @@ TEST_CASE("Google Benchmark's flags: ours are taken, wrong ones are named") {
   std::vector<std::string> wrong{"--benchmark_repetitions=many"};
   CHECK(error_of([&] { (void)take_benchmark_flags(wrong); }).find("a number from 1") != std::string::npos);
   std::vector<std::string> format{"--benchmark_format=xml"};
-  CHECK(error_of([&] { (void)take_benchmark_flags(format); }).find("one of console, json, csv") != std::string::npos);
+  CHECK(error_of([&] { (void)take_benchmark_flags(format); }).find("one of console, json, csv") !=
+        std::string::npos);
 }
 
 TEST_CASE("interleaved jobs run each of their repetitions once, and an error comes out") {
@@ -421,11 +450,14 @@ TEST_CASE("interleaved jobs run each of their repetitions once, and an error com
   std::map<std::string, int> loops;
   std::vector<InterleavedJob> jobs;
   for (const char* name : {"a/b:1", "c"}) {
-    jobs.push_back({.name = name, .indices = {0, 2, 5}, .iterations = 4,
-                    .measure = [&loops, name](TimedLoop& loop) {
-                      while (loop.next()) ++loops[name];
-                      return Repetition{};
-                    },
+    jobs.push_back({.name = name,
+                    .indices = {0, 2, 5},
+                    .iterations = 4,
+                    .measure =
+                        [&loops, name](TimedLoop& loop) {
+                          while (loop.next()) ++loops[name];
+                          return Repetition{};
+                        },
                     .ended = [&ended, name](const Repetition& r) { ended[name].push_back(r.index); }});
   }
   run_interleaved(jobs);
