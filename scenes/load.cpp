@@ -9,6 +9,7 @@
 #include "core/names.h"
 #include "scenes/catalogue.h"
 #include "scenes/generators/generators.h"
+#include "scenes/preflight.h"
 #include "scenes/readers.h"
 #include "scenes/sanitise.h"
 #include "scenes/scene.h"
@@ -47,6 +48,7 @@ Scene read_model(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
   if (extension == ".obj") return read_obj(path);
   if (extension == ".ply") return read_ply(path);
+  check_header(path, extension);
   return read_assimp(path);
 }
 

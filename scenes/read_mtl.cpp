@@ -52,9 +52,11 @@ std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<st
 std::string one_line(std::string_view text) {
   std::string line;
   for (const char c : text) {
-    const bool blank = static_cast<unsigned char>(c) <= ' ' || c == 127;
+    // Bytes of broken files are not UTF-8, and what is printed may end up in JSON.
+    const auto byte = static_cast<unsigned char>(c);
+    const bool blank = byte <= ' ' || byte == 127;
     if (blank && (line.empty() || line.back() == ' ')) continue;
-    line += blank ? ' ' : c;
+    line += blank ? ' ' : byte < 128 ? c : '?';
   }
   while (!line.empty() && line.back() == ' ') line.pop_back();
   constexpr std::size_t kLongest = 300;

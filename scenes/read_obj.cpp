@@ -119,7 +119,7 @@ struct ObjReader {
     }
     if (material_library_seen) {
       scene.report.warnings.push_back(fmt::format("{}:{}: no material '{}' in the material library; grey stands in",
-                                                  path.string(), buffer.line_number(), name));
+                                                  path.string(), buffer.line_number(), one_line(name)));
     }
     use_default_material();
   }
@@ -129,7 +129,7 @@ struct ObjReader {
     const std::filesystem::path file = path.parent_path() / name;
     if (std::error_code error; !std::filesystem::exists(file, error)) {
       scene.report.warnings.push_back(fmt::format("{}:{}: no material library '{}'; grey stands in for its materials",
-                                                  path.string(), buffer.line_number(), file.string()));
+                                                  path.string(), buffer.line_number(), one_line(file.string())));
       material_library_seen = false;
       return;
     }

@@ -25,7 +25,7 @@ namespace arboretum {
 /// Any model by its extension, not sanitised.
 [[nodiscard]] Scene read_model(const std::filesystem::path& path);
 
-/// Line breaks and control characters of a library's message made spaces, so that an error stays one line.
+/// A library's message, or a word of a file, fit for one line: control characters made spaces, what is not ASCII made '?'.
 [[nodiscard]] std::string one_line(std::string_view text);
 
 }  // namespace arboretum
