@@ -15,6 +15,12 @@ def number(value, form="{:.3g}"):
     return f'<td class="number" data-v="{value!r}">{escape(form.format(value))}</td>'
 
 
+def figure(value):
+    """Four digits for what is measured, all of them for what is counted."""
+    whole = value is not None and (abs(value) >= 1000 or value == int(value))
+    return number(value, "{:,.0f}" if whole else "{:#.4g}")
+
+
 def text(value, key=False):
     return f'<td{" class=key" if key else ""}>{escape(str(value))}</td>'
 
@@ -118,8 +124,7 @@ def structure_table(results):
     rows = []
     for cell in cells:
         values = [(cell.value(name), scale) for name, _, scale in columns]
-        numbers = [number(None if v is None else v * s, "{:,.0f}" if v is not None and v * s >= 1000 else "{:.4g}")
-                   for v, s in values]
+        numbers = [figure(None if v is None else v * scale) for v, scale in values]
         rows.append(([text(cell[a], key=a == "structure") for a in axes] + numbers, ""))
     return table("structures", heads, rows)
 
