@@ -100,7 +100,9 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registr
   if (command.resume) refuse_other_configuration(folder, hash);
   if (!command.benchmark.out.empty())
     AppendFile(command.benchmark.out, true);  // cannot be written: say so now
+  const bool replaces = !command.resume && std::filesystem::exists(folder / "cells.jsonl");
   Journal journal(folder, hash, plan, command.resume);
+  if (replaces) fmt::print(stderr, "{}: the results of an earlier run are replaced\n", folder.string());
   for (const char* stale : {"results.json", "results.csv", "report.html"}) {
     std::error_code ignored;
     std::filesystem::remove(folder / stale, ignored);

@@ -85,6 +85,7 @@ void add_facts(Json& facts, const StructureStatistics& s) {
   facts["sah_cost"] = s.sah_cost, facts["sah_child_cost"] = s.sah_child_cost, facts["epo"] = s.epo;
   facts["nodes"] = s.nodes, facts["leaves"] = s.leaves, facts["depth"] = s.depth;
   facts["node_bytes"] = s.node_bytes, facts["leaf_bytes"] = s.leaf_bytes;
+  facts["epo_sampled"] = s.epo_sampled;
   facts["leaf_fill"] = s.leaf_fill, facts["duplication"] = s.duplication,
   facts["children_per_node"] = s.children_per_node;
 }

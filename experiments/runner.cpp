@@ -150,6 +150,7 @@ class Runner {
       TraceJob& job = jobs.emplace_back(*cell, accel, workload, buffers);
       Running& running = begin(*cell);
       running.result.facts.update(pool.facts(*cell, accel));
+      pool.add_build_facts(*cell, running.result.facts);
       job.prepare(running.result.facts, experiment_.metrics.accuracy ? &data : nullptr, experiment_.measure);
       interleaved.push_back(
           interleaved_job(running, job.passes(), [&job](TimedLoop& loop) { return job.measure(loop); }));

@@ -40,7 +40,15 @@ const Accel& StructurePool::get(const Cell& cell) {
   const StructureInfo& info = registry_.structure(cell.structure)->info;
   if (!info.build_depends_on_isa) settings.isa = registry_.isas.back();
   if (!info.build_depends_on_threads) settings.threads = std::max(1u, std::thread::hardware_concurrency());
-  return *held_.emplace(name, registry_.build(cell.structure, mesh_, settings, reports_[name])).first->second;
+  SharedBuild& build = builds_[name];
+  build.threads = settings.threads;
+  return *held_.emplace(name, registry_.build(cell.structure, mesh_, settings, build.report)).first->second;
+}
+
+void StructurePool::add_build_facts(const Cell& cell, Json& facts) const {
+  const SharedBuild& build = builds_.at(key(cell));
+  facts["shared_build_seconds"] = build.report.seconds;
+  facts["shared_build_threads"] = build.threads;
 }
 
 std::size_t StructurePool::held_bytes() const {

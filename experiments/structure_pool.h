@@ -29,6 +29,8 @@ class StructurePool {
   /// The structure, built at the first call with all threads of the machine (the tree is the same for any
   /// number).
   [[nodiscard]] const Accel& get(const Cell& cell);
+  /// Seconds and threads of the shared build, apart from what build cells measure.
+  void add_build_facts(const Cell& cell, Json& facts) const;
   void release(const std::string& key) { held_.erase(key); }
   [[nodiscard]] std::size_t held_bytes() const;
   /// Triangles, bytes, bytes_per_triangle and, with quality, statistics of a structure with this key.
@@ -39,7 +41,11 @@ class StructurePool {
   const Registry& registry_;
   bool quality_;
   std::map<std::string, std::unique_ptr<Accel>> held_;
-  std::map<std::string, BuildReport> reports_;
+  struct SharedBuild {
+    BuildReport report;
+    unsigned threads = 1;
+  };
+  std::map<std::string, SharedBuild> builds_;
   std::map<std::string, Json> facts_;
 };
 
