@@ -1,24 +1,15 @@
 #include "core/arena.h"
 
-#include <cstdint>
-
 #include "core/memory_meter.h"
 
 namespace arboretum {
 
 Arena::Arena(std::size_t bytes) : bytes_(bytes) {
-  if (bytes == 0) return;
-  constexpr std::size_t kHugePage = std::size_t{2} << 20;
-  const std::size_t alignment = bytes >= kHugePage ? kHugePage : 64;
-  data_ = static_cast<std::byte*>(::operator new(bytes, std::align_val_t(alignment)));
-  MemoryMeter::add(bytes);
+  if (bytes > 0) data_ = static_cast<std::byte*>(allocate_metered(bytes));
 }
 
 Arena::~Arena() {
-  if (!data_) return;
-  constexpr std::size_t kHugePage = std::size_t{2} << 20;
-  ::operator delete(data_, std::align_val_t(bytes_ >= kHugePage ? kHugePage : 64));
-  MemoryMeter::remove(bytes_);
+  if (data_) release_metered(data_, bytes_);
 }
 
 }  // namespace arboretum

@@ -1,11 +1,16 @@
 #include "core/memory_meter.h"
 
 #include <atomic>
+#include <new>
+
+#include <sys/mman.h>
 
 namespace arboretum {
 namespace {
 std::atomic<std::size_t> current_bytes{0};
 std::atomic<std::size_t> peak_bytes{0};
+constexpr std::size_t kHugePage = std::size_t{2} << 20;
+[[nodiscard]] std::align_val_t alignment_of(std::size_t bytes) noexcept { return std::align_val_t(bytes >= kHugePage ? kHugePage : 64); }
 }  // namespace
 
 void MemoryMeter::add(std::size_t bytes) noexcept {
@@ -19,5 +24,17 @@ void MemoryMeter::remove(std::size_t bytes) noexcept { current_bytes.fetch_sub(b
 std::size_t MemoryMeter::current() noexcept { return current_bytes.load(std::memory_order_relaxed); }
 std::size_t MemoryMeter::peak() noexcept { return peak_bytes.load(std::memory_order_relaxed); }
 void MemoryMeter::reset_peak() noexcept { peak_bytes.store(current(), std::memory_order_relaxed); }
+
+void* allocate_metered(std::size_t bytes) {
+  void* data = ::operator new(bytes, alignment_of(bytes));
+  if (bytes >= kHugePage) (void)madvise(data, bytes, MADV_HUGEPAGE);  // a wish, not a need
+  MemoryMeter::add(bytes);
+  return data;
+}
+
+void release_metered(void* data, std::size_t bytes) noexcept {
+  MemoryMeter::remove(bytes);
+  ::operator delete(data, alignment_of(bytes));
+}
 
 }  // namespace arboretum

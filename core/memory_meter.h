@@ -19,24 +19,24 @@ class MemoryMeter {
   static void reset_peak() noexcept;
 };
 
-/// Allocates from the global heap and reports to MemoryMeter. Elements are default-initialised (left as they are for
-/// trivial types), since builders overwrite whole arrays.
+/// Uninitialised bytes, metered: aligned to 64, or to 2 MiB and on huge pages (where the kernel grants them) when that
+/// many are asked for. Huge pages save faults while building (docs/performance.md) and TLB misses while tracing. Throws
+/// std::bad_alloc.
+[[nodiscard]] void* allocate_metered(std::size_t bytes);
+/// Gives back what allocate_metered(bytes) gave.
+void release_metered(void* data, std::size_t bytes) noexcept;
+
+/// For builders' arrays. Elements are default-initialised (left as they are for trivial types), since builders overwrite
+/// whole arrays.
 template <class T>
 struct MeteredAllocator {
+  static_assert(alignof(T) <= 64);
   using value_type = T;
   MeteredAllocator() = default;
   template <class U>
   MeteredAllocator(const MeteredAllocator<U>&) noexcept {}
-  static constexpr std::align_val_t kAlignment{alignof(T) > 64 ? alignof(T) : 64};
-  T* allocate(std::size_t n) {
-    T* p = static_cast<T*>(::operator new(n * sizeof(T), kAlignment));
-    MemoryMeter::add(n * sizeof(T));
-    return p;
-  }
-  void deallocate(T* p, std::size_t n) noexcept {
-    MemoryMeter::remove(n * sizeof(T));
-    ::operator delete(p, kAlignment);
-  }
+  T* allocate(std::size_t n) { return static_cast<T*>(allocate_metered(n * sizeof(T))); }
+  void deallocate(T* p, std::size_t n) noexcept { release_metered(p, n * sizeof(T)); }
   template <class U>
   void construct(U* p) noexcept(noexcept(::new (p) U)) {
     ::new (static_cast<void*>(p)) U;

@@ -22,12 +22,18 @@ ARBORETUM_INLINE void sort_pair(StackEntry& a, StackEntry& b) {
   a = far, b = near;
 }
 
+/// Of every child that waits on the stack, so many cache lines are asked for at once (docs/performance.md).
+inline constexpr int kPrefetchLines = 5;
+
 /// Puts the children that `hit` names on the stack, far to near, and takes the nearest off again as the result.
 template <int N>
-ARBORETUM_INLINE bvh::NodeReference push_children(const bvh::NodeReference* child, const std::uint32_t* key, unsigned hit, StackEntry*& top) {
+ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const bvh::NodeReference* child, const std::uint32_t* key,
+                                                  unsigned hit, StackEntry*& top) {
   const auto next = [&] {
     const int i = __builtin_ctz(hit);
     hit &= hit - 1;
+    const auto* target = reinterpret_cast<const char*>(base + bvh::offset_of(child[i]));
+    for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
     return stack_entry(key[i], child[i]);
   };
   StackEntry a = next(), b = next();
@@ -86,7 +92,7 @@ struct SingleRay {
         {
           alignas(64) std::uint32_t key[W];
           entry.store(key);
-          reference = push_children<N>(child, key, hit, top);
+          reference = push_children<N>(base, child, key, hit, top);
         }
       }
       {
