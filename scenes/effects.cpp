@@ -9,14 +9,17 @@
 namespace arboretum {
 namespace {
 
-bool is_bright(Vec3f c) { return std::max({c.x, c.y, c.z}) > 0.0f; }
+bool is_bright(Vec3f c) {
+  return std::max({c.x, c.y, c.z}) > 0.0f;
+}
 
 bool is_dielectric(const Material& m) {
   const bool transparent_model = m.illum == 4 || m.illum == 5 || m.illum == 6 || m.illum == 7 || m.illum == 9;
   return transparent_model && m.ior != 1.0f && is_bright(m.transmission);
 }
 bool is_mirror(const Material& m) {
-  return !is_dielectric(m) && (m.illum == 3 || m.illum == 5 || m.illum == 8) && is_bright(m.specular) && m.roughness == 0.0f;
+  return !is_dielectric(m) && (m.illum == 3 || m.illum == 5 || m.illum == 8) && is_bright(m.specular) &&
+         m.roughness == 0.0f;
 }
 bool is_glossy(const Material& m) {
   return !is_dielectric(m) && !is_mirror(m) && is_bright(m.specular) && m.illum >= 2;
@@ -45,14 +48,17 @@ class Effects {
     camera_and_motion();
     maps();
     for (const std::string_view name : kEffectNames) {
-      const auto found = std::find_if(found_.begin(), found_.end(), [&](const Effect& e) { return e.name == name; });
+      const auto found =
+          std::find_if(found_.begin(), found_.end(), [&](const Effect& e) { return e.name == name; });
       result_.push_back(*found);
     }
     return std::move(result_);
   }
 
  private:
-  void set(std::string_view name, bool called_for, std::string reason) { found_.push_back({name, called_for, std::move(reason)}); }
+  void set(std::string_view name, bool called_for, std::string reason) {
+    found_.push_back({name, called_for, std::move(reason)});
+  }
 
   /// Calls for the effect where a used material passes the test, and says how many do.
   template <class Test>
@@ -64,8 +70,8 @@ class Effects {
       triangles += usage_.triangles[i];
     }
     set(name, materials > 0,
-        materials > 0 ? fmt::format("{}: {} triangles of {} material{}, first {}", what, triangles, materials, materials == 1 ? "" : "s",
-                                    scene_.materials[first].name)
+        materials > 0 ? fmt::format("{}: {} triangles of {} material{}, first {}", what, triangles, materials,
+                                    materials == 1 ? "" : "s", scene_.materials[first].name)
                       : fmt::format("no {}", what));
     return materials > 0;
   }
@@ -75,37 +81,51 @@ class Effects {
     for (const Light& light : scene_.lights) bright += is_bright(light.intensity);
     set("shadow_hard", bright > 0,
         bright > 0 ? fmt::format("{} point, spot or directional light{}", bright, bright == 1 ? "" : "s")
-        : scene_.lights.empty() ? std::string("no point, spot or directional light") : std::string("all of its lights have intensity 0"));
+        : scene_.lights.empty() ? std::string("no point, spot or directional light")
+                                : std::string("all of its lights have intensity 0"));
     std::size_t emitters = 0;
     for (std::size_t i = 0; i < scene_.materials.size(); ++i)
       if (is_bright(scene_.materials[i].emission)) emitters += usage_.triangles[i];
-    by_material("shadow_soft", [](const Material& m) { return is_bright(m.emission); }, "light from surfaces (Ke > 0)");
+    by_material(
+        "shadow_soft", [](const Material& m) { return is_bright(m.emission); },
+        "light from surfaces (Ke > 0)");
     const bool environment = is_bright(scene_.environment);
     set("env_light", environment,
-        environment ? fmt::format("the environment's radiance is ({:.3g}, {:.3g}, {:.3g})", scene_.environment.x, scene_.environment.y, scene_.environment.z)
+        environment ? fmt::format("the environment's radiance is ({:.3g}, {:.3g}, {:.3g})",
+                                  scene_.environment.x, scene_.environment.y, scene_.environment.z)
                     : std::string("no environment, or a black one"));
     emitters_ = bright + emitters + environment;
     set("multi_light", emitters_ > 1,
-        fmt::format("{} emitter{} in all: {} lights, {} emissive triangles, {} environment", emitters_, emitters_ == 1 ? "" : "s", bright, emitters, int(environment)));
+        fmt::format("{} emitter{} in all: {} lights, {} emissive triangles, {} environment", emitters_,
+                    emitters_ == 1 ? "" : "s", bright, emitters, int(environment)));
   }
 
   void surfaces() {
     by_material("mirror", is_mirror, "perfect reflection (illum 3, Ks > 0, Pr 0)");
     by_material("glossy", is_glossy, "rough specular lobe (Ks > 0)");
     by_material("dielectric", is_dielectric, "refraction (illum 4 to 7 or 9, Ni other than 1, Tf > 0)");
-    if (emitters_ == 0) set("diffuse_gi", false, "nothing emits light");
-    else by_material("diffuse_gi", [](const Material& m) { return is_bright(m.diffuse) || !m.diffuse_map.empty(); }, "diffuse surface (Kd > 0) in a lit scene");
+    if (emitters_ == 0)
+      set("diffuse_gi", false, "nothing emits light");
+    else
+      by_material(
+          "diffuse_gi", [](const Material& m) { return is_bright(m.diffuse) || !m.diffuse_map.empty(); },
+          "diffuse surface (Kd > 0) in a lit scene");
   }
 
   void camera_and_motion() {
-    const bool lens = scene_.camera && scene_.camera->aperture_radius > 0.0f && scene_.camera->focus_distance > 0.0f;
-    set("dof", lens, lens ? fmt::format("the camera's aperture has radius {:g}", scene_.camera->aperture_radius) : std::string("a pinhole camera"));
+    const bool lens =
+        scene_.camera && scene_.camera->aperture_radius > 0.0f && scene_.camera->focus_distance > 0.0f;
+    set("dof", lens,
+        lens ? fmt::format("the camera's aperture has radius {:g}", scene_.camera->aperture_radius)
+             : std::string("a pinhole camera"));
     const bool open = scene_.shutter.close > scene_.shutter.open;
     set("motion_blur", open && scene_.key_frames > 1,
         scene_.key_frames < 2 ? std::string("one key frame: nothing moves")
         : !open               ? fmt::format("{} key frames, but the shutter is never open", scene_.key_frames)
-                : fmt::format("{} key frames, shutter open from {:g} to {:g}", scene_.key_frames, scene_.shutter.open, scene_.shutter.close));
-    set("instancing", scene_.instances > 1, fmt::format("{} instance{} in the scene file", scene_.instances, scene_.instances == 1 ? "" : "s"));
+                : fmt::format("{} key frames, shutter open from {:g} to {:g}", scene_.key_frames,
+                              scene_.shutter.open, scene_.shutter.close));
+    set("instancing", scene_.instances > 1,
+        fmt::format("{} instance{} in the scene file", scene_.instances, scene_.instances == 1 ? "" : "s"));
   }
 
   void maps() {
@@ -131,6 +151,8 @@ class Effects {
 
 }  // namespace
 
-std::vector<Effect> effects_of(const Scene& scene) { return Effects(scene).all(); }
+std::vector<Effect> effects_of(const Scene& scene) {
+  return Effects(scene).all();
+}
 
 }  // namespace arboretum

@@ -25,7 +25,8 @@ namespace arboretum {
 Vec3f mean_radiance(const std::filesystem::path& image) {
   check_readable_file(image);
   int width = 0, height = 0, channels = 0;
-  const std::unique_ptr<float, void (*)(void*)> pixels(stbi_loadf(image.c_str(), &width, &height, &channels, 3), stbi_image_free);
+  const std::unique_ptr<float, void (*)(void*)> pixels(
+      stbi_loadf(image.c_str(), &width, &height, &channels, 3), stbi_image_free);
   if (!pixels) throw UserError(image.string() + ": no image that can be read: " + stbi_failure_reason());
   Vec3d sum;
   double weights = 0.0;
@@ -44,7 +45,8 @@ Vec3f mean_radiance(const std::filesystem::path& image) {
 
 std::optional<ValueRange> value_range(const std::filesystem::path& image) {
   int width = 0, height = 0, channels = 0;
-  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(stbi_load(image.c_str(), &width, &height, &channels, 0), stbi_image_free);
+  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+      stbi_load(image.c_str(), &width, &height, &channels, 0), stbi_image_free);
   if (!pixels) return std::nullopt;
   ValueRange range;
   const std::size_t count = std::size_t(width) * std::size_t(height), stride = std::size_t(channels);

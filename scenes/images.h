@@ -1,4 +1,5 @@
-// Images that scenes refer to, as far as they are looked at: mean radiance, and whether they hold anything but one value.
+// Images that scenes refer to, as far as they are looked at: mean radiance, and whether they hold anything
+// but one value.
 #pragma once
 
 #include <filesystem>

@@ -10,16 +10,18 @@ namespace arboretum {
 
 struct SceneInfo {
   std::size_t triangles = 0, vertices = 0;
-  Bounds3f bounds;                 ///< of all triangles
-  LoadReport report;               ///< what loading dropped, zero-area triangles among it
-  std::size_t duplicates = 0;      ///< triangles with the same three corner positions as an earlier one, in any order
-  std::size_t slivers = 0;         ///< longest edge^2 / (2 area) > 100
-  // Edges join vertices by exact position, so a mesh whose triangles share no vertices may be closed all the same.
+  Bounds3f bounds;    ///< of all triangles
+  LoadReport report;  ///< what loading dropped, zero-area triangles among it
+  std::size_t duplicates =
+      0;  ///< triangles with the same three corner positions as an earlier one, in any order
+  std::size_t slivers = 0;  ///< longest edge^2 / (2 area) > 100
+  // Edges join vertices by exact position, so a mesh whose triangles share no vertices may be closed all the
+  // same.
   std::size_t edges = 0;
   std::size_t boundary_edges = 0;      ///< of one triangle
   std::size_t non_manifold_edges = 0;  ///< of more than two
   bool closed = false;                 ///< neither of these
-  std::size_t materials = 0;       ///< used by a triangle
+  std::size_t materials = 0;           ///< used by a triangle
   std::size_t emissive_triangles = 0;
   std::size_t lights = 0;
   std::vector<Effect> effects;

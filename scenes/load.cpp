@@ -19,7 +19,8 @@ namespace {
 
 std::string lower_extension(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return char(std::tolower(c)); });
   return extension;
 }
 
@@ -38,7 +39,9 @@ std::uint64_t parse_whole_number(std::string_view text, std::string_view what, c
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size())
-    throw UserError(fmt::format("scene '{}': {} '{}' is no whole number; write GENERATOR:TRIANGLES or GENERATOR:TRIANGLES:SEED", word, what, text));
+    throw UserError(fmt::format(
+        "scene '{}': {} '{}' is no whole number; write GENERATOR:TRIANGLES or GENERATOR:TRIANGLES:SEED", word,
+        what, text));
   return value;
 }
 
@@ -56,12 +59,15 @@ std::string SceneSpec::name() const {
   if (!catalogue.empty()) return catalogue;
   if (!file.empty()) return file.stem().string();
   if (!scene.empty()) return scene.stem().string();
-  return fmt::format("{}-{}{}", generator, triangles, seed == 1 ? std::string() : fmt::format("-seed{}", seed));
+  return fmt::format("{}-{}{}", generator, triangles,
+                     seed == 1 ? std::string() : fmt::format("-seed{}", seed));
 }
 
 Scene load_scene(const SceneSpec& spec) {
-  const int forms = !spec.catalogue.empty() + !spec.file.empty() + !spec.scene.empty() + !spec.generator.empty();
-  if (forms != 1) throw UserError("a scene is named by exactly one of: a catalogue name, file, scene, generate");
+  const int forms =
+      !spec.catalogue.empty() + !spec.file.empty() + !spec.scene.empty() + !spec.generator.empty();
+  if (forms != 1)
+    throw UserError("a scene is named by exactly one of: a catalogue name, file, scene, generate");
   if (!spec.generator.empty()) {
     Scene scene = generate_scene(spec.generator, spec.triangles, spec.seed);
     scene.name = spec.name();
@@ -75,8 +81,11 @@ Scene load_scene(const SceneSpec& spec) {
     return scene;
   }
   const std::filesystem::path& path = spec.file.empty() ? spec.scene : spec.file;
-  if (!spec.file.empty() && is_yaml(path)) throw UserError(path.string() + ": is a scene file; name it with 'scene:' instead of 'file:'");
-  if (!spec.scene.empty() && !is_yaml(path)) throw UserError(path.string() + ": is no scene file (.yaml); name a model with 'file:' instead of 'scene:'");
+  if (!spec.file.empty() && is_yaml(path))
+    throw UserError(path.string() + ": is a scene file; name it with 'scene:' instead of 'file:'");
+  if (!spec.scene.empty() && !is_yaml(path))
+    throw UserError(path.string() +
+                    ": is no scene file (.yaml); name a model with 'file:' instead of 'scene:'");
   Scene scene = spec.file.empty() ? read_scene_yaml(path) : read_model(path);
   sanitise(scene, path.string());
   scene.name = spec.name();
@@ -92,7 +101,8 @@ SceneSpec parse_scene_word(const std::string& word) {
   const std::string head = word.substr(0, colon);
   const std::vector<std::string> names = generator_names();
   const bool generated = std::find(names.begin(), names.end(), head) != names.end();
-  if (!generated && (word.find('/') != std::string::npos || std::filesystem::exists(path, error) || !path.extension().empty())) {
+  if (!generated && (word.find('/') != std::string::npos || std::filesystem::exists(path, error) ||
+                     !path.extension().empty())) {
     (is_yaml(path) ? spec.scene : spec.file) = path;
     return spec;
   }
@@ -100,8 +110,10 @@ SceneSpec parse_scene_word(const std::string& word) {
     spec.generator = head;
     if (colon == std::string::npos) return spec;
     const std::size_t second = word.find(':', colon + 1);
-    spec.triangles = parse_whole_number(std::string_view(word).substr(colon + 1, second - colon - 1), "the number of triangles", word);
-    if (second != std::string::npos) spec.seed = parse_whole_number(std::string_view(word).substr(second + 1), "the seed", word);
+    spec.triangles = parse_whole_number(std::string_view(word).substr(colon + 1, second - colon - 1),
+                                        "the number of triangles", word);
+    if (second != std::string::npos)
+      spec.seed = parse_whole_number(std::string_view(word).substr(second + 1), "the seed", word);
     return spec;
   }
   if (colon != std::string::npos) throw UserError(unknown_name_message("generator", head, names));

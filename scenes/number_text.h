@@ -14,8 +14,8 @@ namespace arboretum {
   return p;
 }
 
-/// Reads a float at `p`; returns the end of it, or nullptr where there is none. What is too large becomes an infinity,
-/// what is too small zero or a subnormal.
+/// Reads a float at `p`; returns the end of it, or nullptr where there is none. What is too large becomes an
+/// infinity, what is too small zero or a subnormal.
 [[nodiscard]] inline const char* parse_float(const char* p, const char* end, float& value) {
   if (p != end && *p == '+') ++p;
   const auto [next, error] = std::from_chars(p, end, value);

@@ -9,8 +9,10 @@
 
 namespace arboretum {
 
-/// Appends the n - 2 triangles of a polygon of n >= 3 corners (indices into `vertices`) to `triangles`. A polygon that
-/// is not simple, has no area, or is concave with more than 1024 corners, still gives n - 2 triangles over its corners.
-void triangulate(std::span<const std::uint32_t> corners, std::span<const Vec3f> vertices, std::vector<Triangle>& triangles);
+/// Appends the n - 2 triangles of a polygon of n >= 3 corners (indices into `vertices`) to `triangles`. A
+/// polygon that is not simple, has no area, or is concave with more than 1024 corners, still gives n - 2
+/// triangles over its corners.
+void triangulate(std::span<const std::uint32_t> corners, std::span<const Vec3f> vertices,
+                 std::vector<Triangle>& triangles);
 
 }  // namespace arboretum

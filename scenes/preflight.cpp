@@ -30,8 +30,9 @@ void check_off(std::string_view text, const std::string& name) {
   }
   // A vertex takes six characters at least ("0 0 0\n"), a face four.
   if (found < 2 || counts[0] > text.size() / 6 + 1 || counts[1] > text.size() / 4 + 1) {
-    throw UserError(fmt::format("{}: broken or truncated: the header promises {} vertices and {} faces, more than the file can hold", name,
-                                counts[0], counts[1]));
+    throw UserError(fmt::format(
+        "{}: broken or truncated: the header promises {} vertices and {} faces, more than the file can hold",
+        name, counts[0], counts[1]));
   }
 }
 
@@ -45,7 +46,8 @@ void check_glb(std::string_view bytes, const std::string& name) {
   if (bytes.size() < 20 || bytes.substr(0, 4) != "glTF" || word(8) > bytes.size())
     throw UserError(name + ": broken or truncated: no whole GLB header, or fewer bytes than it promises");
   for (std::size_t at = 12; at + 8 <= bytes.size(); at += 8 + word(at)) {
-    if (word(at) > bytes.size() - at - 8) throw UserError(name + ": broken or truncated: a chunk of the GLB is longer than the file");
+    if (word(at) > bytes.size() - at - 8)
+      throw UserError(name + ": broken or truncated: a chunk of the GLB is longer than the file");
   }
 }
 
@@ -54,8 +56,10 @@ void check_glb(std::string_view bytes, const std::string& name) {
 void check_header(const std::filesystem::path& path, std::string_view extension) {
   if (extension != ".off" && extension != ".glb") return;
   const FileBytes bytes(path);
-  if (extension == ".off") check_off(bytes.text(), path.string());
-  else check_glb(bytes.text(), path.string());
+  if (extension == ".off")
+    check_off(bytes.text(), path.string());
+  else
+    check_glb(bytes.text(), path.string());
 }
 
 }  // namespace arboretum

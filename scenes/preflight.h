@@ -1,5 +1,5 @@
-// Preflight: refuses files whose headers promise more than they hold, for formats where assimp would ask for the memory
-// first: a few damaged bytes could otherwise take all of a machine's.
+// Preflight: refuses files whose headers promise more than they hold, for formats where assimp would ask for
+// the memory first: a few damaged bytes could otherwise take all of a machine's.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// STL, glTF, OFF and the rest through assimp, with no post-processing of its: vertices are not merged, polygons are split
-// by our own code, and the node transforms are applied here.
+// STL, glTF, OFF and the rest through assimp, with no post-processing of its: vertices are not merged,
+// polygons are split by our own code, and the node transforms are applied here.
 #include <assimp/DefaultLogger.hpp>
 #include <assimp/GltfMaterial.h>
 #include <assimp/Importer.hpp>
@@ -36,7 +36,8 @@ class LogCapture {
  public:
   explicit LogCapture(std::vector<std::string>& lines) : lock_(mutex()) {
     Assimp::DefaultLogger::create("", Assimp::Logger::NORMAL, 0);
-    Assimp::DefaultLogger::get()->attachStream(new Listener(lines), Assimp::Logger::Warn | Assimp::Logger::Err);
+    Assimp::DefaultLogger::get()->attachStream(new Listener(lines),
+                                               Assimp::Logger::Warn | Assimp::Logger::Err);
   }
   LogCapture(const LogCapture&) = delete;
   LogCapture& operator=(const LogCapture&) = delete;
@@ -50,7 +51,9 @@ class LogCapture {
   std::scoped_lock<std::mutex> lock_;
 };
 
-Vec3f color(const aiColor4D& c) { return {c.r, c.g, c.b}; }
+Vec3f color(const aiColor4D& c) {
+  return {c.r, c.g, c.b};
+}
 
 Material convert(const aiMaterial& in) {
   Material out;
@@ -62,8 +65,10 @@ Material convert(const aiMaterial& in) {
   in.Get(AI_MATKEY_SHININESS, out.shininess);
   in.Get(AI_MATKEY_OPACITY, out.opacity);
   in.Get(AI_MATKEY_REFRACTI, out.ior);
-  if (aiString map; in.GetTexture(aiTextureType_DIFFUSE, 0, &map) == AI_SUCCESS) out.diffuse_map = map.C_Str();
-  if (aiString map; in.GetTexture(aiTextureType_OPACITY, 0, &map) == AI_SUCCESS) out.opacity_map = map.C_Str();
+  if (aiString map; in.GetTexture(aiTextureType_DIFFUSE, 0, &map) == AI_SUCCESS)
+    out.diffuse_map = map.C_Str();
+  if (aiString map; in.GetTexture(aiTextureType_OPACITY, 0, &map) == AI_SUCCESS)
+    out.opacity_map = map.C_Str();
 
   // The metallic-roughness model of glTF.
   float metallic = 0.0f, transmission = 0.0f;
@@ -100,8 +105,8 @@ class AssimpReader {
   void add_node(const aiNode& node, const aiMatrix4x4t<double>& parent) {
     const aiMatrix4x4& m = node.mTransformation;
     const aiMatrix4x4t<double> to_world =
-        parent * aiMatrix4x4t<double>(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2,
-                                      m.d3, m.d4);
+        parent * aiMatrix4x4t<double>(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4,
+                                      m.d1, m.d2, m.d3, m.d4);
     for (unsigned i = 0; i < node.mNumMeshes; ++i) add_mesh(*in_.mMeshes[node.mMeshes[i]], to_world);
     for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(*node.mChildren[i], to_world);
   }
@@ -122,7 +127,8 @@ class AssimpReader {
       corners_.clear();
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
         if (face.mIndices[k] >= mesh.mNumVertices) {
-          throw UserError(fmt::format("{}: face {} names vertex {}, but its mesh has {}", name_, f, face.mIndices[k], mesh.mNumVertices));
+          throw UserError(fmt::format("{}: face {} names vertex {}, but its mesh has {}", name_, f,
+                                      face.mIndices[k], mesh.mNumVertices));
         }
         corners_.push_back(std::uint32_t(first + face.mIndices[k]));
       }
@@ -133,7 +139,8 @@ class AssimpReader {
       scene_.report.polygons_split += corners_.size() > 3;
       triangulate(corners_, out.vertices, out.triangles);
     }
-    if (mesh.mMaterialIndex < scene_.materials.size()) out.materials.resize(out.triangles.size(), std::uint16_t(mesh.mMaterialIndex));
+    if (mesh.mMaterialIndex < scene_.materials.size())
+      out.materials.resize(out.triangles.size(), std::uint16_t(mesh.mMaterialIndex));
   }
 
   std::string name_;
@@ -149,9 +156,11 @@ Scene read_assimp(const std::filesystem::path& path) {
   check_readable_file(path);
   std::vector<std::string> said;
   Assimp::Importer importer;
-  if (const std::string extension = path.extension().string(); extension.empty() || !importer.IsExtensionSupported(extension)) {
-    throw UserError(fmt::format("{}: unknown kind of file '{}'; OBJ, PLY, STL, glTF, GLB, OFF and others of assimp are read",
-                                path.string(), extension));
+  if (const std::string extension = path.extension().string();
+      extension.empty() || !importer.IsExtensionSupported(extension)) {
+    throw UserError(fmt::format(
+        "{}: unknown kind of file '{}'; OBJ, PLY, STL, glTF, GLB, OFF and others of assimp are read",
+        path.string(), extension));
   }
   const aiScene* in = nullptr;
   try {
@@ -160,11 +169,13 @@ Scene read_assimp(const std::filesystem::path& path) {
   } catch (const std::exception& error) {
     throw UserError(path.string() + ": broken or truncated: " + one_line(error.what()));
   }
-  if (!in || !in->mRootNode) throw UserError(path.string() + ": broken or truncated: " + one_line(importer.GetErrorString()));
+  if (!in || !in->mRootNode)
+    throw UserError(path.string() + ": broken or truncated: " + one_line(importer.GetErrorString()));
   for (const std::string& line : said) {
     if (line.find("out of range") != std::string::npos) throw UserError(path.string() + ": " + line);
   }
-  if (in->mFlags & AI_SCENE_FLAGS_INCOMPLETE && in->mNumMeshes == 0) throw UserError(path.string() + ": no triangle in it");
+  if (in->mFlags & AI_SCENE_FLAGS_INCOMPLETE && in->mNumMeshes == 0)
+    throw UserError(path.string() + ": no triangle in it");
   Scene scene = AssimpReader(path, *in).read();
   for (const std::string& line : said) scene.report.warnings.push_back(path.string() + ": " + line);
   return scene;

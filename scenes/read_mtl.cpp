@@ -11,7 +11,9 @@
 namespace arboretum {
 namespace {
 
-Vec3f color(const tinyobj::real_t (&c)[3]) { return {float(c[0]), float(c[1]), float(c[2])}; }
+Vec3f color(const tinyobj::real_t (&c)[3]) {
+  return {float(c[0]), float(c[1]), float(c[2])};
+}
 
 }  // namespace
 
@@ -37,10 +39,12 @@ std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<st
                       .ior = float(m.ior),
                       .opacity = float(m.dissolve),
                       .illum = m.illum};
-    // tinyobjloader cannot tell an absent Tf from one of zeros; the format's default is a filter that lets all through.
+    // tinyobjloader cannot tell an absent Tf from one of zeros; the format's default is a filter that lets
+    // all through.
     if (material.transmission == Vec3f{0, 0, 0}) material.transmission = {1, 1, 1};
     for (Vec3f* c : {&material.diffuse, &material.specular, &material.emission, &material.transmission}) {
-      if (!is_finite(*c)) throw UserError(path.string() + ": material '" + m.name + "' has a colour that is no finite number");
+      if (!is_finite(*c))
+        throw UserError(path.string() + ": material '" + m.name + "' has a colour that is no finite number");
     }
     if (!m.diffuse_texname.empty()) material.diffuse_map = (path.parent_path() / m.diffuse_texname).string();
     if (!m.alpha_texname.empty()) material.opacity_map = (path.parent_path() / m.alpha_texname).string();

@@ -1,6 +1,7 @@
-// OBJ through tinyobjloader's callback interface: no intermediate copy, and the text of the line at hand stays in reach.
-// tinyobjloader reads `nan` and `inf` as 0, rounds some decimals wrongly and wraps indices beyond 32 bits; so
-// coordinates are read again here from the line itself, and faces with over-long numbers are refused.
+// OBJ through tinyobjloader's callback interface: no intermediate copy, and the text of the line at hand
+// stays in reach. tinyobjloader reads `nan` and `inf` as 0, rounds some decimals wrongly and wraps indices
+// beyond 32 bits; so coordinates are read again here from the line itself, and faces with over-long numbers
+// are refused.
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
@@ -20,7 +21,8 @@
 namespace arboretum {
 namespace {
 
-/// A stream buffer over mapped bytes. At a callback the get pointer stands just behind the line that caused it.
+/// A stream buffer over mapped bytes. At a callback the get pointer stands just behind the line that caused
+/// it.
 class MappedBuffer : public std::streambuf {
  public:
   explicit MappedBuffer(std::string_view text) {
@@ -65,7 +67,9 @@ struct ObjReader {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       p = skip_blanks(p, end);
       const char* next = parse_float(p, end, v[axis]);
-      if (!next) fail(fmt::format("vertex {} has no number for {}; write 'v x y z'", scene.mesh.vertices.size() + 1, "xyz"[axis]));
+      if (!next)
+        fail(fmt::format("vertex {} has no number for {}; write 'v x y z'", scene.mesh.vertices.size() + 1,
+                         "xyz"[axis]));
       p = next;
     }
     if (scene.mesh.vertices.size() >= 0xfffffffeu) fail("more than 2^32 - 2 vertices");
@@ -88,8 +92,9 @@ struct ObjReader {
       const std::int64_t index = indices[i].vertex_index;
       const std::int64_t vertex = index > 0 ? index - 1 : vertices + index;
       if (index == 0 || vertex < 0 || vertex >= vertices) {
-        fail(fmt::format("face index {} is out of range: {} vertices precede it, so valid are 1 to {} and -1 to -{}", index,
-                         vertices, vertices, vertices));
+        fail(fmt::format(
+            "face index {} is out of range: {} vertices precede it, so valid are 1 to {} and -1 to -{}",
+            index, vertices, vertices, vertices));
       }
       corners.push_back(std::uint32_t(vertex));
     }
@@ -118,8 +123,9 @@ struct ObjReader {
       return;
     }
     if (material_library_seen) {
-      scene.report.warnings.push_back(fmt::format("{}:{}: no material '{}' in the material library; grey stands in",
-                                                  path.string(), buffer.line_number(), one_line(name)));
+      scene.report.warnings.push_back(
+          fmt::format("{}:{}: no material '{}' in the material library; grey stands in", path.string(),
+                      buffer.line_number(), one_line(name)));
     }
     use_default_material();
   }
@@ -128,8 +134,9 @@ struct ObjReader {
     material_library_seen = true;
     const std::filesystem::path file = path.parent_path() / name;
     if (std::error_code error; !std::filesystem::exists(file, error)) {
-      scene.report.warnings.push_back(fmt::format("{}:{}: no material library '{}'; grey stands in for its materials",
-                                                  path.string(), buffer.line_number(), one_line(file.string())));
+      scene.report.warnings.push_back(
+          fmt::format("{}:{}: no material library '{}'; grey stands in for its materials", path.string(),
+                      buffer.line_number(), one_line(file.string())));
       material_library_seen = false;
       return;
     }
@@ -145,7 +152,8 @@ struct ObjReader {
   static constexpr std::size_t kMaxMaterials = 65534;  // one is left for the default
 };
 
-/// The word behind the keyword, trailing blanks left out: tinyobjloader's own callback for it needs its material table.
+/// The word behind the keyword, trailing blanks left out: tinyobjloader's own callback for it needs its
+/// material table.
 std::string argument(std::string_view line, std::size_t keyword) {
   line.remove_prefix(std::min(line.size(), line.find_first_not_of(" \t") + keyword));
   const std::size_t first = line.find_first_not_of(" \t");
@@ -153,12 +161,13 @@ std::string argument(std::string_view line, std::size_t keyword) {
   return std::string(line.substr(first, line.find_last_not_of(" \t") - first + 1));
 }
 
-/// Stands in for tinyobjloader's own lookup of `mtllib`, whose failures are no more than a line in a warning string.
+/// Stands in for tinyobjloader's own lookup of `mtllib`, whose failures are no more than a line in a warning
+/// string.
 class LibraryReader : public tinyobj::MaterialReader {
  public:
   explicit LibraryReader(ObjReader& reader) : reader_(reader) {}
-  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*, std::map<std::string, int>*, std::string*,
-                  std::string*) override {
+  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*, std::map<std::string, int>*,
+                  std::string*, std::string*) override {
     reader_.add_library(name);
     return true;
   }
@@ -193,7 +202,8 @@ Scene read_obj(const std::filesystem::path& path) {
         fmt::format("{}: {} faces of fewer than three corners left out", path.string(), reader.short_faces));
   }
   if (scene.mesh.triangles.empty()) {
-    throw UserError(fmt::format("{}: no face in it ({} vertices); is it an OBJ file?", path.string(), scene.mesh.vertices.size()));
+    throw UserError(fmt::format("{}: no face in it ({} vertices); is it an OBJ file?", path.string(),
+                                scene.mesh.vertices.size()));
   }
   return std::move(reader.scene);
 }

@@ -1,6 +1,7 @@
-// PLY, ASCII and binary of either byte order, read straight from the mapped file: millions of triangles a second, where
-// assimp takes minutes and gigabytes. Elements and properties may come in any order; what is not a position, a list of
-// vertex indices or a `material_id` is skipped. Format: Turk, "The PLY Polygon File Format", 1994.
+// PLY, ASCII and binary of either byte order, read straight from the mapped file: millions of triangles a
+// second, where assimp takes minutes and gigabytes. Elements and properties may come in any order; what is
+// not a position, a list of vertex indices or a `material_id` is skipped. Format: Turk, "The PLY Polygon File
+// Format", 1994.
 #include <algorithm>
 #include <bit>
 #include <charconv>
@@ -78,13 +79,17 @@ std::vector<std::string_view> words(std::string_view line) {
 
 Type parse_type(std::string_view word, std::size_t line, const Failure& fail) {
   constexpr std::pair<std::string_view, Type> kTypes[] = {
-      {"char", Type::int8},     {"int8", Type::int8},     {"uchar", Type::uint8},   {"uint8", Type::uint8},
-      {"short", Type::int16},   {"int16", Type::int16},   {"ushort", Type::uint16}, {"uint16", Type::uint16},
-      {"int", Type::int32},     {"int32", Type::int32},   {"uint", Type::uint32},   {"uint32", Type::uint32},
-      {"float", Type::float32}, {"float32", Type::float32}, {"double", Type::float64}, {"float64", Type::float64}};
+      {"char", Type::int8},      {"int8", Type::int8},       {"uchar", Type::uint8},
+      {"uint8", Type::uint8},    {"short", Type::int16},     {"int16", Type::int16},
+      {"ushort", Type::uint16},  {"uint16", Type::uint16},   {"int", Type::int32},
+      {"int32", Type::int32},    {"uint", Type::uint32},     {"uint32", Type::uint32},
+      {"float", Type::float32},  {"float32", Type::float32}, {"double", Type::float64},
+      {"float64", Type::float64}};
   for (const auto& [name, type] : kTypes)
     if (name == word) return type;
-  fail.line(line, fmt::format("unknown property type '{}'; PLY has char uchar short ushort int uint float double", one_line(word)));
+  fail.line(line,
+            fmt::format("unknown property type '{}'; PLY has char uchar short ushort int uint float double",
+                        one_line(word)));
 }
 
 Header parse_header(std::string_view text, const Failure& fail) {
@@ -94,17 +99,24 @@ Header parse_header(std::string_view text, const Failure& fail) {
   for (std::size_t number = 1;; ++number) {
     const std::size_t end = text.find('\n', position);
     if (number == 1 && text.substr(0, 3) != "ply") fail("not a PLY file: it does not begin with 'ply'");
-    if (end == std::string_view::npos) fail("the PLY header has no 'end_header' line; the file is truncated or broken");
+    if (end == std::string_view::npos)
+      fail("the PLY header has no 'end_header' line; the file is truncated or broken");
     const auto word = words(text.substr(position, end - position));
     position = end + 1;
     if (word.empty() || word[0] == "ply" || word[0] == "comment" || word[0] == "obj_info") continue;
     if (word[0] == "end_header") break;
     if (word[0] == "format" && word.size() >= 2) {
       has_format = true;
-      if (word[1] == "ascii") header.format = Format::ascii;
-      else if (word[1] == "binary_little_endian") header.format = Format::little_endian;
-      else if (word[1] == "binary_big_endian") header.format = Format::big_endian;
-      else fail.line(number, fmt::format("unknown format '{}'; PLY has ascii, binary_little_endian, binary_big_endian", one_line(word[1])));
+      if (word[1] == "ascii")
+        header.format = Format::ascii;
+      else if (word[1] == "binary_little_endian")
+        header.format = Format::little_endian;
+      else if (word[1] == "binary_big_endian")
+        header.format = Format::big_endian;
+      else
+        fail.line(number,
+                  fmt::format("unknown format '{}'; PLY has ascii, binary_little_endian, binary_big_endian",
+                              one_line(word[1])));
     } else if (word[0] == "element" && word.size() == 3) {
       Element element{.name = std::string(word[1]), .count = 0, .properties = {}};
       const auto [p, error] = std::from_chars(word[2].data(), word[2].data() + word[2].size(), element.count);
@@ -117,7 +129,8 @@ Header parse_header(std::string_view text, const Failure& fail) {
         if (word.size() != 5) fail.line(number, "a list property is 'property list COUNT_TYPE TYPE NAME'");
         property.is_list = true;
         property.count_type = parse_type(word[2], number, fail);
-        if (property.count_type >= Type::float32) fail.line(number, "a list's count cannot be a floating-point number");
+        if (property.count_type >= Type::float32)
+          fail.line(number, "a list's count cannot be a floating-point number");
         property.type = parse_type(word[3], number, fail);
       } else {
         property.type = parse_type(word[1], number, fail);
@@ -141,7 +154,9 @@ class Cursor {
 
   [[nodiscard]] std::size_t left() const noexcept { return std::size_t(end_ - p_); }
   [[nodiscard]] bool is_ascii() const noexcept { return format_ == Format::ascii; }
-  void set_place(const Element& element, std::uint64_t index) noexcept { element_ = &element, index_ = index; }
+  void set_place(const Element& element, std::uint64_t index) noexcept {
+    element_ = &element, index_ = index;
+  }
 
   [[noreturn]] void fail(std::string_view what) const {
     fail_(fmt::format("{} {} of {}: {}", element_->name, index_, element_->count, what));
@@ -154,9 +169,12 @@ class Cursor {
       return value;
     }
     switch (type) {
-      case Type::float32: return take<float>();
-      case Type::float64: return float(take<double>());
-      default: return float(read_integer(type));
+      case Type::float32:
+        return take<float>();
+      case Type::float64:
+        return float(take<double>());
+      default:
+        return float(read_integer(type));
     }
   }
 
@@ -169,20 +187,28 @@ class Cursor {
       return value;
     }
     switch (type) {
-      case Type::int8: return take<std::int8_t>();
-      case Type::uint8: return take<std::uint8_t>();
-      case Type::int16: return take<std::int16_t>();
-      case Type::uint16: return take<std::uint16_t>();
-      case Type::int32: return take<std::int32_t>();
-      case Type::uint32: return take<std::uint32_t>();
-      default: fail("an index or a count is stored as a floating-point number");
+      case Type::int8:
+        return take<std::int8_t>();
+      case Type::uint8:
+        return take<std::uint8_t>();
+      case Type::int16:
+        return take<std::int16_t>();
+      case Type::uint16:
+        return take<std::uint16_t>();
+      case Type::int32:
+        return take<std::int32_t>();
+      case Type::uint32:
+        return take<std::uint32_t>();
+      default:
+        fail("an index or a count is stored as a floating-point number");
     }
   }
 
   std::uint64_t read_count(const Property& list) {
     const std::int64_t count = read_integer(list.count_type);
     if (count < 0) fail("a list has a negative length");
-    if (std::uint64_t(count) > left() / (is_ascii() ? 1 : size_of(list.type)) + 1) fail("truncated: the file ends inside a list");
+    if (std::uint64_t(count) > left() / (is_ascii() ? 1 : size_of(list.type)) + 1)
+      fail("truncated: the file ends inside a list");
     return std::uint64_t(count);
   }
 
@@ -221,7 +247,8 @@ class Cursor {
   T take() {
     char raw[sizeof(T)];
     std::memcpy(raw, take_bytes(sizeof(T)), sizeof(T));
-    if ((format_ == Format::big_endian) != (std::endian::native == std::endian::big)) std::reverse(raw, raw + sizeof(T));
+    if ((format_ == Format::big_endian) != (std::endian::native == std::endian::big))
+      std::reverse(raw, raw + sizeof(T));
     T value;
     std::memcpy(&value, raw, sizeof(T));
     return value;
@@ -237,25 +264,32 @@ class Cursor {
 void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh, const Failure& fail) {
   const int axes[] = {element.find({"x"}), element.find({"y"}), element.find({"z"})};
   for (const int axis : axes)
-    if (axis < 0 || element.properties[std::size_t(axis)].is_list) fail("the vertices have no properties x, y and z");
+    if (axis < 0 || element.properties[std::size_t(axis)].is_list)
+      fail("the vertices have no properties x, y and z");
   mesh.vertices.reserve(element.count);
   for (std::uint64_t i = 0; i < element.count; ++i) {
     cursor.set_place(element, i);
     Vec3f v;
     for (int k = 0; k < int(element.properties.size()); ++k) {
       const Property& property = element.properties[std::size_t(k)];
-      if (k == axes[0]) v.x = cursor.read_float(property.type);
-      else if (k == axes[1]) v.y = cursor.read_float(property.type);
-      else if (k == axes[2]) v.z = cursor.read_float(property.type);
-      else cursor.skip(property);
+      if (k == axes[0])
+        v.x = cursor.read_float(property.type);
+      else if (k == axes[1])
+        v.y = cursor.read_float(property.type);
+      else if (k == axes[2])
+        v.z = cursor.read_float(property.type);
+      else
+        cursor.skip(property);
     }
     mesh.vertices.push_back(v);
   }
 }
 
-void read_faces(const Element& element, std::uint64_t vertices, Cursor& cursor, Scene& scene, const Failure& fail) {
+void read_faces(const Element& element, std::uint64_t vertices, Cursor& cursor, Scene& scene,
+                const Failure& fail) {
   const int list = element.find({"vertex_indices", "vertex_index"});
-  if (list < 0 || !element.properties[std::size_t(list)].is_list) fail("the faces have no list 'vertex_indices'");
+  if (list < 0 || !element.properties[std::size_t(list)].is_list)
+    fail("the faces have no list 'vertex_indices'");
   const int material = element.find({"material_id"});
   TriangleMesh& mesh = scene.mesh;
   mesh.triangles.reserve(element.count);
@@ -272,7 +306,8 @@ void read_faces(const Element& element, std::uint64_t vertices, Cursor& cursor, 
         for (std::uint64_t n = cursor.read_count(property); n > 0; --n) {
           const std::int64_t vertex = cursor.read_integer(property.type);
           if (vertex < 0 || std::uint64_t(vertex) >= vertices)
-            cursor.fail(fmt::format("vertex index {} is out of range: there are {} vertices", vertex, vertices));
+            cursor.fail(
+                fmt::format("vertex index {} is out of range: there are {} vertices", vertex, vertices));
           corners.push_back(std::uint32_t(vertex));
         }
       } else if (k == material) {
@@ -290,21 +325,26 @@ void read_faces(const Element& element, std::uint64_t vertices, Cursor& cursor, 
     triangulate(corners, mesh.vertices, mesh.triangles);
     if (material >= 0) mesh.materials.resize(mesh.triangles.size(), std::uint16_t(id));
   }
-  if (short_faces > 0) scene.report.warnings.push_back(fmt::format("{} faces of fewer than three corners left out", short_faces));
+  if (short_faces > 0)
+    scene.report.warnings.push_back(
+        fmt::format("{} faces of fewer than three corners left out", short_faces));
 }
 
 void read_materials(const std::filesystem::path& path, Scene& scene, const Failure& fail) {
   if (scene.mesh.materials.empty()) return;
-  const std::size_t used = std::size_t(*std::max_element(scene.mesh.materials.begin(), scene.mesh.materials.end())) + 1;
+  const std::size_t used =
+      std::size_t(*std::max_element(scene.mesh.materials.begin(), scene.mesh.materials.end())) + 1;
   std::filesystem::path library = path;
   library.replace_extension(".mtl");
   if (std::error_code error; std::filesystem::exists(library, error)) {
     scene.materials = read_mtl(library, scene.report.warnings);
     if (scene.materials.size() < used)
-      fail(fmt::format("a face has material_id {}, but {} holds {} materials", used - 1, library.string(), scene.materials.size()));
+      fail(fmt::format("a face has material_id {}, but {} holds {} materials", used - 1, library.string(),
+                       scene.materials.size()));
     return;
   }
-  for (std::size_t i = 0; i < used; ++i) scene.materials.push_back(Material{.name = fmt::format("material{}", i)});
+  for (std::size_t i = 0; i < used; ++i)
+    scene.materials.push_back(Material{.name = fmt::format("material{}", i)});
 }
 
 }  // namespace
@@ -321,11 +361,12 @@ Scene read_ply(const std::filesystem::path& path) {
   if (vertices >= 0xffffffffu) fail("more than 2^32 - 2 vertices");
   bool has_vertices = false, has_faces = false;
   for (const Element& element : header.elements) {
-    // Every property takes a byte at least, so a count that the file cannot hold is known before memory is asked for.
+    // Every property takes a byte at least, so a count that the file cannot hold is known before memory is
+    // asked for.
     cursor.set_place(element, 0);
     if (!element.properties.empty() && element.count > cursor.left() / element.properties.size()) {
-      fail(fmt::format("truncated: the header promises {} of element '{}', more than the file can hold", element.count,
-                       one_line(element.name)));
+      fail(fmt::format("truncated: the header promises {} of element '{}', more than the file can hold",
+                       element.count, one_line(element.name)));
     }
     if (element.name == "vertex" && !has_vertices) {
       read_vertices(element, cursor, scene.mesh, fail);
@@ -343,7 +384,8 @@ Scene read_ply(const std::filesystem::path& path) {
       }
     }
   }
-  if (scene.mesh.triangles.empty()) fail(has_faces ? "no face in it" : "no element 'face' in it; a point cloud cannot be traced");
+  if (scene.mesh.triangles.empty())
+    fail(has_faces ? "no face in it" : "no element 'face' in it; a point cloud cannot be traced");
   if (scene.mesh.triangles.size() >= 0xffffffffu) fail("more than 2^32 - 2 triangles");
   read_materials(path, scene, fail);
   return scene;

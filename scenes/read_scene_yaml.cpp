@@ -17,8 +17,10 @@ namespace {
 
 using Transform = Eigen::Affine3d;
 
-/// Appends `part`, moved by `transform`, to `scene`. Materials are appended once for each part (`first_material`).
-void append_mesh(TriangleMesh& mesh, const TriangleMesh& part, const Transform& transform, std::size_t first_material) {
+/// Appends `part`, moved by `transform`, to `scene`. Materials are appended once for each part
+/// (`first_material`).
+void append_mesh(TriangleMesh& mesh, const TriangleMesh& part, const Transform& transform,
+                 std::size_t first_material) {
   const auto first = std::uint32_t(mesh.vertices.size());
   if (mesh.vertices.size() + part.vertices.size() >= 0xffffffffu || mesh.size() + part.size() >= 0xffffffffu)
     throw UserError("more than 2^32 - 2 triangles or vertices once the instances are laid out");
@@ -34,7 +36,8 @@ void append_mesh(TriangleMesh& mesh, const TriangleMesh& part, const Transform& 
   }
   for (const Triangle& t : part.triangles) mesh.triangles.push_back({t.a + first, t.b + first, t.c + first});
   for (std::size_t i = 0; i < part.size(); ++i)
-    mesh.materials.push_back(std::uint16_t(first_material + (part.materials.empty() ? 0 : part.materials[i])));
+    mesh.materials.push_back(
+        std::uint16_t(first_material + (part.materials.empty() ? 0 : part.materials[i])));
 }
 
 class SceneFile {
@@ -69,21 +72,24 @@ class SceneFile {
 
   void read_shutter(const YAML::Node& node) {
     if (!node.IsSequence() || node.size() != 2) file_.fail(node, "shutter must be [open, close]");
-    scene_.shutter = {float(file_.number(node[0], "shutter open")), float(file_.number(node[1], "shutter close"))};
+    scene_.shutter = {float(file_.number(node[0], "shutter open")),
+                      float(file_.number(node[1], "shutter close"))};
     if (scene_.shutter.close < scene_.shutter.open) file_.fail(node, "the shutter closes before it opens");
   }
 
   void read_environment(const YAML::Node& node) {
     file_.check_keys(node, "environment", {"radiance", "image"});
-    if (bool(node["radiance"]) == bool(node["image"])) file_.fail(node, "environment needs either 'radiance' or 'image'");
+    if (bool(node["radiance"]) == bool(node["image"]))
+      file_.fail(node, "environment needs either 'radiance' or 'image'");
     if (node["radiance"]) {
       scene_.environment = file_.color(node["radiance"], "environment radiance");
       return;
     }
     const std::filesystem::path image = file_.beside(file_.text(node["image"], "environment image"));
     scene_.environment = mean_radiance(image);
-    scene_.report.warnings.push_back(fmt::format("{}: the environment image stands as its mean radiance ({:.4g}, {:.4g}, {:.4g})",
-                                                 image.string(), scene_.environment.x, scene_.environment.y, scene_.environment.z));
+    scene_.report.warnings.push_back(
+        fmt::format("{}: the environment image stands as its mean radiance ({:.4g}, {:.4g}, {:.4g})",
+                    image.string(), scene_.environment.x, scene_.environment.y, scene_.environment.z));
   }
 
   Light light(const YAML::Node& node) {
@@ -105,13 +111,16 @@ class SceneFile {
     if (light.type != Light::Type::directional)
       light.position = file_.vec3(file_.need(node, "position", "a " + type + " light"), "a light's position");
     if (light.type != Light::Type::point) {
-      light.direction = file_.vec3(file_.need(node, "direction", "a " + type + " light"), "a light's direction");
-      if (light.direction == Vec3f{0, 0, 0}) file_.fail(node["direction"], "a light's direction must not be zero");
+      light.direction =
+          file_.vec3(file_.need(node, "direction", "a " + type + " light"), "a light's direction");
+      if (light.direction == Vec3f{0, 0, 0})
+        file_.fail(node["direction"], "a light's direction must not be zero");
     }
     if (node["intensity"]) light.intensity = file_.color(node["intensity"], "a light's intensity");
     if (node["cone_degrees"]) {
       light.cone_degrees = float(file_.number(node["cone_degrees"], "cone_degrees"));
-      if (!(light.cone_degrees > 0.0f && light.cone_degrees <= 180.0f)) file_.fail(node["cone_degrees"], "cone_degrees must lie within (0, 180]");
+      if (!(light.cone_degrees > 0.0f && light.cone_degrees <= 180.0f))
+        file_.fail(node["cone_degrees"], "cone_degrees must lie within (0, 180]");
     }
     return light;
   }
@@ -125,32 +134,39 @@ class SceneFile {
         frames.push_back(file_.text(entry, "a mesh"));
       } else {
         file_.check_keys(entry, "a mesh", {"file", "keyframes", "name"});
-        if (bool(entry["file"]) == bool(entry["keyframes"])) file_.fail(entry, "a mesh is a path, {file: path} or {keyframes: [paths]}");
+        if (bool(entry["file"]) == bool(entry["keyframes"]))
+          file_.fail(entry, "a mesh is a path, {file: path} or {keyframes: [paths]}");
         if (entry["name"]) name = file_.text(entry["name"], "a mesh's name");
         if (entry["file"]) frames.push_back(file_.text(entry["file"], "a mesh's file"));
         if (entry["keyframes"]) {
           file_.check_list(entry["keyframes"], "keyframes");
-          for (const YAML::Node& frame : entry["keyframes"]) frames.push_back(file_.text(frame, "a key frame"));
+          for (const YAML::Node& frame : entry["keyframes"])
+            frames.push_back(file_.text(frame, "a key frame"));
         }
       }
       if (name.empty()) name = std::filesystem::path(frames.front()).stem().string();
-      Part part{.name = name, .model = read_model(file_.beside(frames.front())), .first_material = 0, .instanced = false};
+      Part part{.name = name,
+                .model = read_model(file_.beside(frames.front())),
+                .first_material = 0,
+                .instanced = false};
       check_key_frames(entry, frames, part.model);
       parts_.push_back(std::move(part));
     }
   }
 
-  /// The later frames must have the first one's triangles, corner by corner; their positions are not used yet.
+  /// The later frames must have the first one's triangles, corner by corner; their positions are not used
+  /// yet.
   void check_key_frames(const YAML::Node& node, const std::vector<std::string>& frames, const Scene& first) {
     if (frames.size() < 2) return;
     for (std::size_t i = 1; i < frames.size(); ++i) {
       const Scene frame = read_model(file_.beside(frames[i]));
-      if (frame.mesh.triangles != first.mesh.triangles || frame.mesh.vertices.size() != first.mesh.vertices.size())
+      if (frame.mesh.triangles != first.mesh.triangles ||
+          frame.mesh.vertices.size() != first.mesh.vertices.size())
         file_.fail(node, fmt::format("key frame '{}' has other triangles than '{}'", frames[i], frames[0]));
     }
     scene_.key_frames = std::max(scene_.key_frames, unsigned(frames.size()));
-    scene_.report.warnings.push_back(
-        fmt::format("{}: {} key frames; the first stands still for all", file_.path().string(), frames.size()));
+    scene_.report.warnings.push_back(fmt::format("{}: {} key frames; the first stands still for all",
+                                                 file_.path().string(), frames.size()));
   }
 
   /// Meshes that an instance names appear where their instances say, the others once where they are.
@@ -158,12 +174,14 @@ class SceneFile {
     for (Part& part : parts_) {
       part.first_material = scene_.materials.size();
       if (part.model.materials.empty()) part.model.materials.push_back(Material{.name = "default"});
-      scene_.materials.insert(scene_.materials.end(), part.model.materials.begin(), part.model.materials.end());
+      scene_.materials.insert(scene_.materials.end(), part.model.materials.begin(),
+                              part.model.materials.end());
       LoadReport& from = part.model.report;
       scene_.report.polygons_split += from.polygons_split;
       scene_.report.warnings.insert(scene_.report.warnings.end(), from.warnings.begin(), from.warnings.end());
     }
-    if (scene_.materials.size() > 65535) throw UserError(file_.path().string() + ": more than 65535 materials");
+    if (scene_.materials.size() > 65535)
+      throw UserError(file_.path().string() + ": more than 65535 materials");
     std::vector<std::pair<std::size_t, Transform>> placed;
     if (instances) {
       file_.check_list(instances, "instances");
@@ -183,7 +201,8 @@ class SceneFile {
     for (const auto& [part, t] : placed) triangles += parts_[part].model.mesh.size();
     scene_.mesh.triangles.reserve(triangles);
     scene_.mesh.materials.reserve(triangles);
-    for (const auto& [part, t] : placed) append_mesh(scene_.mesh, parts_[part].model.mesh, t, parts_[part].first_material);
+    for (const auto& [part, t] : placed)
+      append_mesh(scene_.mesh, parts_[part].model.mesh, t, parts_[part].first_material);
   }
 
   std::size_t find_part(const YAML::Node& node) {
@@ -195,7 +214,8 @@ class SceneFile {
     }
     if (unsigned index = 0; YAML::convert<unsigned>::decode(node, index)) {
       if (index < parts_.size()) return index;
-      file_.fail(node, fmt::format("mesh {} does not exist: there are {}, counted from 0", index, parts_.size()));
+      file_.fail(node,
+                 fmt::format("mesh {} does not exist: there are {}, counted from 0", index, parts_.size()));
     }
     file_.fail(node, unknown_name_message("mesh", one_line(word), names));
   }
@@ -204,9 +224,12 @@ class SceneFile {
   Transform transform(const YAML::Node& node) {
     Transform result = Transform::Identity();
     if (node.IsSequence()) {
-      if (node.size() != 16) file_.fail(node, fmt::format("a transform has 16 numbers, row by row, not {}", node.size()));
-      for (int i = 0; i < 16; ++i) result.matrix()(i / 4, i % 4) = file_.number(node[std::size_t(i)], "a transform's element");
-      if (result.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) file_.fail(node, "a transform's last row must be 0 0 0 1");
+      if (node.size() != 16)
+        file_.fail(node, fmt::format("a transform has 16 numbers, row by row, not {}", node.size()));
+      for (int i = 0; i < 16; ++i)
+        result.matrix()(i / 4, i % 4) = file_.number(node[std::size_t(i)], "a transform's element");
+      if (result.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+        file_.fail(node, "a transform's last row must be 0 0 0 1");
     } else {
       file_.check_keys(node, "a transform", {"translate", "rotate", "scale"});
       if (const YAML::Node t = node["translate"]) {
@@ -218,16 +241,20 @@ class SceneFile {
         const Vec3f axis = file_.vec3(file_.need(r, "axis", "rotate"), "rotate axis");
         if (axis == Vec3f{0, 0, 0}) file_.fail(r, "rotate axis must not be zero");
         const double degrees = file_.number(file_.need(r, "degrees", "rotate"), "rotate degrees");
-        result.rotate(Eigen::AngleAxisd(degrees * EIGEN_PI / 180.0, Eigen::Vector3d(axis.x, axis.y, axis.z).normalized()));
+        result.rotate(Eigen::AngleAxisd(degrees * EIGEN_PI / 180.0,
+                                        Eigen::Vector3d(axis.x, axis.y, axis.z).normalized()));
       }
       if (const YAML::Node s = node["scale"]) {
         Vec3f v;
-        if (s.IsScalar()) v = Vec3f{1, 1, 1} * float(file_.number(s, "scale"));
-        else v = file_.vec3(s, "scale");
+        if (s.IsScalar())
+          v = Vec3f{1, 1, 1} * float(file_.number(s, "scale"));
+        else
+          v = file_.vec3(s, "scale");
         result.scale(Eigen::Vector3d(v.x, v.y, v.z));
       }
     }
-    if (result.linear().determinant() == 0.0) file_.fail(node, "a transform flattens its mesh: its determinant is 0");
+    if (result.linear().determinant() == 0.0)
+      file_.fail(node, "a transform flattens its mesh: its determinant is 0");
     return result;
   }
 
@@ -238,6 +265,8 @@ class SceneFile {
 
 }  // namespace
 
-Scene read_scene_yaml(const std::filesystem::path& path) { return SceneFile(path).read(); }
+Scene read_scene_yaml(const std::filesystem::path& path) {
+  return SceneFile(path).read();
+}
 
 }  // namespace arboretum

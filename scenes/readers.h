@@ -1,5 +1,5 @@
-// Readers: one model file in, one Scene out. They check that indices are in range and leave the rest of the sanitising
-// (non-finite, out of range, zero area) to scenes/sanitise.h.
+// Readers: one model file in, one Scene out. They check that indices are in range and leave the rest of the
+// sanitising (non-finite, out of range, zero area) to scenes/sanitise.h.
 #pragma once
 
 #include <filesystem>
@@ -13,19 +13,22 @@ namespace arboretum {
 
 /// Wavefront OBJ through tinyobjloader, materials of its mtllib included. Throws UserError.
 [[nodiscard]] Scene read_obj(const std::filesystem::path& path);
-/// PLY, ASCII or binary. A `material_id` of a face indexes the materials of the MTL file of the same stem. Throws UserError.
+/// PLY, ASCII or binary. A `material_id` of a face indexes the materials of the MTL file of the same stem.
+/// Throws UserError.
 [[nodiscard]] Scene read_ply(const std::filesystem::path& path);
 /// STL, glTF, GLB, OFF and whatever else assimp knows, node transforms applied. Throws UserError.
 [[nodiscard]] Scene read_assimp(const std::filesystem::path& path);
 /// Materials in the file's order. Warnings of the parser are appended, one line each.
-[[nodiscard]] std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<std::string>& warnings);
+[[nodiscard]] std::vector<Material> read_mtl(const std::filesystem::path& path,
+                                             std::vector<std::string>& warnings);
 /// A scene file of the project. Throws UserError.
 [[nodiscard]] Scene read_scene_yaml(const std::filesystem::path& path);
 
 /// Any model by its extension, not sanitised.
 [[nodiscard]] Scene read_model(const std::filesystem::path& path);
 
-/// A library's message, or a word of a file, fit for one line: control characters made spaces, what is not ASCII made '?'.
+/// A library's message, or a word of a file, fit for one line: control characters made spaces, what is not
+/// ASCII made '?'.
 [[nodiscard]] std::string one_line(std::string_view text);
 
 }  // namespace arboretum

@@ -9,8 +9,8 @@
 namespace arboretum {
 namespace {
 
-/// Whether the doubles sum to zero exactly: they are gathered into a non-overlapping expansion (Shewchuk 1997,
-/// GROW-EXPANSION), which is zero only when each of its components is.
+/// Whether the doubles sum to zero exactly: they are gathered into a non-overlapping expansion (Shewchuk
+/// 1997, GROW-EXPANSION), which is zero only when each of its components is.
 template <std::size_t N>
 bool sums_to_zero(const double (&terms)[N]) noexcept {
   double expansion[N] = {};
@@ -29,8 +29,8 @@ bool sums_to_zero(const double (&terms)[N]) noexcept {
   return true;
 }
 
-/// Whether three points of the plane, float32 numbers in doubles, are exactly collinear. Products of two floats are exact
-/// in double (48 bits, no underflow), so the determinant is an exact sum of six doubles.
+/// Whether three points of the plane, float32 numbers in doubles, are exactly collinear. Products of two
+/// floats are exact in double (48 bits, no underflow), so the determinant is an exact sum of six doubles.
 bool collinear(double ax, double ay, double bx, double by, double cx, double cy) noexcept {
   const double left = (bx - ax) * (cy - ay), right = (by - ay) * (cx - ax);
   constexpr double kErrorBound = 4.0 * 0x1p-53;  // Shewchuk's ccwerrboundA is (3 + 16 u) u
@@ -39,7 +39,8 @@ bool collinear(double ax, double ay, double bx, double by, double cx, double cy)
 }
 
 bool is_in_range(Vec3f v) noexcept {
-  return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate && std::abs(v.z) <= kMaxCoordinate;
+  return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate &&
+         std::abs(v.z) <= kMaxCoordinate;
 }
 
 }  // namespace
@@ -75,8 +76,9 @@ void sanitise(Scene& scene, const std::string& source) {
   for (Vec3f& v : mesh.vertices)
     if (!is_finite(v) || !is_in_range(v)) v = Vec3f{};
   if (kept == 0) {
-    throw UserError(fmt::format("{}: no triangle left: of {} read, {} are not finite, {} out of range, {} of zero area", source,
-                                report.triangles_read, report.non_finite, report.out_of_range, report.degenerate));
+    throw UserError(fmt::format(
+        "{}: no triangle left: of {} read, {} are not finite, {} out of range, {} of zero area", source,
+        report.triangles_read, report.non_finite, report.out_of_range, report.degenerate));
   }
   if (scene.materials.empty()) {
     scene.materials.push_back(Material{.name = "default"});

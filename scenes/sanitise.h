@@ -5,12 +5,14 @@
 
 namespace arboretum {
 
-/// Whether the triangle's area is exactly zero, the corners taken as exact numbers (|coordinate| <= kMaxCoordinate).
+/// Whether the triangle's area is exactly zero, the corners taken as exact numbers (|coordinate| <=
+/// kMaxCoordinate).
 [[nodiscard]] bool has_zero_area(Vec3f a, Vec3f b, Vec3f c) noexcept;
 
-/// Drops triangles with a corner that is not finite or beyond kMaxCoordinate and those of exactly zero area, keeps the
-/// order of the others, and counts into `scene.report`. A scene without materials gets one grey. Vertices stay, since
-/// indices refer to them; unusable ones are set to the origin. Throws UserError, led by `source`, when no triangle is left.
+/// Drops triangles with a corner that is not finite or beyond kMaxCoordinate and those of exactly zero area,
+/// keeps the order of the others, and counts into `scene.report`. A scene without materials gets one grey.
+/// Vertices stay, since indices refer to them; unusable ones are set to the origin. Throws UserError, led by
+/// `source`, when no triangle is left.
 void sanitise(Scene& scene, const std::string& source);
 
 }  // namespace arboretum

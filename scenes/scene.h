@@ -1,4 +1,5 @@
-// Scene: a mesh with what is needed to look at it: camera, materials, lights, and what the loader found wrong.
+// Scene: a mesh with what is needed to look at it: camera, materials, lights, and what the loader found
+// wrong.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ struct Camera {
   Vec3f look_at{0, 0, 0};
   Vec3f up{0, 1, 0};
   float vertical_fov = 40.0f;
-  bool mirror_x = false;         ///< the source used a left-handed camera
+  bool mirror_x = false;           ///< the source used a left-handed camera
   unsigned width = 0, height = 0;  ///< preferred resolution; 0: none given
   float aperture_radius = 0.0f;
   float focus_distance = 0.0f;
@@ -48,10 +49,10 @@ struct Light {
 /// What was counted while loading. Nothing of it stops a load; every line of it is reported.
 struct LoadReport {
   std::size_t triangles_read = 0;
-  std::size_t non_finite = 0;      ///< dropped: a vertex is NaN or infinite
-  std::size_t out_of_range = 0;    ///< dropped: a coordinate beyond kMaxCoordinate
-  std::size_t degenerate = 0;      ///< dropped: exactly zero area
-  std::size_t polygons_split = 0;  ///< faces of more than three corners, triangulated
+  std::size_t non_finite = 0;         ///< dropped: a vertex is NaN or infinite
+  std::size_t out_of_range = 0;       ///< dropped: a coordinate beyond kMaxCoordinate
+  std::size_t degenerate = 0;         ///< dropped: exactly zero area
+  std::size_t polygons_split = 0;     ///< faces of more than three corners, triangulated
   std::vector<std::string> warnings;  ///< one line each
 };
 
@@ -68,25 +69,26 @@ struct Scene {
   Vec3f environment{0, 0, 0};
   std::optional<Camera> camera;
   Shutter shutter;
-  unsigned key_frames = 1;     ///< most key frames of one mesh in the scene file; `mesh` holds the first
-  std::size_t instances = 0;   ///< transforms that the scene file names; they are baked into `mesh`
+  unsigned key_frames = 1;    ///< most key frames of one mesh in the scene file; `mesh` holds the first
+  std::size_t instances = 0;  ///< transforms that the scene file names; they are baked into `mesh`
   LoadReport report;
 };
 
 /// How a configuration names a scene: exactly one of the four forms of the contract.
 struct SceneSpec {
-  std::string catalogue;             ///< `bunny`
-  std::filesystem::path file;        ///< `{file: model.obj}`
-  std::filesystem::path scene;       ///< `{scene: scene.yaml}`
-  std::string generator;             ///< `{generate: sphere_flake, triangles: 100000, seed: 1}`
+  std::string catalogue;        ///< `bunny`
+  std::filesystem::path file;   ///< `{file: model.obj}`
+  std::filesystem::path scene;  ///< `{scene: scene.yaml}`
+  std::string generator;        ///< `{generate: sphere_flake, triangles: 100000, seed: 1}`
   std::size_t triangles = 100000;
   std::uint64_t seed = 1;
-  /// What cells are named after: `bunny`, `model`, `sphere_flake-100000`, with `-seed2` when the seed is not 1.
+  /// What cells are named after: `bunny`, `model`, `sphere_flake-100000`, with `-seed2` when the seed is
+  /// not 1.
   [[nodiscard]] std::string name() const;
 };
 
-/// Loads or generates. Throws UserError with one clear line for a missing, empty or broken file, an unknown name, or a
-/// scene with no triangle left.
+/// Loads or generates. Throws UserError with one clear line for a missing, empty or broken file, an unknown
+/// name, or a scene with no triangle left.
 [[nodiscard]] Scene load_scene(const SceneSpec& spec);
 /// A command-line word: a catalogue name, a path to a model or scene YAML, or `generator:triangles[:seed]`.
 [[nodiscard]] SceneSpec parse_scene_word(const std::string& word);

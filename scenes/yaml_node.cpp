@@ -20,15 +20,18 @@ YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
   } catch (const YAML::Exception& error) {
     throw UserError(fmt::format("{}:{}: {}", path_.string(), error.mark.line + 1, one_line(error.msg)));
   }
-  if (!root_.IsMap()) throw UserError(path_.string() + ": is no scene file: expected keys such as 'meshes:' at its top");
+  if (!root_.IsMap())
+    throw UserError(path_.string() + ": is no scene file: expected keys such as 'meshes:' at its top");
 }
 
 void YamlFile::fail(const YAML::Node& node, const std::string& what) const {
   const int line = node.Mark().line + 1;
-  throw UserError(line > 0 ? fmt::format("{}:{}: {}", path_.string(), line, what) : fmt::format("{}: {}", path_.string(), what));
+  throw UserError(line > 0 ? fmt::format("{}:{}: {}", path_.string(), line, what)
+                           : fmt::format("{}: {}", path_.string(), what));
 }
 
-void YamlFile::check_keys(const YAML::Node& node, std::string_view what, std::initializer_list<const char*> keys) const {
+void YamlFile::check_keys(const YAML::Node& node, std::string_view what,
+                          std::initializer_list<const char*> keys) const {
   if (!node.IsMap()) fail(node, fmt::format("{} must be a map of keys and values", what));
   const std::vector<std::string> valid(keys.begin(), keys.end());
   std::set<std::string> seen;
@@ -48,7 +51,8 @@ YAML::Node YamlFile::need(const YAML::Node& map, const char* key, std::string_vi
 }
 
 void YamlFile::check_list(const YAML::Node& node, std::string_view what) const {
-  if (!node.IsSequence() || node.size() == 0) fail(node, fmt::format("{} must be a list with something in it", what));
+  if (!node.IsSequence() || node.size() == 0)
+    fail(node, fmt::format("{} must be a list with something in it", what));
 }
 
 std::string YamlFile::text(const YAML::Node& node, std::string_view what) const {
@@ -59,7 +63,8 @@ std::string YamlFile::text(const YAML::Node& node, std::string_view what) const 
 double YamlFile::number(const YAML::Node& node, std::string_view what) const {
   double value = 0.0;
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(float(value))) {
-    fail(node, fmt::format("{} must be a finite number{}", what, node.IsScalar() ? ", not '" + one_line(node.Scalar()) + "'" : ""));
+    fail(node, fmt::format("{} must be a finite number{}", what,
+                           node.IsScalar() ? ", not '" + one_line(node.Scalar()) + "'" : ""));
   }
   return value;
 }
@@ -73,12 +78,14 @@ std::uint64_t YamlFile::count(const YAML::Node& node, std::string_view what, std
 
 bool YamlFile::boolean(const YAML::Node& node, std::string_view what) const {
   bool value = false;
-  if (!node.IsScalar() || !YAML::convert<bool>::decode(node, value)) fail(node, fmt::format("{} must be true or false", what));
+  if (!node.IsScalar() || !YAML::convert<bool>::decode(node, value))
+    fail(node, fmt::format("{} must be true or false", what));
   return value;
 }
 
 Vec3f YamlFile::vec3(const YAML::Node& node, std::string_view what) const {
-  if (!node.IsSequence() || node.size() != 3) fail(node, fmt::format("{} must be a list of three numbers", what));
+  if (!node.IsSequence() || node.size() != 3)
+    fail(node, fmt::format("{} must be a list of three numbers", what));
   return {float(number(node[0], what)), float(number(node[1], what)), float(number(node[2], what))};
 }
 
@@ -96,7 +103,8 @@ Vec3f YamlFile::color(const YAML::Node& node, std::string_view what) const {
 
 Camera YamlFile::camera(const YAML::Node& node) const {
   check_keys(node, "camera",
-             {"position", "look_at", "up", "vertical_fov", "mirror_x", "resolution", "aperture_radius", "focus_distance"});
+             {"position", "look_at", "up", "vertical_fov", "mirror_x", "resolution", "aperture_radius",
+              "focus_distance"});
   Camera camera;
   camera.position = vec3(need(node, "position", "camera"), "camera position");
   camera.look_at = vec3(need(node, "look_at", "camera"), "camera look_at");
@@ -110,11 +118,13 @@ Camera YamlFile::camera(const YAML::Node& node) const {
     fail(node["vertical_fov"], "camera vertical_fov must lie between 0 and 180 degrees");
   if (node["mirror_x"]) camera.mirror_x = boolean(node["mirror_x"], "camera mirror_x");
   if (const YAML::Node resolution = node["resolution"]) {
-    if (!resolution.IsSequence() || resolution.size() != 2) fail(resolution, "camera resolution must be [width, height]");
+    if (!resolution.IsSequence() || resolution.size() != 2)
+      fail(resolution, "camera resolution must be [width, height]");
     camera.width = unsigned(count(resolution[0], "camera width", 65536));
     camera.height = unsigned(count(resolution[1], "camera height", 65536));
   }
-  for (const auto& [key, value] : {std::pair{"aperture_radius", &camera.aperture_radius}, {"focus_distance", &camera.focus_distance}}) {
+  for (const auto& [key, value] :
+       {std::pair{"aperture_radius", &camera.aperture_radius}, {"focus_distance", &camera.focus_distance}}) {
     if (!node[key]) continue;
     *value = float(number(node[key], fmt::format("camera {}", key)));
     if (*value < 0.0f) fail(node[key], fmt::format("camera {} must not be negative", key));

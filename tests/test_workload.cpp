@@ -1,4 +1,5 @@
-// Workloads: order, counts, intervals, offsets, determinism. Primary hits come from a plain loop in double precision.
+// Workloads: order, counts, intervals, offsets, determinism. Primary hits come from a plain loop in double
+// precision.
 #include <array>
 
 #include "core/error.h"
@@ -40,7 +41,8 @@ bool same(const Ray& a, const Ray& b) {
   return a.origin == b.origin && a.direction == b.direction && a.tnear == b.tnear && a.tfar == b.tfar;
 }
 bool same(const std::vector<Ray>& a, const std::vector<Ray>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Ray& x, const Ray& y) { return same(x, y); });
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Ray& x, const Ray& y) { return same(x, y); });
 }
 
 /// A flat floor with a camera above, moved `far` along x, so that float32 has few digits left for it.
@@ -65,7 +67,8 @@ TEST_CASE("primary rays come in Morton order, one a pixel, of unit length") {
   const Workload square = make_primary(scene, View{.width = 8, .height = 8});
   REQUIRE(square.rays.size() == 64);
   for (std::size_t i = 0; i < 64; ++i) {
-    const unsigned x = unsigned(i & 1 | (i >> 1 & 2) | (i >> 2 & 4)), y = unsigned(i >> 1 & 1 | (i >> 2 & 2) | (i >> 3 & 4));
+    const unsigned x = unsigned(i & 1 | (i >> 1 & 2) | (i >> 2 & 4)),
+                   y = unsigned(i >> 1 & 1 | (i >> 2 & 2) | (i >> 3 & 4));
     const Vec3d d(square.rays[i].direction);
     // The picture's plane lies at z = 1 of a frame that looks down from (0, 5, 9).
     const Vec3d forward = normalize(Vec3d{0, -5, -9}), up = normalize(Vec3d{0, 9, -5});
@@ -86,7 +89,8 @@ TEST_CASE("every workload: counts, intervals, unit directions, and the same rays
     const View view{.width = 32, .height = 24, .seed = 5};
     const Workload primary = make_primary(scene, view);
     const std::vector<Hit> hits = trace_all(scene.mesh, primary.rays);
-    const auto hit_count = std::size_t(std::count_if(hits.begin(), hits.end(), [](const Hit& h) { return h.is_hit(); }));
+    const auto hit_count =
+        std::size_t(std::count_if(hits.begin(), hits.end(), [](const Hit& h) { return h.is_hit(); }));
     REQUIRE(hit_count > 10);
     const double diagonal = length(Vec3d(scene.mesh.bounds().extent()));
     for (const std::string_view workload_name : workload_names()) {
@@ -103,15 +107,18 @@ TEST_CASE("every workload: counts, intervals, unit directions, and the same rays
       CHECK(same(workload.rays, make_workload(workload_name, scene, view, primary.rays, hits).rays));
       View other = view;
       other.seed = 6;
-      const bool random = workload_name == "ambient_occlusion" || workload_name == "diffuse" || workload_name == "random";
-      CHECK(same(workload.rays, make_workload(workload_name, scene, other, primary.rays, hits).rays) == !random);
+      const bool random =
+          workload_name == "ambient_occlusion" || workload_name == "diffuse" || workload_name == "random";
+      CHECK(same(workload.rays, make_workload(workload_name, scene, other, primary.rays, hits).rays) ==
+            !random);
     }
   }
 }
 
 TEST_CASE("secondary rays start on the side that they leave for, and never meet their own triangle") {
   std::vector<Scene> scenes;
-  for (const char* name : {"cornell_box", "sphere_flake", "teapot_in_stadium", "needles", "city", "random_triangles"})
+  for (const char* name :
+       {"cornell_box", "sphere_flake", "teapot_in_stadium", "needles", "city", "random_triangles"})
     scenes.push_back(generate_scene(name, 300, 1));
   for (const float far : {0.0f, 1e4f, 1e7f, -3e5f}) scenes.push_back(floor_scene(far));
   for (const Scene& scene : scenes) {
@@ -130,13 +137,15 @@ TEST_CASE("secondary rays start on the side that they leave for, and never meet 
         const Vec3d a(corners[0]);
         Vec3d normal = cross(Vec3d(corners[1]) - a, Vec3d(corners[2]) - a);
         if (dot(normal, Vec3d(primary.rays[starts[k]].direction)) > 0.0) normal = normal * -1.0;
-        const double side = dot(Vec3d(workload.rays[k].origin) - a, normal), leaving = dot(Vec3d(workload.rays[k].direction), normal);
+        const double side = dot(Vec3d(workload.rays[k].origin) - a, normal),
+                     leaving = dot(Vec3d(workload.rays[k].direction), normal);
         wrong_side += !(side * leaving > 0.0);
         behind += side < 0.0;
       }
       INFO(name);
       CHECK(wrong_side == 0);
-      if (std::string_view(name) != "shadow") CHECK(behind == 0);  // a light may be behind the surface, nothing else
+      if (std::string_view(name) != "shadow")
+        CHECK(behind == 0);  // a light may be behind the surface, nothing else
     }
   }
 }

@@ -21,16 +21,20 @@ constexpr GeneratorInfo kInfos[] = {
     {"needles", "long thin triangles of any direction, the worst for boxes", kExact, true},
     {"city", "towers of boxes on a ground plane, streets between", kExact, true},
     {"teapot_in_stadium", "a teapot of one unit in a stadium a million units wide", kExact, false},
-    {"cornell_box", "a box with a lamp, a glass sphere, a mirror sphere, a metal and a matt block", kExact, false},
+    {"cornell_box", "a box with a lamp, a glass sphere, a mirror sphere, a metal and a matt block", kExact,
+     false},
     {"sphere", "a closed sphere of latitude and longitude lines, poles as fans", kEven, false},
 };
-constexpr Generate kFunctions[] = {generate_sphere_flake, generate_fractal_terrain,   generate_random_triangles, generate_needles,
-                                   generate_city,         generate_teapot_in_stadium, generate_cornell_box,      generate_sphere};
+constexpr Generate kFunctions[] = {
+    generate_sphere_flake, generate_fractal_terrain,   generate_random_triangles, generate_needles,
+    generate_city,         generate_teapot_in_stadium, generate_cornell_box,      generate_sphere};
 static_assert(std::size(kInfos) == std::size(kFunctions));
 
 }  // namespace
 
-std::span<const GeneratorInfo> generators() { return kInfos; }
+std::span<const GeneratorInfo> generators() {
+  return kInfos;
+}
 
 Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t seed) {
   std::vector<std::string> names;
@@ -38,9 +42,12 @@ Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t
     names.emplace_back(kInfos[i].name);
     if (kInfos[i].name != name) continue;
     if (triangles == 0 || triangles > kMaxGeneratedTriangles)
-      throw UserError(fmt::format("generator {}: triangles: {} is not within 1 to {}", name, triangles, kMaxGeneratedTriangles));
+      throw UserError(fmt::format("generator {}: triangles: {} is not within 1 to {}", name, triangles,
+                                  kMaxGeneratedTriangles));
     if (seed != 1 && !kInfos[i].takes_seed)
-      throw UserError(fmt::format("generator {}: seed: {} would change nothing, since its shape has nothing random; leave it out", name, seed));
+      throw UserError(fmt::format(
+          "generator {}: seed: {} would change nothing, since its shape has nothing random; leave it out",
+          name, seed));
     Scene scene = kFunctions[i](triangles, seed);
     sanitise(scene, fmt::format("generator {}", name));
     return scene;

@@ -1,5 +1,5 @@
-// Generators: scenes made by rule, at any triangle count, with the same bits on every machine and run (only + - * / and
-// sqrt in double, results rounded to float32, counter-based random numbers).
+// Generators: scenes made by rule, at any triangle count, with the same bits on every machine and run (only +
+// - * / and sqrt in double, results rounded to float32, counter-based random numbers).
 //
 // A count that a shape cannot have is met as nearly as it can; `rule` of GeneratorInfo says how.
 #pragma once
@@ -24,11 +24,12 @@ struct GeneratorInfo {
 /// Most triangles that a generator makes.
 inline constexpr std::size_t kMaxGeneratedTriangles = 500'000'000;
 
-/// Throws UserError for an unknown name, a count of 0 or beyond kMaxGeneratedTriangles, or a seed other than 1 where the
-/// generator takes none.
+/// Throws UserError for an unknown name, a count of 0 or beyond kMaxGeneratedTriangles, or a seed other than
+/// 1 where the generator takes none.
 [[nodiscard]] Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t seed);
 
-// One function a generator; `triangles` is at least 1. The scene has a camera and materials; its name is left empty.
+// One function a generator; `triangles` is at least 1. The scene has a camera and materials; its name is left
+// empty.
 [[nodiscard]] Scene generate_sphere(std::size_t triangles, std::uint64_t seed);
 [[nodiscard]] Scene generate_sphere_flake(std::size_t triangles, std::uint64_t seed);
 [[nodiscard]] Scene generate_fractal_terrain(std::size_t triangles, std::uint64_t seed);

@@ -1,5 +1,5 @@
-// sphere, sphere_flake. The flake follows the one of Haines' Standard Procedural Databases (1987): on each sphere nine of
-// a third of its radius, six around its equator and three above.
+// sphere, sphere_flake. The flake follows the one of Haines' Standard Procedural Databases (1987): on each
+// sphere nine of a third of its radius, six around its equator and three above.
 #include <deque>
 
 #include "scenes/generators/generators.h"
@@ -18,8 +18,9 @@ struct Ball {
 void add_ball(MeshBuilder& builder, const Ball& ball, std::size_t count, std::uint16_t material) {
   builder.add_closed(count, 0.5, material, [&ball](double v, double turns) {
     const UnitCircle latitude(0.5 * v), longitude(turns);  // v = 0: the pole at -normal
-    return ball.center +
-           ball.frame.to_world(Vec3d{latitude.sine * longitude.cosine, latitude.sine * longitude.sine, -latitude.cosine}) * ball.radius;
+    return ball.center + ball.frame.to_world(Vec3d{latitude.sine * longitude.cosine,
+                                                   latitude.sine * longitude.sine, -latitude.cosine}) *
+                             ball.radius;
   });
 }
 
@@ -64,21 +65,25 @@ Scene generate_sphere_flake(std::size_t triangles, std::uint64_t) {
     const Ball ball = waiting.front();
     waiting.pop_front();
     const std::size_t own = share(ball.level, levels);
-    add_ball(builder, ball, MeshBuilder::closed_count((wanted - builder.size()) * own / shares), std::uint16_t(ball.level % 2));
+    add_ball(builder, ball, MeshBuilder::closed_count((wanted - builder.size()) * own / shares),
+             std::uint16_t(ball.level % 2));
     shares -= own;
     if (ball.level == levels) continue;
     for (int child = 0; child < 9; ++child) {
       const bool upper = child >= 6;
-      const UnitCircle latitude(upper ? 0.15 : 0.0), longitude(upper ? (child - 6) / 3.0 + 1.0 / 12.0 : child / 6.0);
-      const Vec3d direction = normalize(
-          ball.frame.to_world({latitude.cosine * longitude.cosine, latitude.cosine * longitude.sine, latitude.sine}));
+      const UnitCircle latitude(upper ? 0.15 : 0.0),
+          longitude(upper ? (child - 6) / 3.0 + 1.0 / 12.0 : child / 6.0);
+      const Vec3d direction = normalize(ball.frame.to_world(
+          {latitude.cosine * longitude.cosine, latitude.cosine * longitude.sine, latitude.sine}));
       const double radius = ball.radius / 3.0;
-      waiting.push_back({ball.center + direction * (ball.radius + radius), radius, Frame(direction), ball.level + 1});
+      waiting.push_back(
+          {ball.center + direction * (ball.radius + radius), radius, Frame(direction), ball.level + 1});
     }
   }
   Scene scene;
   scene.mesh = builder.take();
-  scene.materials.push_back(Material{.name = "mirror", .diffuse = {0.1f, 0.1f, 0.1f}, .specular = {0.8f, 0.7f, 0.5f}, .illum = 3});
+  scene.materials.push_back(
+      Material{.name = "mirror", .diffuse = {0.1f, 0.1f, 0.1f}, .specular = {0.8f, 0.7f, 0.5f}, .illum = 3});
   scene.materials.push_back(Material{.name = "matt", .diffuse = {0.3f, 0.4f, 0.7f}});
   scene.camera = Camera{.position = {2.1f, 2.0f, 3.6f}, .look_at = {0, 0.25f, 0}};
   scene.lights.push_back(Light{.position = {4, 6, 3}, .intensity = {40, 40, 40}});

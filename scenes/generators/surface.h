@@ -20,13 +20,15 @@ class MeshBuilder {
     mesh_.triangles.push_back({a, b, c});
     mesh_.materials.push_back(material);
   }
-  /// The image of the unit square under position(u, v), exactly `count` triangles (>= 1; one is half a square), facing
-  /// du x dv. `aspect` is the surface's width (along u) over its height. No T-vertices inside.
+  /// The image of the unit square under position(u, v), exactly `count` triangles (>= 1; one is half a
+  /// square), facing du x dv. `aspect` is the surface's width (along u) over its height. No T-vertices
+  /// inside.
   template <class Position>
   void add_patch(std::size_t count, double aspect, std::uint16_t material, const Position& position);
-  /// A closed surface, exactly `count` triangles (even, >= 6): rings position(v, turns) with 0 < v < 1 between two poles,
-  /// position(0, 0) and position(1, 0), each with a fan. Faces outward where increasing `turns` goes counter-clockwise
-  /// seen from pole 1 (v = 1). `aspect`: length from pole to pole over the largest circumference.
+  /// A closed surface, exactly `count` triangles (even, >= 6): rings position(v, turns) with 0 < v < 1
+  /// between two poles, position(0, 0) and position(1, 0), each with a fan. Faces outward where increasing
+  /// `turns` goes counter-clockwise seen from pole 1 (v = 1). `aspect`: length from pole to pole over the
+  /// largest circumference.
   template <class Position>
   void add_closed(std::size_t count, double aspect, std::uint16_t material, const Position& position);
   /// The 12 triangles of a box.
@@ -36,7 +38,9 @@ class MeshBuilder {
   [[nodiscard]] TriangleMesh take() { return std::move(mesh_); }
 
   /// The count that add_closed can make nearest below `count`.
-  [[nodiscard]] static std::size_t closed_count(std::size_t count) noexcept { return std::max<std::size_t>(6, count & ~std::size_t{1}); }
+  [[nodiscard]] static std::size_t closed_count(std::size_t count) noexcept {
+    return std::max<std::size_t>(6, count & ~std::size_t{1});
+  }
 
  private:
   struct Row {
@@ -52,31 +56,38 @@ class MeshBuilder {
 };
 
 template <class Position>
-void MeshBuilder::add_patch(std::size_t count, double aspect, std::uint16_t material, const Position& position) {
+void MeshBuilder::add_patch(std::size_t count, double aspect, std::uint16_t material,
+                            const Position& position) {
   if (count == 1) {
-    const std::uint32_t a = add_vertex(position(0.0, 0.0)), b = add_vertex(position(1.0, 0.0)), c = add_vertex(position(0.0, 1.0));
+    const std::uint32_t a = add_vertex(position(0.0, 0.0)), b = add_vertex(position(1.0, 0.0)),
+                        c = add_vertex(position(0.0, 1.0));
     add_triangle(a, b, c, material);
     return;
   }
-  const std::size_t rows = std::clamp<std::size_t>(std::size_t(std::sqrt(double(count) / (2.0 * aspect)) + 0.5), 1, count / 2);
+  const std::size_t rows =
+      std::clamp<std::size_t>(std::size_t(std::sqrt(double(count) / (2.0 * aspect)) + 0.5), 1, count / 2);
   const std::size_t columns = count / (2 * rows);
-  // What rows of equal length leave over goes into longer lines of vertices: one more segment on an inner line makes two
-  // more triangles, on the last line one.
+  // What rows of equal length leave over goes into longer lines of vertices: one more segment on an inner
+  // line makes two more triangles, on the last line one.
   const std::size_t rest = count - 2 * rows * columns;
   Row below{};
   for (std::size_t i = 0; i <= rows; ++i) {
     std::size_t segments = columns;
-    if (i == rows) segments += rest & 1;
-    else if (i >= 1 && i <= rest / 2) segments += 1;
+    if (i == rows)
+      segments += rest & 1;
+    else if (i >= 1 && i <= rest / 2)
+      segments += 1;
     const Row row{std::uint32_t(mesh_.vertices.size()), segments};
-    for (std::size_t j = 0; j <= segments; ++j) add_vertex(position(double(j) / double(segments), double(i) / double(rows)));
+    for (std::size_t j = 0; j <= segments; ++j)
+      add_vertex(position(double(j) / double(segments), double(i) / double(rows)));
     if (i > 0) stitch(below, row, false, material);
     below = row;
   }
 }
 
 template <class Position>
-void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t material, const Position& position) {
+void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t material,
+                             const Position& position) {
   const std::vector<std::size_t> sizes = ring_sizes(count, aspect);
   const std::uint32_t pole = add_vertex(position(0.0, 0.0));
   Row below{};
@@ -86,7 +97,8 @@ void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t mat
     for (std::size_t j = 0; j < sizes[i]; ++j) add_vertex(position(v, double(j) / double(sizes[i])));
     if (i == 0) {
       for (std::size_t j = 0; j < row.segments; ++j)
-        add_triangle(pole, row.first + std::uint32_t((j + 1) % row.segments), row.first + std::uint32_t(j), material);
+        add_triangle(pole, row.first + std::uint32_t((j + 1) % row.segments), row.first + std::uint32_t(j),
+                     material);
     } else {
       stitch(below, row, true, material);
     }
@@ -94,7 +106,8 @@ void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t mat
   }
   const std::uint32_t other_pole = add_vertex(position(1.0, 0.0));
   for (std::size_t j = 0; j < below.segments; ++j)
-    add_triangle(other_pole, below.first + std::uint32_t(j), below.first + std::uint32_t((j + 1) % below.segments), material);
+    add_triangle(other_pole, below.first + std::uint32_t(j),
+                 below.first + std::uint32_t((j + 1) % below.segments), material);
 }
 
 }  // namespace arboretum
