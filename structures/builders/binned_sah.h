@@ -59,7 +59,7 @@ class BinnedSah {
   /// same bin does not wait.
   struct Bins {
     Box box[2][3][kMaxBins];
-    std::uint32_t count[3][kMaxBins];
+    std::int32_t count4[kMaxBins][4];  ///< references by bin, then axis; exact as float below 2^24, good enough above
   };
 
   struct Split {
@@ -95,12 +95,6 @@ class BinnedSah {
   }
   /// The centroid, doubled: upper + lower.
   static ARBORETUM_INLINE vf<4> centroid(const Reference& r) { return vf<4>::load(r.upper) - vf<4>::load(r.neg_lower); }
-
-  static ARBORETUM_INLINE float half_area(Box b) {
-    alignas(16) float d[4];
-    (high_half(b) + low_half(b)).store(d);
-    return d[0] * (d[1] + d[2]) + d[1] * d[2];
-  }
 
   /// A vertex as four lanes, the fourth of any value; the array's last vertex is not read beyond.
   ARBORETUM_INLINE vf<4> vertex(std::uint32_t v) const {
@@ -143,8 +137,7 @@ class BinnedSah {
     unsigned bins;
     BinMap(const Range& range, unsigned max_bins) {
       const std::size_t n = range.size();
-      bins = n < 16 ? 8u : n < 256 ? 16u : 32u;
-      if (bins > max_bins || n >= 4096) bins = max_bins;
+      bins = std::min(max_bins, n < 48 ? 8u : n < 1024 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
       const vf<4> low = -low_half(range.centroids), extent = high_half(range.centroids) - low;
       lower = low;
       // A flat axis gets scale 0: all in bin 0, and no split there.
@@ -155,23 +148,31 @@ class BinnedSah {
     }
   };
 
-  static void clear(Bins& bins, unsigned n) {
+  static void clear(Bins& bins, unsigned n, int sets) {
     for (int axis = 0; axis < 3; ++axis) {
-      for (unsigned b = 0; b < n; ++b) bins.box[0][axis][b] = bins.box[1][axis][b] = empty_box(), bins.count[axis][b] = 0;
+      for (int set = 0; set < sets; ++set) {
+        for (unsigned b = 0; b < n; ++b) bins.box[set][axis][b] = empty_box();
+      }
     }
+    std::memset(bins.count4, 0, n * sizeof bins.count4[0]);
   }
 
   static void bin(const Reference* r, const Reference* end, const BinMap& map, Bins& bins) {
-    clear(bins, map.bins);
+    const int sets = end - r < 64 ? 1 : 2;
+    clear(bins, map.bins, sets);
     const auto put = [&](const Reference& ref, int set) {
       alignas(16) std::int32_t b[4];
       map(ref, b);
       const Box box = Box::load(&ref);
       for (int axis = 0; axis < 3; ++axis) {
         bins.box[set][axis][b[axis]] = max_x86(box, bins.box[set][axis][b[axis]]);
-        ++bins.count[axis][b[axis]];
+        ++bins.count4[b[axis]][axis];
       }
     };
+    if (sets == 1) {
+      for (; r < end; ++r) put(*r, 0);
+      return;
+    }
     for (; r + 1 < end; r += 2) put(r[0], 0), put(r[1], 1);
     if (r < end) put(*r, 0);
     for (int axis = 0; axis < 3; ++axis) {
@@ -183,36 +184,72 @@ class BinnedSah {
     for (int axis = 0; axis < 3; ++axis) {
       for (unsigned b = 0; b < n; ++b) {
         into.box[0][axis][b] = max_x86(into.box[0][axis][b], from.box[0][axis][b]);
-        into.count[axis][b] += from.count[axis][b];
+        into.count4[b][axis] += from.count4[b][axis];
       }
     }
   }
 
-  /// The cheapest plane: area times blocks on both sides, a block holding leaf_width_ references.
-  Split best_split(const Bins& bins, unsigned n, std::size_t total) const {
-    Split best;
-    const float per_block = 1.0f / float(leaf_width_);
-    const auto blocks = [&](std::size_t count) { return leaf_width_ <= 1 ? float(count) : std::max(1.0f, float(count) * per_block); };
-    for (int axis = 0; axis < 3; ++axis) {
-      float right_cost[kMaxBins];
-      Box box = empty_box();
-      std::size_t count = 0;
-      for (unsigned b = n; --b > 0;) {
-        box = max_x86(bins.box[0][axis][b], box);
-        count += bins.count[axis][b];
-        right_cost[b] = count ? half_area(box) * blocks(count) : std::numeric_limits<float>::infinity();
-      }
-      box = empty_box();
-      count = 0;
-      for (unsigned b = 1; b < n; ++b) {
-        box = max_x86(bins.box[0][axis][b - 1], box);
-        count += bins.count[axis][b - 1];
-        if (count == 0) continue;
-        if (count == total) break;
-        const float cost = half_area(box) * blocks(count) + right_cost[b];
-        if (cost < best.cost) best = {cost, axis, b, count};
-      }
+  /// Half the areas of three boxes, in lanes 0 to 2.
+  static ARBORETUM_INLINE vf<4> half_areas(const Box (&box)[3]) {
+    const vf<4> a = high_half(box[0]) + low_half(box[0]), b = high_half(box[1]) + low_half(box[1]), c = high_half(box[2]) + low_half(box[2]);
+    vf<4> x, y, z;
+    transpose(a, b, c, x, y, z);
+    return x * (y + z) + y * z;
+  }
+
+  /// Rows a, b, c of x y z become columns: x holds the three first components.
+  static ARBORETUM_INLINE void transpose(vf<4> a, vf<4> b, vf<4> c, vf<4>& x, vf<4>& y, vf<4>& z) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+    for (int i = 0; i < 4; ++i) {
+      const vf<4>& row = i == 0 ? a : i == 1 ? b : c;
+      x.lane[i] = row.lane[0], y.lane[i] = row.lane[1], z.lane[i] = row.lane[2];
     }
+#else
+    const __m128 ab_low = _mm_unpacklo_ps(a.v, b.v);   // ax bx ay by
+    const __m128 ab_high = _mm_unpackhi_ps(a.v, b.v);  // az bz
+    x = vf<4>(_mm_movelh_ps(ab_low, c.v));             // ax bx cx cy
+    y = vf<4>(_mm_shuffle_ps(ab_low, c.v, _MM_SHUFFLE(1, 1, 3, 2)));
+    z = vf<4>(_mm_shuffle_ps(ab_high, c.v, _MM_SHUFFLE(2, 2, 1, 0)));
+#endif
+  }
+
+  static ARBORETUM_INLINE vf<4> counts_of(const Bins& bins, unsigned b) {
+    return to_float(vi<4>::load(bins.count4[b]));
+  }
+
+  /// The cheapest plane: area times blocks on both sides, a block holding leaf_width_ references; the three axes in lanes.
+  Split best_split(const Bins& bins, unsigned n, std::size_t total) const {
+    const vf<4> per_block(1.0f / float(leaf_width_)), one(1.0f), zero(0.0f), none(std::numeric_limits<float>::infinity());
+    vf<4> right_cost[kMaxBins];
+    Box box[3] = {empty_box(), empty_box(), empty_box()};
+    vf<4> count(0.0f);
+    for (unsigned b = n; --b > 0;) {
+      for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b], box[axis]);
+      count = count + counts_of(bins, b);
+      right_cost[b] = select(count > zero, half_areas(box) * max_x86(count * per_block, one), none);
+    }
+    for (Box& side : box) side = empty_box();
+    count = vf<4>(0.0f);
+    vf<4> best_cost = none;
+    vi<4> best_bin(0);
+    for (unsigned b = 1; b < n; ++b) {
+      for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b - 1], box[axis]);
+      count = count + counts_of(bins, b - 1);
+      const vf<4> cost = select(count > zero, half_areas(box) * max_x86(count * per_block, one) + right_cost[b], none);
+      const vm<4> better = cost < best_cost;
+      best_cost = select(better, cost, best_cost);
+      best_bin = select(better, vi<4>(std::int32_t(b)), best_bin);
+    }
+    alignas(16) float costs[4];
+    alignas(16) std::int32_t planes[4];
+    best_cost.store(costs), best_bin.store(planes);
+    Split best;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (costs[axis] < best.cost) best = {costs[axis], axis, unsigned(planes[axis]), 0};
+    }
+    if (best.axis < 0) return best;
+    for (unsigned b = 0; b < best.bin; ++b) best.left_count += std::uint32_t(bins.count4[b][best.axis]);
+    if (best.left_count == total) best.axis = -1;
     return best;
   }
 
@@ -307,7 +344,7 @@ class BinnedSah {
       bin(r + begin, r + end, map, bins[c]);
     });
     Bins total;
-    clear(total, map.bins);
+    clear(total, map.bins, 1);
     for (const Bins& b : bins) merge(total, b, map.bins);
     const Split split = best_split(total, map.bins, range.size());
     if (split.axis < 0) return split_in_the_middle(range, left, right);
@@ -323,7 +360,7 @@ class BinnedSah {
     for (std::size_t c = 0; c < chunks; ++c) {
       targets[c].left = l, targets[c].right = h;
       std::size_t to_left = 0;
-      for (unsigned b = 0; b < split.bin; ++b) to_left += bins[c].count[split.axis][b];
+      for (unsigned b = 0; b < split.bin; ++b) to_left += std::size_t(bins[c].count4[b][split.axis]);
       const auto [begin, end] = bounds_of(c);
       l += to_left, h += end - begin - to_left;
     }
