@@ -117,9 +117,10 @@ TEST_CASE("bad scene files: file, line, and the nearest key") {
       {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{rotation: 1}]}]\n",
        ":2: unknown key of a transform 'rotation'; did you mean 'rotate'?"},
   };
-  for (const auto& [text, says] : cases) {
-    INFO(text);
-    CHECK_THAT(error_of([&] { (void)load_file(folder.write("s.yaml", text)); }), Catch::Contains(says));
+  for (const auto& c : cases) {
+    INFO(c.first);
+    CHECK_THAT(error_of([&] { (void)load_file(folder.write("s.yaml", c.first)); }),
+               Catch::Contains(c.second));
   }
 }
 

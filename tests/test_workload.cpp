@@ -67,8 +67,8 @@ TEST_CASE("primary rays come in Morton order, one a pixel, of unit length") {
   const Workload square = make_primary(scene, View{.width = 8, .height = 8});
   REQUIRE(square.rays.size() == 64);
   for (std::size_t i = 0; i < 64; ++i) {
-    const unsigned x = unsigned(i & 1 | (i >> 1 & 2) | (i >> 2 & 4)),
-                   y = unsigned(i >> 1 & 1 | (i >> 2 & 2) | (i >> 3 & 4));
+    const unsigned x = unsigned((i & 1) | (i >> 1 & 2) | (i >> 2 & 4)),
+                   y = unsigned((i >> 1 & 1) | (i >> 2 & 2) | (i >> 3 & 4));
     const Vec3d d(square.rays[i].direction);
     // The picture's plane lies at z = 1 of a frame that looks down from (0, 5, 9).
     const Vec3d forward = normalize(Vec3d{0, -5, -9}), up = normalize(Vec3d{0, 9, -5});
