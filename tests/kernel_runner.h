@@ -1,4 +1,5 @@
-// Calling rows of the kernel table from tests: the rows that can run here, the structures they need, whole batches.
+// Calling rows of the kernel table from tests: the rows that can run here, the structures they need, whole
+// batches.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +20,8 @@ namespace arboretum::test {
 
 [[nodiscard]] inline std::string name_of(const KernelRow& row) {
   std::string name(row.structure);
-  for (std::string_view part : {row.leaf, row.intersector, row.box, row.traversal, to_string(row.isa)}) name.append("/").append(part);
+  for (std::string_view part : {row.leaf, row.intersector, row.box, row.traversal, to_string(row.isa)})
+    name.append("/").append(part);
   return name;
 }
 
@@ -52,14 +54,18 @@ class Structures {
   std::map<std::tuple<std::string_view, std::string_view, Isa>, std::unique_ptr<Accel>> built_;
 };
 
-/// With `counters`, the counting kernel. Answers that the kernel leaves unwritten are marked: t is NaN, an id 0xdeadbeef.
-[[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, Counters* counters = nullptr) {
+/// With `counters`, the counting kernel. Answers that the kernel leaves unwritten are marked: t is NaN, an id
+/// 0xdeadbeef.
+[[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel,
+                                                  std::span<const Ray> rays, Counters* counters = nullptr) {
   std::vector<Hit> hits(rays.size(), Hit{std::numeric_limits<float>::quiet_NaN(), 0, 0, 0xdeadbeefu});
   (counters ? row.count_closest_hit : row.closest_hit)(accel, rays, hits, counters);
   return hits;
 }
 
-[[nodiscard]] inline std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, Counters* counters = nullptr) {
+[[nodiscard]] inline std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel,
+                                                       std::span<const Ray> rays,
+                                                       Counters* counters = nullptr) {
   std::vector<std::uint8_t> occluded(rays.size(), 0xee);
   (counters ? row.count_any_hit : row.any_hit)(accel, rays, occluded, counters);
   return occluded;

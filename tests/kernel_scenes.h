@@ -20,11 +20,13 @@ struct KernelScene {
   TriangleMesh mesh;
 };
 
-[[nodiscard]] inline float uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension, float low, float high) {
+[[nodiscard]] inline float uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension,
+                                   float low, float high) {
   return low + (high - low) * random_float(seed, index, dimension);
 }
 
-[[nodiscard]] inline Vec3f uniform_point(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension, const Bounds3f& box) {
+[[nodiscard]] inline Vec3f uniform_point(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension,
+                                         const Bounds3f& box) {
   return {uniform(seed, index, dimension, box.lower.x, box.upper.x),
           uniform(seed, index, dimension + 1, box.lower.y, box.upper.y),
           uniform(seed, index, dimension + 2, box.lower.z, box.upper.z)};
@@ -36,7 +38,8 @@ struct KernelScene {
   TriangleMesh mesh;
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3f center = uniform_point(seed, i, 0, cube);
-    for (std::uint64_t k = 0; k < 3; ++k) mesh.vertices.push_back(center + size * uniform_point(seed, i, 3 + 3 * k, cube));
+    for (std::uint64_t k = 0; k < 3; ++k)
+      mesh.vertices.push_back(center + size * uniform_point(seed, i, 3 + 3 * k, cube));
     const auto first = static_cast<std::uint32_t>(3 * i);
     mesh.triangles.push_back({first, first + 1, first + 2});
   }
@@ -47,7 +50,8 @@ struct KernelScene {
 [[nodiscard]] inline TriangleMesh flat_grid(std::uint32_t n) {
   TriangleMesh mesh;
   for (std::uint32_t y = 0; y <= n; ++y)
-    for (std::uint32_t x = 0; x <= n; ++x) mesh.vertices.push_back({2.0f * float(x) / float(n) - 1, 2.0f * float(y) / float(n) - 1, 0});
+    for (std::uint32_t x = 0; x <= n; ++x)
+      mesh.vertices.push_back({2.0f * float(x) / float(n) - 1, 2.0f * float(y) / float(n) - 1, 0});
   for (std::uint32_t y = 0; y < n; ++y) {
     for (std::uint32_t x = 0; x < n; ++x) {
       const std::uint32_t a = y * (n + 1) + x, b = a + 1, c = a + n + 1, d = c + 1;
@@ -67,7 +71,8 @@ struct KernelScene {
   for (std::uint32_t r = 1; r < rings; ++r) {
     for (std::uint32_t k = 0; k < around; ++k) {
       const double theta = pi * r / rings, phi = 2 * pi * k / around;
-      mesh.vertices.push_back({float(std::sin(theta) * std::cos(phi)), float(std::sin(theta) * std::sin(phi)), float(std::cos(theta))});
+      mesh.vertices.push_back({float(std::sin(theta) * std::cos(phi)), float(std::sin(theta) * std::sin(phi)),
+                               float(std::cos(theta))});
     }
   }
   mesh.vertices.push_back({0, 0, -1});
@@ -99,7 +104,8 @@ struct KernelScene {
 
 [[nodiscard]] inline std::vector<KernelScene> kernel_scenes() {
   std::vector<KernelScene> scenes;
-  for (std::size_t n : {1u, 2u, 3u, 5u, 17u}) scenes.push_back({"random " + std::to_string(n), random_triangles(n, 0.7f, 40 + n)});
+  for (std::size_t n : {1u, 2u, 3u, 5u, 17u})
+    scenes.push_back({"random " + std::to_string(n), random_triangles(n, 0.7f, 40 + n)});
   scenes.push_back({"random 100", random_triangles(100, 0.3f, 1)});
   scenes.push_back({"random 3000", random_triangles(3000, 0.1f, 2)});
   scenes.push_back({"flat grid", flat_grid(16)});
@@ -116,13 +122,15 @@ struct KernelScene {
   return scenes;
 }
 
-/// Rays that meet nothing special: from around the scene through its inside, some short, some starting late, some along
-/// an axis.
-[[nodiscard]] inline std::vector<Ray> generic_rays(const TriangleMesh& mesh, std::size_t count, std::uint64_t seed) {
+/// Rays that meet nothing special: from around the scene through its inside, some short, some starting late,
+/// some along an axis.
+[[nodiscard]] inline std::vector<Ray> generic_rays(const TriangleMesh& mesh, std::size_t count,
+                                                   std::uint64_t seed) {
   const Bounds3f box = mesh.bounds();
   const Vec3f extent = box.extent();
   const float largest = std::max({extent.x, extent.y, extent.z});
-  const Bounds3f around{box.lower - Vec3f{largest, largest, largest}, box.upper + Vec3f{largest, largest, largest}};
+  const Bounds3f around{box.lower - Vec3f{largest, largest, largest},
+                        box.upper + Vec3f{largest, largest, largest}};
   std::vector<Ray> rays;
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3f from = uniform_point(seed, i, 0, around), to = uniform_point(seed, i, 3, box);
@@ -143,7 +151,8 @@ struct KernelScene {
 }
 
 /// Rays aimed at vertices and at points of edges, from `from`.
-[[nodiscard]] inline std::vector<Ray> aimed_rays(const TriangleMesh& mesh, Vec3f from, std::size_t count, std::uint64_t seed) {
+[[nodiscard]] inline std::vector<Ray> aimed_rays(const TriangleMesh& mesh, Vec3f from, std::size_t count,
+                                                 std::uint64_t seed) {
   std::vector<Ray> rays;
   for (std::size_t i = 0; i < count; ++i) {
     const auto c = mesh.corners(random_bits(seed, i, 0) % mesh.size());
@@ -159,14 +168,22 @@ struct KernelScene {
 [[nodiscard]] inline std::vector<Ray> invalid_rays() {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   return {
-      {{nan, 0, 0}, 0, {0, 0, 1}, kInfinity},        {{0, nan, nan}, 0, {0, 1, 1}, kInfinity},
-      {{0, 0, -3}, 0, {0, nan, 1}, kInfinity},       {{0, 0, -3}, nan, {0, 0, 1}, kInfinity},
-      {{0, 0, -3}, 0, {0, 0, 1}, nan},               {{nan, nan, nan}, nan, {nan, nan, nan}, nan},
-      {{kInfinity, 0, 0}, 0, {-1, 0, 0}, kInfinity}, {{0, 0, -kInfinity}, 0, {0, 0, 1}, kInfinity},
-      {{0, 0, -3}, 0, {0, 0, kInfinity}, kInfinity}, {{0, 0, -3}, 0, {-kInfinity, kInfinity, 1}, kInfinity},
-      {{0, 0, 0}, 0, {0, 0, 0}, kInfinity},          {{0, 0, 0}, 0, {-0.0f, 0, -0.0f}, kInfinity},
-      {{0, 0, -3}, 9, {0, 0, 1}, 1},                 {{0, 0, -3}, 0, {0, 0, 1}, -kInfinity},
-      {{0, 0, -3}, 0, {0, 0, 1}, -1},                {{0, 0, -3}, kInfinity, {0, 0, 1}, 5},
+      {{nan, 0, 0}, 0, {0, 0, 1}, kInfinity},
+      {{0, nan, nan}, 0, {0, 1, 1}, kInfinity},
+      {{0, 0, -3}, 0, {0, nan, 1}, kInfinity},
+      {{0, 0, -3}, nan, {0, 0, 1}, kInfinity},
+      {{0, 0, -3}, 0, {0, 0, 1}, nan},
+      {{nan, nan, nan}, nan, {nan, nan, nan}, nan},
+      {{kInfinity, 0, 0}, 0, {-1, 0, 0}, kInfinity},
+      {{0, 0, -kInfinity}, 0, {0, 0, 1}, kInfinity},
+      {{0, 0, -3}, 0, {0, 0, kInfinity}, kInfinity},
+      {{0, 0, -3}, 0, {-kInfinity, kInfinity, 1}, kInfinity},
+      {{0, 0, 0}, 0, {0, 0, 0}, kInfinity},
+      {{0, 0, 0}, 0, {-0.0f, 0, -0.0f}, kInfinity},
+      {{0, 0, -3}, 9, {0, 0, 1}, 1},
+      {{0, 0, -3}, 0, {0, 0, 1}, -kInfinity},
+      {{0, 0, -3}, 0, {0, 0, 1}, -1},
+      {{0, 0, -3}, kInfinity, {0, 0, 1}, 5},
   };
 }
 

@@ -1,4 +1,5 @@
-// Embree behind Accel: the same rays as a double-precision brute force, on every ISA, build quality and robustness.
+// Embree behind Accel: the same rays as a double-precision brute force, on every ISA, build quality and
+// robustness.
 #include <cmath>
 #include <iostream>
 #include <limits>
@@ -28,7 +29,8 @@ TriangleMesh random_triangles(std::size_t count, std::uint64_t seed) {
     const Vec3f center{number(seed, i, 0, -1, 1), number(seed, i, 1, -1, 1), number(seed, i, 2, -1, 1)};
     for (int k = 0; k < 3; ++k) {
       const std::uint64_t d = 3 + 3 * std::uint64_t(k);
-      mesh.vertices.push_back(center + 0.2f * Vec3f{number(seed, i, d, -1, 1), number(seed, i, d + 1, -1, 1), number(seed, i, d + 2, -1, 1)});
+      mesh.vertices.push_back(center + 0.2f * Vec3f{number(seed, i, d, -1, 1), number(seed, i, d + 1, -1, 1),
+                                                    number(seed, i, d + 2, -1, 1)});
     }
     const auto first = std::uint32_t(3 * i);
     mesh.triangles.push_back({first, first + 1, first + 2});
@@ -46,7 +48,8 @@ std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed) {
   return rays;
 }
 
-/// Moeller-Trumbore in double. `near_edge`: some triangle's decision is within 1e-5 of a boundary, so a float kernel may differ.
+/// Moeller-Trumbore in double. `near_edge`: some triangle's decision is within 1e-5 of a boundary, so a float
+/// kernel may differ.
 struct Truth {
   bool hit = false, near_edge = false;
   double t = 0, u = 0, v = 0;
@@ -54,21 +57,28 @@ struct Truth {
 };
 
 Truth brute_force(const TriangleMesh& mesh, const Ray& ray) {
-  struct D3 { double x, y, z; };
+  struct D3 {
+    double x, y, z;
+  };
   const auto d3 = [](Vec3f p) { return D3{p.x, p.y, p.z}; };
   const auto sub = [](D3 a, D3 b) { return D3{a.x - b.x, a.y - b.y, a.z - b.z}; };
-  const auto cross = [](D3 a, D3 b) { return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
+  const auto cross = [](D3 a, D3 b) {
+    return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  };
   const auto dot = [](D3 a, D3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
   Truth truth;
   truth.t = ray.tfar;
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const auto [a, b, c] = mesh.corners(i);
-    const D3 e1 = sub(d3(b), d3(a)), e2 = sub(d3(c), d3(a)), d = d3(ray.direction), s = sub(d3(ray.origin), d3(a));
+    const D3 e1 = sub(d3(b), d3(a)), e2 = sub(d3(c), d3(a)), d = d3(ray.direction),
+             s = sub(d3(ray.origin), d3(a));
     const D3 p = cross(d, e2), q = cross(s, e1);
     const double det = dot(e1, p), u = dot(s, p) / det, v = dot(d, q) / det, t = dot(e2, q) / det;
     const double margin = std::min({u, v, 1 - u - v});
     const bool inside_interval = t >= ray.tnear - 1e-5 && t <= double(ray.tfar) + 1e-5;
-    if (inside_interval && (std::abs(margin) < 1e-5 || std::abs(t - ray.tnear) < 1e-5 || std::abs(t - ray.tfar) < 1e-5)) truth.near_edge = true;
+    if (inside_interval &&
+        (std::abs(margin) < 1e-5 || std::abs(t - ray.tnear) < 1e-5 || std::abs(t - ray.tfar) < 1e-5))
+      truth.near_edge = true;
     if (!(margin >= 0 && t >= ray.tnear && t <= truth.t)) continue;
     if (truth.hit && t == truth.t) continue;
     truth = {true, truth.near_edge, t, u, v, std::uint32_t(i)};
@@ -76,7 +86,8 @@ Truth brute_force(const TriangleMesh& mesh, const Ray& ray) {
   return truth;
 }
 
-EmbreeAccel& build(EmbreeAccel& accel, const TriangleMesh& mesh, Isa isa, std::string_view builder, std::string_view leaf, unsigned threads = 1) {
+EmbreeAccel& build(EmbreeAccel& accel, const TriangleMesh& mesh, Isa isa, std::string_view builder,
+                   std::string_view leaf, unsigned threads = 1) {
   BuildSettings settings;
   settings.builder = builder, settings.leaf = leaf, settings.isa = isa, settings.threads = threads;
   BuildReport report;
@@ -166,11 +177,11 @@ TEST_CASE("u weighs the second vertex and v the third") {
 TEST_CASE("rays that are none hit nothing in embree") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<Ray> rays{
-      {{nan, 0, 0}, 0, {0, 0, 1}, kInfinity},       {{0, 0, -3}, 0, {0, nan, 1}, kInfinity},
-      {{0, 0, -3}, nan, {0, 0, 1}, kInfinity},      {{0, 0, -3}, 0, {0, 0, 1}, nan},
+      {{nan, 0, 0}, 0, {0, 0, 1}, kInfinity},        {{0, 0, -3}, 0, {0, nan, 1}, kInfinity},
+      {{0, 0, -3}, nan, {0, 0, 1}, kInfinity},       {{0, 0, -3}, 0, {0, 0, 1}, nan},
       {{kInfinity, 0, 0}, 0, {-1, 0, 0}, kInfinity}, {{0, 0, -3}, 0, {0, 0, kInfinity}, kInfinity},
-      {{0, 0, 0}, 0, {0, 0, 0}, kInfinity},         {{0, 0, -3}, 9, {0, 0, 1}, 1},
-      {{0, 0, -3}, 0, {0, 0, 1}, -kInfinity},       {{0, 0, -3}, 0, {0, 0, 1}, -1},
+      {{0, 0, 0}, 0, {0, 0, 0}, kInfinity},          {{0, 0, -3}, 9, {0, 0, 1}, 1},
+      {{0, 0, -3}, 0, {0, 0, 1}, -kInfinity},        {{0, 0, -3}, 0, {0, 0, 1}, -1},
   };
   const TriangleMesh mesh = random_triangles(500, 3);
   for (Isa isa : available_isas()) {
@@ -213,8 +224,10 @@ TEST_CASE("embree gives its memory back, and can build again") {
 TEST_CASE("embree says what it cannot do") {
   const TriangleMesh mesh = random_triangles(3, 1);
   EmbreeAccel accel;
-  CHECK_THROWS_WITH(build(accel, mesh, Isa::scalar, "medium", "triangle4"), Catch::Contains("no scalar kernels"));
-  CHECK_THROWS_WITH(build(accel, mesh, Isa::sse, "mediun", "triangle4"), Catch::Contains("did you mean 'medium'?"));
+  CHECK_THROWS_WITH(build(accel, mesh, Isa::scalar, "medium", "triangle4"),
+                    Catch::Contains("no scalar kernels"));
+  CHECK_THROWS_WITH(build(accel, mesh, Isa::sse, "mediun", "triangle4"),
+                    Catch::Contains("did you mean 'medium'?"));
   CHECK_THROWS_AS(build(accel, mesh, Isa::sse, "medium", "triangle8"), UserError);
   build(accel, mesh, Isa::sse, "medium", "triangle4");
   CHECK_NOTHROW(accel.expect(Isa::sse, false));

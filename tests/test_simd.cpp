@@ -21,10 +21,18 @@ namespace {
 
 using Bits = std::uint32_t;
 
-float as_float(Bits b) { return std::bit_cast<float>(b); }
-Bits bits(float x) { return std::bit_cast<Bits>(x); }
-std::int32_t as_int(Bits b) { return std::bit_cast<std::int32_t>(b); }
-Bits bits(std::int32_t x) { return std::bit_cast<Bits>(x); }
+float as_float(Bits b) {
+  return std::bit_cast<float>(b);
+}
+Bits bits(float x) {
+  return std::bit_cast<Bits>(x);
+}
+std::int32_t as_int(Bits b) {
+  return std::bit_cast<std::int32_t>(b);
+}
+Bits bits(std::int32_t x) {
+  return std::bit_cast<Bits>(x);
+}
 
 struct Lanes {
   int width, lane;
@@ -43,8 +51,8 @@ struct Lanes {
   [[nodiscard]] float madd(float x, float y, float z) const { return fma ? std::fma(x, y, z) : x * y + z; }
 };
 
-/// `exact`: NaNs must agree in every bit too, since the operation moves patterns and does no arithmetic. `finite`: the
-/// result is promised for lanes without NaN only, and the sign of a zero is not.
+/// `exact`: NaNs must agree in every bit too, since the operation moves patterns and does no arithmetic.
+/// `finite`: the result is promised for lanes without NaN only, and the sign of a zero is not.
 enum class Compare { exact, arithmetic, finite };
 
 struct Reference {
@@ -55,7 +63,10 @@ struct Reference {
 const std::map<std::string, Reference>& references() {
   using L = const Lanes&;
   using enum Compare;
-  static const auto product = [](float x, float y) { volatile float p = x * y; return float(p); };
+  static const auto product = [](float x, float y) {
+    volatile float p = x * y;
+    return float(p);
+  };
   static const std::map<std::string, Reference> table{
       {"add", {arithmetic, [](L l) { return bits(l.fa() + l.fb()); }}},
       {"sub", {arithmetic, [](L l) { return bits(l.fa() - l.fb()); }}},
@@ -94,10 +105,12 @@ const std::map<std::string, Reference>& references() {
       {"shift_left_3", {exact, [](L l) { return l.a[l.lane] << 3; }}},
       {"shift_right_logical_7", {exact, [](L l) { return l.a[l.lane] >> 7; }}},
       {"to_float", {exact, [](L l) { return bits(float(l.ia())); }}},
-      {"truncate_to_int", {exact, [](L l) {
-         const bool fits = l.fa() >= -2147483648.0f && l.fa() < 2147483648.0f;
-         return bits(fits ? std::int32_t(l.fa()) : std::numeric_limits<std::int32_t>::min());
-       }}},
+      {"truncate_to_int",
+       {exact,
+        [](L l) {
+          const bool fits = l.fa() >= -2147483648.0f && l.fa() < 2147483648.0f;
+          return bits(fits ? std::int32_t(l.fa()) : std::numeric_limits<std::int32_t>::min());
+        }}},
       {"as_int", {exact, [](L l) { return l.a[l.lane]; }}},
       {"from_int_bits", {exact, [](L l) { return l.a[l.lane]; }}},
       {"broadcast_float", {exact, [](L) { return bits(1.5f); }}},
@@ -114,27 +127,33 @@ const std::map<std::string, Reference>& references() {
       {"mask_any", {exact, [](L l) { return Bits(l.mask(l.a) != 0); }}},
       {"mask_none", {exact, [](L l) { return Bits(l.mask(l.a) == 0); }}},
       {"mask_all", {exact, [](L l) { return Bits(l.mask(l.a) == (1u << l.width) - 1u); }}},
-      {"reduce_min", {finite, [](L l) {
-         float m = as_float(l.a[0]);
-         for (int i = 1; i < l.width; ++i) m = std::fmin(m, as_float(l.a[i]));
-         return bits(m);
-       }}},
-      {"reduce_max", {finite, [](L l) {
-         float m = as_float(l.a[0]);
-         for (int i = 1; i < l.width; ++i) m = std::fmax(m, as_float(l.a[i]));
-         return bits(m);
-       }}},
-      {"dot", {arithmetic, [](L l) {
-         return bits(l.madd(l.fa(), l.fb(), l.madd(l.fb(), l.fc(), product(l.fc(), l.fa()))));
-       }}},
+      {"reduce_min",
+       {finite,
+        [](L l) {
+          float m = as_float(l.a[0]);
+          for (int i = 1; i < l.width; ++i) m = std::fmin(m, as_float(l.a[i]));
+          return bits(m);
+        }}},
+      {"reduce_max",
+       {finite,
+        [](L l) {
+          float m = as_float(l.a[0]);
+          for (int i = 1; i < l.width; ++i) m = std::fmax(m, as_float(l.a[i]));
+          return bits(m);
+        }}},
+      {"dot",
+       {arithmetic,
+        [](L l) { return bits(l.madd(l.fa(), l.fb(), l.madd(l.fb(), l.fc(), product(l.fc(), l.fa())))); }}},
       {"cross_x", {arithmetic, [](L l) { return bits(l.madd(l.fb(), l.fa(), -product(l.fc(), l.fc()))); }}},
       {"cross_y", {arithmetic, [](L l) { return bits(l.madd(l.fc(), l.fb(), -product(l.fa(), l.fa()))); }}},
       {"cross_z", {arithmetic, [](L l) { return bits(l.madd(l.fa(), l.fc(), -product(l.fb(), l.fb()))); }}},
-      {"compress", {exact, [](L l) {
-         for (int i = 0, n = 0; i < l.width; ++i)
-           if ((l.c[i] & 1u) && n++ == l.lane) return l.a[i];
-         return 0u;  // the lanes behind are not looked at, see agrees()
-       }}},
+      {"compress",
+       {exact,
+        [](L l) {
+          for (int i = 0, n = 0; i < l.width; ++i)
+            if ((l.c[i] & 1u) && n++ == l.lane) return l.a[i];
+          return 0u;  // the lanes behind are not looked at, see agrees()
+        }}},
   };
   return table;
 }
@@ -144,7 +163,8 @@ bool agrees(const std::string& name, const Reference& reference, const Lanes& l,
   if (name == "compress" && l.lane >= std::popcount(l.mask(l.c))) return true;
   if (got == want) return true;
   if (reference.compare == Compare::exact) return false;
-  if (reference.compare == Compare::arithmetic) return std::isnan(as_float(got)) && std::isnan(as_float(want));
+  if (reference.compare == Compare::arithmetic)
+    return std::isnan(as_float(got)) && std::isnan(as_float(want));
   for (int i = 0; i < l.width; ++i)
     if (std::isnan(as_float(l.a[i]))) return true;
   return as_float(got) == as_float(want);
@@ -155,14 +175,16 @@ const std::vector<Bits>& special_values() {
     std::vector<Bits> v{0x7fc00000u, 0xffc00000u, 0x7fc12345u, 0x7f800001u, 0x00000001u, 0x80000001u,
                         0x007fffffu, 0x00800000u, 0x7f7fffffu, 0xff7fffffu, 0x4f000000u, 0xcf000000u,
                         0x4effffffu, 0xcf000001u, 0x7fffffffu, 0xffffffffu, 0x3f7fffffu, 0x3f800001u};
-    for (float x : {0.0f, -0.0f, 1.0f, -1.0f, 0.1f, 0.5f, -2.5f, 3e38f, INFINITY, -INFINITY}) v.push_back(bits(x));
+    for (float x : {0.0f, -0.0f, 1.0f, -1.0f, 0.1f, 0.5f, -2.5f, 3e38f, INFINITY, -INFINITY})
+      v.push_back(bits(x));
     return v;
   }();
   return values;
 }
 
-/// Input `dimension` of sample `sample`: every pair of special values once, then random patterns, then ordinary numbers;
-/// a quarter of the third inputs is the rounded product of the first two, where a fused operation shows.
+/// Input `dimension` of sample `sample`: every pair of special values once, then random patterns, then
+/// ordinary numbers; a quarter of the third inputs is the rounded product of the first two, where a fused
+/// operation shows.
 Bits input(std::uint64_t sample, int dimension) {
   const auto& special = special_values();
   if (sample < special.size() * special.size() && dimension < 2)
@@ -176,10 +198,14 @@ Bits input(std::uint64_t sample, int dimension) {
 
 OperationTable operations(Isa isa, int width) {
   switch (isa) {
-    case Isa::scalar: return operations_scalar(width);
-    case Isa::sse: return operations_sse(width);
-    case Isa::avx2: return operations_avx2(width);
-    case Isa::avx512: return operations_avx512(width);
+    case Isa::scalar:
+      return operations_scalar(width);
+    case Isa::sse:
+      return operations_sse(width);
+    case Isa::avx2:
+      return operations_avx2(width);
+    case Isa::avx512:
+      return operations_avx512(width);
   }
   return {};
 }
@@ -214,8 +240,8 @@ TEST_CASE("every operation of simd/ agrees with plain C++, lane by lane") {
             const Lanes lanes{width, lane, &a[1], &b[1], &c[1], table.has_fma};
             if (agrees(operation.name, reference->second, lanes, out[lane + 1])) continue;
             ++failures;
-            UNSCOPED_INFO(std::hex << "lane " << lane << ": a " << lanes.a[lane] << " b " << lanes.b[lane] << " c "
-                                   << lanes.c[lane] << " gave " << out[lane + 1] << ", want "
+            UNSCOPED_INFO(std::hex << "lane " << lane << ": a " << lanes.a[lane] << " b " << lanes.b[lane]
+                                   << " c " << lanes.c[lane] << " gave " << out[lane + 1] << ", want "
                                    << reference->second.lane(lanes));
           }
         }
@@ -226,9 +252,15 @@ TEST_CASE("every operation of simd/ agrees with plain C++, lane by lane") {
 }
 
 TEST_CASE("NaN and ties give the second operand of min_x86 and max_x86, on every ISA") {
-  const Bits nan = 0x7fc00000u, other_nan = 0xffc12345u, one = bits(1.0f), zero = 0u, minus_zero = 0x80000000u;
-  const struct { Bits a, b, want; } cases[] = {{nan, one, one}, {one, nan, nan}, {nan, other_nan, other_nan},
-                                               {zero, minus_zero, minus_zero}, {minus_zero, zero, zero}};
+  const Bits nan = 0x7fc00000u, other_nan = 0xffc12345u, one = bits(1.0f), zero = 0u,
+             minus_zero = 0x80000000u;
+  const struct {
+    Bits a, b, want;
+  } cases[] = {{nan, one, one},
+               {one, nan, nan},
+               {nan, other_nan, other_nan},
+               {zero, minus_zero, minus_zero},
+               {minus_zero, zero, zero}};
   for (Isa isa : available_isas()) {
     for (int width : {4, 8, 16}) {
       const OperationTable table = operations(isa, width);
@@ -251,7 +283,8 @@ TEST_CASE("the reference tells a fused operation from an unfused one") {
   // Otherwise the checks of madd and of -ffp-contract=off above could not fail.
   int different = 0;
   for (std::uint64_t sample = 0; sample < 6000; ++sample) {
-    const float a = as_float(input(sample, 0)), b = as_float(input(sample, 1)), c = as_float(input(sample, 2));
+    const float a = as_float(input(sample, 0)), b = as_float(input(sample, 1)),
+                c = as_float(input(sample, 2));
     volatile float product = a * b;
     different += std::isfinite(a * b) && std::fma(a, b, -c) != product - c;
   }

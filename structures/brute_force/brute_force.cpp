@@ -15,7 +15,8 @@ const StructureInfo& BruteForce::static_info() {
     i.summary = "every ray tests every triangle: the reference, for small scenes";
     i.builders = {"in_order"};
     i.uses_parameters = false;
-    for_each_type(Blocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    for_each_type(Blocks{},
+                  [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
     return i;
   }();
   return info;
@@ -23,10 +24,13 @@ const StructureInfo& BruteForce::static_info() {
 
 void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport&) {
   if (settings.builder != info().builders.front()) {
-    throw UserError(unknown_name_message("builder of brute_force", settings.builder, std::vector<std::string>{"in_order"}));
+    throw UserError(unknown_name_message("builder of brute_force", settings.builder,
+                                         std::vector<std::string>{"in_order"}));
   }
-  constexpr std::size_t kMostTriangles = 0x7ffffffe;  // ids are compared as int32, and INT_MAX stands for none
-  if (mesh.size() > kMostTriangles) throw UserError("brute_force: the mesh has more than 2^31 - 2 triangles; split it");
+  constexpr std::size_t kMostTriangles =
+      0x7ffffffe;  // ids are compared as int32, and INT_MAX stands for none
+  if (mesh.size() > kMostTriangles)
+    throw UserError("brute_force: the mesh has more than 2^31 - 2 triangles; split it");
   bool known = false;
   for_each_type(Blocks{}, [&]<class Block>(std::type_identity<Block>) {
     if (settings.leaf != Block::kName) return;
@@ -39,13 +43,15 @@ void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, 
     auto* blocks = reinterpret_cast<Block*>(arena_.data());
     for (std::size_t b = 0; b < block_count_; ++b) {
       const std::size_t first = b * kWidth;
-      fill_block(blocks[b], int(std::min(kWidth, mesh.size() - first)), [&](int i) { return mesh.corners(first + i); },
-                 [&](int i) { return std::uint32_t(first + i); });
+      fill_block(
+          blocks[b], int(std::min(kWidth, mesh.size() - first)),
+          [&](int i) { return mesh.corners(first + i); }, [&](int i) { return std::uint32_t(first + i); });
     }
   });
   if (!known) {
-    throw UserError(unknown_name_message("leaf of brute_force", settings.leaf,
-                                         std::vector<std::string>(info().leaves.begin(), info().leaves.end())));
+    throw UserError(
+        unknown_name_message("leaf of brute_force", settings.leaf,
+                             std::vector<std::string>(info().leaves.begin(), info().leaves.end())));
   }
   triangles_ = mesh.size();
   bounds_ = mesh.bounds();
@@ -56,8 +62,12 @@ bool BruteForce::visit(StructureVisitor& visitor) const {
   if (triangles_ == 0) return true;
   std::vector<std::uint32_t> primitives(triangles_);
   std::iota(primitives.begin(), primitives.end(), 0u);
-  visitor.leaf({.bounds = bounds_, .primitives = primitives, .depth = 0, .blocks = unsigned(block_count_),
-                .block_width = block_width_, .bytes = arena_.bytes()});
+  visitor.leaf({.bounds = bounds_,
+                .primitives = primitives,
+                .depth = 0,
+                .blocks = unsigned(block_count_),
+                .block_width = block_width_,
+                .bytes = arena_.bytes()});
   return true;
 }
 

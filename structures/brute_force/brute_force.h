@@ -1,5 +1,6 @@
-// brute_force: no structure at all. One leaf holds every triangle, in the mesh's order, and every ray tests every block.
-// What the other structures are compared with: the same blocks and intersectors, so the same rounding, and no box test.
+// brute_force: no structure at all. One leaf holds every triangle, in the mesh's order, and every ray tests
+// every block. What the other structures are compared with: the same blocks and intersectors, so the same
+// rounding, and no box test.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +17,8 @@ namespace arboretum::brute_force {
 class BruteForce final : public Accel {
  public:
   static constexpr std::string_view kName = "brute_force";
-  using Blocks = TypeList<EdgeBlock<1>, EdgeBlock<4>, EdgeBlock<8>, EdgeBlock<16>, VertexBlock<1>, VertexBlock<4>,
-                          VertexBlock<8>, VertexBlock<16>>;
+  using Blocks = TypeList<EdgeBlock<1>, EdgeBlock<4>, EdgeBlock<8>, EdgeBlock<16>, VertexBlock<1>,
+                          VertexBlock<4>, VertexBlock<8>, VertexBlock<16>>;
 
   [[nodiscard]] static const StructureInfo& static_info();
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }

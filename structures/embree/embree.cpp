@@ -30,27 +30,27 @@ RTCBuildQuality quality_of(std::string_view builder) {
   return builder == "high" ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM;
 }
 
-/// Packet widths that a device runs natively: they tell SSE, AVX and AVX-512 apart after the fact. Embree falls back to
-/// SSE2 without a word when it is asked for a name that it does not know or was not built with.
+/// Packet widths that a device runs natively: they tell SSE, AVX and AVX-512 apart after the fact. Embree
+/// falls back to SSE2 without a word when it is asked for a name that it does not know or was not built with.
 bool device_runs(RTCDevice device, Isa isa) {
   const bool ray8 = rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
   const bool ray16 = rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0;
   return ray8 == (isa >= Isa::avx2) && ray16 == (isa == Isa::avx512);
 }
 
-/// Embree's own bound on the numbers of a ray (its FLT_LARGE). A build with assertions, such as Debian's, aborts on
-/// anything beyond it, NaN and infinities included.
+/// Embree's own bound on the numbers of a ray (its FLT_LARGE). A build with assertions, such as Debian's,
+/// aborts on anything beyond it, NaN and infinities included.
 constexpr float kLargest = 1.844e18f;
 
-/// Whether the ray may be handed to Embree: is_valid() in one pass, the bound, and some t >= 0, since a build with
-/// assertions aborts on tnear < 0 (to_embree() raises it to 0). False with a NaN anywhere.
+/// Whether the ray may be handed to Embree: is_valid() in one pass, the bound, and some t >= 0, since a build
+/// with assertions aborts on tnear < 0 (to_embree() raises it to 0). False with a NaN anywhere.
 inline bool accepts(const Ray& ray) noexcept {
   const auto in_range = [](Vec3f a) {
     return (std::abs(a.x) <= kLargest) & (std::abs(a.y) <= kLargest) & (std::abs(a.z) <= kLargest);
   };
   const Vec3f d = ray.direction;
-  return in_range(ray.origin) & in_range(d) & ((d.x != 0.0f) | (d.y != 0.0f) | (d.z != 0.0f)) & (ray.tnear <= ray.tfar) &
-         (ray.tfar >= 0.0f);
+  return in_range(ray.origin) & in_range(d) & ((d.x != 0.0f) | (d.y != 0.0f) | (d.z != 0.0f)) &
+         (ray.tnear <= ray.tfar) & (ray.tfar >= 0.0f);
 }
 
 inline RTCRay to_embree(const Ray& ray) noexcept {
@@ -77,10 +77,16 @@ const StructureInfo& EmbreeAccel::static_info() {
   return info;
 }
 
-void EmbreeAccel::DeviceRelease::operator()(RTCDeviceTy* device) const noexcept { rtcReleaseDevice(device); }
-void EmbreeAccel::SceneRelease::operator()(RTCSceneTy* scene) const noexcept { rtcReleaseScene(scene); }
+void EmbreeAccel::DeviceRelease::operator()(RTCDeviceTy* device) const noexcept {
+  rtcReleaseDevice(device);
+}
+void EmbreeAccel::SceneRelease::operator()(RTCSceneTy* scene) const noexcept {
+  rtcReleaseScene(scene);
+}
 
-EmbreeAccel::~EmbreeAccel() { release(); }
+EmbreeAccel::~EmbreeAccel() {
+  release();
+}
 
 void EmbreeAccel::release() noexcept {
   scene_.reset();
@@ -102,7 +108,8 @@ bool EmbreeAccel::on_memory(void* self, std::ptrdiff_t bytes, bool) {
 void EmbreeAccel::check(std::string_view what) const {
   const RTCError error = rtcGetDeviceError(device_.get());
   if (error == RTC_ERROR_NONE) return;
-  if (error == RTC_ERROR_OUT_OF_MEMORY) throw UserError("embree: out of memory in " + std::string(what) + "; take a smaller scene");
+  if (error == RTC_ERROR_OUT_OF_MEMORY)
+    throw UserError("embree: out of memory in " + std::string(what) + "; take a smaller scene");
   throw std::runtime_error("embree: error " + std::to_string(int(error)) + " in " + std::string(what));
 }
 
@@ -110,12 +117,15 @@ void EmbreeAccel::open_device(Isa isa) {
   if (isa == Isa::scalar) throw UserError("embree has no scalar kernels; use isa sse, avx2 or avx512");
   if (!cpu_supports(isa)) throw UserError("embree: this machine has no " + std::string(to_string(isa)));
   const std::string name = isa == Isa::sse ? "sse4.2" : std::string(to_string(isa));
-  // No threads=N: Embree makes that a limit of the whole process while the device lives (tbb::global_control), so our
-  // builders would run on its threads too. The build runs in an arena of N threads instead; see build().
+  // No threads=N: Embree makes that a limit of the whole process while the device lives
+  // (tbb::global_control), so our builders would run on its threads too. The build runs in an arena of N
+  // threads instead; see build().
   device_.reset(rtcNewDevice(("isa=" + name + ",set_affinity=0").c_str()));
-  if (!device_) throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
+  if (!device_)
+    throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
   if (!device_runs(device_.get(), isa)) {
-    throw UserError("embree: this libembree was built without " + name + "; leave out isa " + std::string(to_string(isa)));
+    throw UserError("embree: this libembree was built without " + name + "; leave out isa " +
+                    std::string(to_string(isa)));
   }
   // Behind a function pointer type: the API names it ssize_t, which is ptrdiff_t here.
   rtcSetDeviceMemoryMonitorFunction(device_.get(), &EmbreeAccel::on_memory, this);
@@ -137,13 +147,14 @@ void EmbreeAccel::build(const TriangleMesh& mesh, const BuildSettings& settings,
   if (!mesh.triangles.empty()) {
     const RTCGeometry geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
     const std::unique_ptr<RTCGeometryTy, void (*)(RTCGeometry)> owner(geometry, &rtcReleaseGeometry);
-    // `low` builds each geometry by itself, with the geometry's own quality: only both together give the Morton builder.
+    // `low` builds each geometry by itself, with the geometry's own quality: only both together give the
+    // Morton builder.
     rtcSetGeometryBuildQuality(geometry, quality);
     rtcSetGeometryMask(geometry, ~0u);
     const std::size_t vertices = mesh.vertices.size();
     if (mesh.vertices.capacity() > vertices) {
-      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices.data(), 0,
-                                 sizeof(Vec3f), vertices);
+      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices.data(),
+                                 0, sizeof(Vec3f), vertices);
     } else if (void* copy = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                     sizeof(Vec3f), vertices)) {
       std::copy(mesh.vertices.begin(), mesh.vertices.end(), static_cast<Vec3f*>(copy));
@@ -164,7 +175,8 @@ void EmbreeAccel::build(const TriangleMesh& mesh, const BuildSettings& settings,
 const EmbreeAccel& EmbreeAccel::expect(Isa isa, bool robust) const {
   if (isa_ == isa && robust_ == robust) return *this;
   throw std::logic_error("embree: a kernel of " + std::string(to_string(isa)) + (robust ? ", robust" : "") +
-                         " was called on a scene built for " + std::string(to_string(isa_)) + (robust_ ? ", robust" : ""));
+                         " was called on a scene built for " + std::string(to_string(isa_)) +
+                         (robust_ ? ", robust" : ""));
 }
 
 void EmbreeAccel::intersect_single(std::span<const Ray> rays, std::span<Hit> hits) const {
@@ -185,7 +197,8 @@ void EmbreeAccel::intersect_single(std::span<const Ray> rays, std::span<Hit> hit
 #else
     rtcIntersect1(scene, &query, nullptr);
 #endif
-    if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) hits[i] = {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID};
+    if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID)
+      hits[i] = {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID};
   }
 }
 

@@ -1,8 +1,10 @@
-// Embree (Intel's ray-tracing kernels, API 3.13; 4.x where that is installed) as a structure like the others: its own
-// builders and its own kernels behind Accel, so that a sweep holds our columns against it in the same run.
+// Embree (Intel's ray-tracing kernels, API 3.13; 4.x where that is installed) as a structure like the others:
+// its own builders and its own kernels behind Accel, so that a sweep holds our columns against it in the same
+// run.
 //
-// What differs from our own structures: ties at an equal t are not broken by the lowest id, nothing can be looked into
-// (visit() is false), and the instruction set belongs to the built scene, not to the kernel that is called.
+// What differs from our own structures: ties at an equal t are not broken by the lowest id, nothing can be
+// looked into (visit() is false), and the instruction set belongs to the built scene, not to the kernel that
+// is called.
 #pragma once
 
 #include <atomic>
@@ -33,13 +35,13 @@ class EmbreeAccel final : public Accel {
   [[nodiscard]] static const StructureInfo& static_info();
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
   /// Builders `low` (Morton codes), `medium` (binned SAH), `high` (spatial splits): RTC_BUILD_QUALITY_*. Leaf
-  /// `triangle4` is Embree's default scene, `triangle4v` its robust one (RTC_SCENE_FLAG_ROBUST: Pluecker test, widened
-  /// boxes). Builds and traces with settings.isa (scalar: UserError, Embree has no such kernels) on settings.threads.
-  /// BuilderParameters are ours and do not concern Embree.
+  /// `triangle4` is Embree's default scene, `triangle4v` its robust one (RTC_SCENE_FLAG_ROBUST: Pluecker
+  /// test, widened boxes). Builds and traces with settings.isa (scalar: UserError, Embree has no such
+  /// kernels) on settings.threads. BuilderParameters are ours and do not concern Embree.
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   [[nodiscard]] bool visit(StructureVisitor&) const override { return false; }
-  /// What Embree's memory monitor counts for the scene: nodes, leaves, and a copy of the vertices where the mesh's own
-  /// array leaves too little room behind the last one (Embree reads 16 bytes a vertex).
+  /// What Embree's memory monitor counts for the scene: nodes, leaves, and a copy of the vertices where the
+  /// mesh's own array leaves too little room behind the last one (Embree reads 16 bytes a vertex).
   [[nodiscard]] std::size_t bytes() const noexcept override { return bytes_.load(std::memory_order_relaxed); }
 
   /// The instruction set of the device that was built for.
@@ -47,18 +49,23 @@ class EmbreeAccel final : public Accel {
   /// Whether the scene is built robust (leaf triangle4v).
   [[nodiscard]] bool robust() const noexcept { return robust_; }
 
-  /// This scene. Throws std::logic_error when it was built for another instruction set or with the other robustness:
-  /// its numbers would then stand under a wrong name.
+  /// This scene. Throws std::logic_error when it was built for another instruction set or with the other
+  /// robustness: its numbers would then stand under a wrong name.
   [[nodiscard]] const EmbreeAccel& expect(Isa isa, bool robust) const;
 
-  /// rtcIntersect1 / rtcOccluded1 for each ray; the conversion from Ray and to Hit is inside. A ray that is not valid, or
-  /// has an origin or direction beyond 1.8e18, which Embree does not take, misses without a call.
+  /// rtcIntersect1 / rtcOccluded1 for each ray; the conversion from Ray and to Hit is inside. A ray that is
+  /// not valid, or has an origin or direction beyond 1.8e18, which Embree does not take, misses without a
+  /// call.
   void intersect_single(std::span<const Ray> rays, std::span<Hit> hits) const;
   void occluded_single(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const;
 
  private:
-  struct DeviceRelease { void operator()(RTCDeviceTy* device) const noexcept; };
-  struct SceneRelease { void operator()(RTCSceneTy* scene) const noexcept; };
+  struct DeviceRelease {
+    void operator()(RTCDeviceTy* device) const noexcept;
+  };
+  struct SceneRelease {
+    void operator()(RTCSceneTy* scene) const noexcept;
+  };
 
   void release() noexcept;
   void open_device(Isa isa);

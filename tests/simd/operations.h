@@ -5,7 +5,8 @@
 
 namespace arboretum::simd_test {
 
-/// Reads W patterns of each input, writes W patterns. Floats and ints are passed by their bits, masks as 0 or 1 a lane.
+/// Reads W patterns of each input, writes W patterns. Floats and ints are passed by their bits, masks as 0 or
+/// 1 a lane.
 struct Operation {
   const char* name;
   void (*run)(const std::uint32_t* a, const std::uint32_t* b, const std::uint32_t* c, std::uint32_t* out);
@@ -17,7 +18,8 @@ struct OperationTable {
   bool has_fma;
 };
 
-/// One function an ISA; `width` is 4, 8 or 16. Only call it, and what it gives, where the machine has the ISA.
+/// One function an ISA; `width` is 4, 8 or 16. Only call it, and what it gives, where the machine has the
+/// ISA.
 OperationTable operations_scalar(int width);
 OperationTable operations_sse(int width);
 OperationTable operations_avx2(int width);

@@ -9,18 +9,35 @@ namespace test {
 
 using Bits = std::uint32_t;
 
-template <int W> ARBORETUM_INLINE vf<W> f(const Bits* p) { return vf<W>::load(p); }
-template <int W> ARBORETUM_INLINE vi<W> n(const Bits* p) { return vi<W>::load(p); }
+template <int W>
+ARBORETUM_INLINE vf<W> f(const Bits* p) {
+  return vf<W>::load(p);
+}
+template <int W>
+ARBORETUM_INLINE vi<W> n(const Bits* p) {
+  return vi<W>::load(p);
+}
 /// A mask of the lowest bits of W patterns.
-template <int W> ARBORETUM_INLINE vm<W> m(const Bits* p) { return (vi<W>::load(p) & vi<W>(1)) == vi<W>(1); }
-template <int W> ARBORETUM_INLINE void put(vf<W> x, Bits* out) { x.store(out); }
-template <int W> ARBORETUM_INLINE void put(vi<W> x, Bits* out) { x.store(out); }
-template <int W> ARBORETUM_INLINE void put(vm<W> x, Bits* out) {
+template <int W>
+ARBORETUM_INLINE vm<W> m(const Bits* p) {
+  return (vi<W>::load(p) & vi<W>(1)) == vi<W>(1);
+}
+template <int W>
+ARBORETUM_INLINE void put(vf<W> x, Bits* out) {
+  x.store(out);
+}
+template <int W>
+ARBORETUM_INLINE void put(vi<W> x, Bits* out) {
+  x.store(out);
+}
+template <int W>
+ARBORETUM_INLINE void put(vm<W> x, Bits* out) {
   for (int i = 0; i < W; ++i) out[i] = x.bits() >> i & 1u;
 }
 
 // Plain C++ in a kernel unit: must not be contracted either.
-template <int W> inline void scalar_mul_sub(const Bits* a, const Bits* b, const Bits* c, Bits* out) {
+template <int W>
+inline void scalar_mul_sub(const Bits* a, const Bits* b, const Bits* c, Bits* out) {
   for (int i = 0; i < W; ++i) {
     float x, y, z;
     std::memcpy(&x, a + i, 4), std::memcpy(&y, b + i, 4), std::memcpy(&z, c + i, 4);
@@ -29,11 +46,13 @@ template <int W> inline void scalar_mul_sub(const Bits* a, const Bits* b, const 
   }
 }
 
-#define OP(name, expression)                                                                              \
-  {name, [](const Bits* a, const Bits* b, const Bits* c, Bits* out) {                                     \
-     (void)a, (void)b, (void)c;                                                                           \
-     put<W>(expression, out);                                                                             \
-   }}
+#define OP(name, expression)                                           \
+  {                                                                    \
+    name, [](const Bits* a, const Bits* b, const Bits* c, Bits* out) { \
+      (void)a, (void)b, (void)c;                                       \
+      put<W>(expression, out);                                         \
+    }                                                                  \
+  }
 
 template <int W>
 inline constexpr simd_test::Operation kOperations[] = {
