@@ -4,8 +4,13 @@
 // Every vertex is translated, permuted and sheared once per (ray, vertex), alike in all triangles that share it, so the
 // rounded 2-D mesh stays closed; rounding is monotone, so an exact Cx*By > Cy*Bx is never computed as <, and a tie is
 // inside on both sides. No contraction can break it (comparisons do not fuse); the shear may fuse, being one expression
-// for every vertex. Only where all three edges tie (det 0) the float test cannot tell, and double products, exact for
-// float inputs, decide, as in the paper.
+// for every vertex. A tie may be rounding alone, and then a triangle far beside the ray would be taken for hit (small
+// triangles seen from a great distance): in lanes that pass with a tie, double products, exact for float inputs, decide,
+// as in the paper.
+//
+// t is a mean of the vertices' depths, so its error grows with their distance, not with t: beside a large triangle a ray
+// that starts on it could meet it again. Where t is within 2^-10 of the vertices' depth from tnear it is computed again
+// from the triangle's plane, in double.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -20,8 +25,9 @@ struct Watertight {
   /// kz: the axis along which the direction is largest. Shear constants dx/dz, dy/dz, 1/dz of the permuted direction.
   struct RayData {
     float ox, oy, oz, sx, sy, sz;
+    float dx, dy, dz, tnear;
     int kx, ky, kz;
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) {
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) : tnear(ray.tnear) {
       const float ax = __builtin_fabsf(ray.direction.x), ay = __builtin_fabsf(ray.direction.y), az = __builtin_fabsf(ray.direction.z);
       kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
       kx = kz == 2 ? 0 : kz + 1;
@@ -29,7 +35,8 @@ struct Watertight {
       const float* o = &ray.origin.x;
       const float* d = &ray.direction.x;
       ox = o[kx], oy = o[ky], oz = o[kz];
-      sx = d[kx] / d[kz], sy = d[ky] / d[kz], sz = 1.0f / d[kz];
+      dx = d[kx], dy = d[ky], dz = d[kz];
+      sx = dx / dz, sy = dy / dz, sz = 1.0f / dz;
     }
   };
 
@@ -50,11 +57,14 @@ struct Watertight {
       const F sz(ray.sz);
       hits.t = (u * (sz * az) + v * (sz * bz) + w * (sz * cz)) / det;
       hits.u_numerator = v, hits.v_numerator = w, hits.denominator = det;
-      const vm<W> undecided = inside & (det == F(0.0f));
+      const vm<W> undecided = inside & ((u == F(0.0f)) | (v == F(0.0f)) | (w == F(0.0f)));
       if (__builtin_expect(any(undecided), 0)) {
         inside = inside & ~undecided;
         inside = inside | decide_in_double<W>(undecided, ray.sz, {ax, ay, az}, {bx, by, bz}, {cx, cy, cz}, hits);
       }
+      const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz)) * abs(sz);
+      const vm<W> near = inside & (abs(hits.t - F(ray.tnear)) <= F(0x1p-10f) * depth);
+      if (__builtin_expect(any(near), 0)) plane_distance_in_double(near, ray, block, hits);
     }
     return inside;
   }
@@ -83,6 +93,29 @@ struct Watertight {
     }
     hits = {vf<W>::load(out[0]), vf<W>::load(out[1]), vf<W>::load(out[2]), vf<W>::load(out[3])};
     return vm<W>::from_bits(hit);
+  }
+
+  /// Sets t of `lanes` to N.(a - o) / N.d, computed in double.
+  template <class Block>
+  static __attribute__((noinline)) void plane_distance_in_double(vm<Block::kWidth> lanes, const RayData& ray, const Block& block,
+                                                                 TriangleHits<Block::kWidth>& hits) {
+    constexpr int W = Block::kWidth;
+    float t[W];
+    hits.t.store(t);
+    const int k[3] = {ray.kx, ray.ky, ray.kz};
+    const double o[3] = {ray.ox, ray.oy, ray.oz}, d[3] = {ray.dx, ray.dy, ray.dz};
+    for (unsigned rest = lanes.bits(); rest; rest &= rest - 1) {
+      const int i = __builtin_ctz(rest);
+      double a[3], e1[3], e2[3];
+      for (int j = 0; j < 3; ++j) {
+        const double v0 = block.v0[k[j]][i];
+        a[j] = v0 - o[j], e1[j] = block.v1[k[j]][i] - v0, e2[j] = block.v2[k[j]][i] - v0;
+      }
+      const double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
+      const double along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
+      if (along != 0) t[i] = float((n[0] * a[0] + n[1] * a[1] + n[2] * a[2]) / along);
+    }
+    hits.t = vf<W>::load(t);
   }
 };
 

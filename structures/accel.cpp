@@ -44,6 +44,12 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   check("builder", settings.builder, entry->info.builders);
   check("leaf", settings.leaf, entry->info.leaves);
 
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    for (const Vec3f& p : mesh.corners(i)) {
+      if (!is_finite(p)) throw UserError("triangle " + std::to_string(i) + " has a vertex that is not finite; drop such triangles first, as load_scene() does");
+    }
+  }
+
   std::unique_ptr<Accel> accel = entry->create();
   report = {};
   const unsigned threads = settings.threads < 1 ? 1 : settings.threads;

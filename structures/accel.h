@@ -105,7 +105,8 @@ struct StructureEntry {
 [[nodiscard]] std::span<const StructureEntry> all_structures();
 /// nullptr where there is none of that name.
 [[nodiscard]] const StructureEntry* find_structure(std::string_view name);
-/// Creates and builds, filling in the report's seconds and peak.
+/// Creates and builds, filling in the report's seconds and peak. Throws UserError for a name or setting that is not one of
+/// the structure's, and for a triangle with a vertex that is not finite (looked for before the clock starts).
 [[nodiscard]] std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh,
                                                      const BuildSettings& settings, BuildReport& report);
 

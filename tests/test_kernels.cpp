@@ -41,13 +41,6 @@ std::vector<Ray> keep_clear(const TriangleMesh& mesh, const std::vector<Ray>& ra
   return kept;
 }
 
-/// Known limit: seen from 1e6 away the rounded edge products of small triangles tie, and the watertight test
-/// takes such triangles for hit however far beside the ray they lie. Boxes rule them out; brute force does
-/// not.
-bool takes_ties_for_hits(const KernelScene& scene, const KernelRow& row) {
-  return scene.name == "two scales" && row.intersector == "watertight";
-}
-
 }  // namespace
 
 TEST_CASE("every kernel finds the exact primitive on generic rays, and t to within rounding") {
@@ -67,10 +60,6 @@ TEST_CASE("every kernel finds the exact primitive on generic rays, and t to with
       INFO(scene.name << ": " << name_of(row));
       const Accel& accel = structures.get(row);
       const std::vector<Hit> hits = closest_hit(row, accel, rays);
-      if (takes_ties_for_hits(scene, row) && row.structure == "brute_force") {
-        CHECK(any_hit(row, accel, rays) != any_truth);
-        continue;
-      }
       REQUIRE(any_hit(row, accel, rays) == any_truth);
       for (std::size_t i = 0; i < rays.size(); ++i) {
         INFO("ray " << i << ": t " << hits[i].t << ", primitive " << hits[i].primitive << "; exactly t "
@@ -144,9 +133,7 @@ TEST_CASE("any hit, the counting kernels and batches of any size agree with clos
   }
 }
 
-// With fused boxes bit for bit. Without FMA only the far planes are padded, so a tie, or a triangle an ulp
-// nearer, can be culled: there t agrees to 16 ulp, and the primitive may be the other one.
-TEST_CASE("with padded boxes every structure gives the brute force's answers") {
+TEST_CASE("with padded boxes every structure gives the brute force's answers, bit for bit") {
   for (const KernelScene& scene : kernel_scenes()) {
     std::vector<Ray> rays = generic_rays(scene.mesh, 150, 21);
     const Bounds3f box = scene.mesh.bounds();
@@ -161,10 +148,9 @@ TEST_CASE("with padded boxes every structure gives the brute force's answers") {
       const KernelRow* reference =
           find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
       if (!reference) continue;
-      const bool fused = row.isa >= Isa::avx2;
-      // Seen from 1e6 away a float test is wrong by more than a small triangle and by more than any pad of
-      // its box.
-      if (scene.name == "two scales") continue;
+      // Seen from 1e6 away these tests are wrong by more than a small triangle, and by more than its box is
+      // padded.
+      if (scene.name == "two scales" && row.intersector != "watertight") continue;
       INFO(scene.name << ": " << name_of(row));
       ++compared;
       const std::vector<Hit> want = closest_hit(*reference, structures.get(*reference), rays);
@@ -172,15 +158,10 @@ TEST_CASE("with padded boxes every structure gives the brute force's answers") {
       for (std::size_t i = 0; i < rays.size(); ++i) {
         INFO("ray " << i << ": t " << got[i].t << ", primitive " << got[i].primitive << "; brute force: t "
                     << want[i].t << ", primitive " << want[i].primitive);
-        if (fused) {
-          REQUIRE(same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)));
-        } else {
-          REQUIRE(got[i].is_hit() == want[i].is_hit());
-          if (got[i].is_hit()) REQUIRE(std::abs(got[i].t - want[i].t) <= 0x1p-20f * want[i].t);
-        }
+        REQUIRE(same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)));
       }
     }
-    CHECK((compared >= 8 || scene.name == "two scales"));
+    CHECK(compared >= 8);
   }
 }
 

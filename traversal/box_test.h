@@ -10,8 +10,12 @@
 // 2^-60 of the largest gets r = 2^60 / |d|max: the ray moves by less than the pad along that axis wherever it can meet the
 // scene, and e alone is then larger than any such t.
 //
-// Without FMA (scalar, SSE) t = (plane - o) * r with r = 1/d, infinite for 0; padded: Ize (JCGT 2(2) 2013), r of the far planes
-// two ulp larger. 0 * inf is NaN there; min_x86 and max_x86 keep their second operand, the running value, and so ignore it.
+// Without FMA (scalar, SSE) t = (plane - o) * r with r = 1/d, infinite for 0; padded: the origin of the near planes is moved
+// by e = 2^-21 (M + |o|) along the direction, that of the far planes against it (as Woop, Benthin, Wald 2013 do), so both ends
+// of the interval are padded for the cost of none. Proof: the moved origin, the difference and the two factors round by less
+// than 4 u (M + |o| + e)|r| together, which is under e |r|. (Ize's pad, JCGT 2(2) 2013, widens the far end alone: no box is
+// missed, but one whose triangle is an ulp nearer than the best hit can be culled.) 0 * inf is NaN in the fast test;
+// min_x86 and max_x86 keep their second operand, the running value, and so ignore it.
 //
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once
@@ -28,8 +32,8 @@ struct BoxRay {
   static constexpr unsigned kSide = N * sizeof(float);
 
   float rx, ry, rz;
-  float fx, fy, fz;  ///< o * r of the near planes (FMA), or the reciprocals of the far planes (no FMA)
-  float gx, gy, gz;  ///< o * r of the far planes (FMA), or the origin (no FMA)
+  float fx, fy, fz;  ///< for the near planes: o * r (FMA) or the origin (no FMA), padded
+  float gx, gy, gz;  ///< the same for the far planes
   unsigned near_x, near_y, near_z;
 
   ARBORETUM_INLINE BoxRay(const Ray& ray, float max_coordinate) {
@@ -47,9 +51,12 @@ struct BoxRay {
       }
     } else {
       rx = 1.0f / d.x, ry = 1.0f / d.y, rz = 1.0f / d.z;
-      constexpr float kTwoUlp = Padded ? 1.0f + 0x1p-22f : 1.0f;
-      fx = rx * kTwoUlp, fy = ry * kTwoUlp, fz = rz * kTwoUlp;
-      gx = o.x, gy = o.y, gz = o.z;
+      fx = gx = o.x, fy = gy = o.y, fz = gz = o.z;
+      if constexpr (Padded) {
+        const float ex = shift(o.x, rx, max_coordinate), ey = shift(o.y, ry, max_coordinate), ez = shift(o.z, rz, max_coordinate);
+        fx += ex, fy += ey, fz += ez;
+        gx -= ex, gy -= ey, gz -= ez;
+      }
     }
     near_x = __builtin_signbit(rx) ? kSide : 0u;
     near_y = 2 * kSide + (__builtin_signbit(ry) ? kSide : 0u);
@@ -64,6 +71,9 @@ struct BoxRay {
   }
   static ARBORETUM_INLINE float reciprocal(float d, float tiny, float limit) {
     return __builtin_fabsf(d) > tiny ? 1.0f / d : __builtin_copysignf(limit, d);
+  }
+  static ARBORETUM_INLINE float shift(float o, float r, float max_coordinate) {
+    return __builtin_copysignf(0x1p-21f * (max_coordinate + __builtin_fabsf(o)) + 0x1p-100f, r);
   }
   static ARBORETUM_INLINE float pad(float o, float r, float max_coordinate) {
     return 0x1p-21f * (max_coordinate + __builtin_fabsf(o)) * __builtin_fabsf(r) + 0x1p-100f;
@@ -92,8 +102,8 @@ struct BoxLanes {
       const F hx = Padded ? gx : fx, hy = Padded ? gy : fy, hz = Padded ? gz : fz;
       lx = msub(planes(near_x ^ kSide), rx, hx), ly = msub(planes(far(near_y, 2)), ry, hy), lz = msub(planes(far(near_z, 4)), rz, hz);
     } else {
-      nx = (planes(near_x) - gx) * rx, ny = (planes(near_y) - gy) * ry, nz = (planes(near_z) - gz) * rz;
-      lx = (planes(near_x ^ kSide) - gx) * fx, ly = (planes(far(near_y, 2)) - gy) * fy, lz = (planes(far(near_z, 4)) - gz) * fz;
+      nx = (planes(near_x) - fx) * rx, ny = (planes(near_y) - fy) * ry, nz = (planes(near_z) - fz) * rz;
+      lx = (planes(near_x ^ kSide) - gx) * rx, ly = (planes(far(near_y, 2)) - gy) * ry, lz = (planes(far(near_z, 4)) - gz) * rz;
     }
     // Two levels instead of three. A NaN may take a neighbour's bound with it: the interval only grows.
     entry = max_x86(max_x86(nx, ny), max_x86(nz, tnear));

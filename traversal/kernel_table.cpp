@@ -83,9 +83,11 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   if (!any_row(structure, leaf, intersector, "", traversal, &isa)) {
     std::string others;
     for (const KernelRow& r : kernel_table()) {
+      std::string other = " ";
+      other.append(r.leaf).append(",");
       if (r.structure == structure && r.intersector == intersector && r.traversal == traversal && r.isa == isa &&
-          others.find(" " + std::string(r.leaf) + ",") == std::string::npos) {
-        others += " " + std::string(r.leaf) + ",";
+          others.find(other) == std::string::npos) {
+        others += other;
       }
     }
     others.pop_back();
