@@ -34,7 +34,7 @@ void brute_force_closest_hit(const Accel& structure, std::span<const Ray> rays, 
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Ray& ray = rays[i];
     NearestHit best{ray.tfar};
-    if (is_valid(ray)) {
+    if (is_valid_in_lanes(ray)) {
       const typename Intersector::RayData data(ray);
       for (std::size_t b = 0; b < blocks.size(); ++b)
         closest_hit_block<Intersector>(data, blocks[b], ray.tnear, best);
@@ -56,7 +56,7 @@ void brute_force_any_hit(const Accel& structure, std::span<const Ray> rays, std:
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Ray& ray = rays[i];
     occluded[i] = 0;
-    if (!is_valid(ray)) continue;
+    if (!is_valid_in_lanes(ray)) continue;
     const typename Intersector::RayData data(ray);
     std::size_t b = 0;
     for (; b < blocks.size() && !occluded[i]; ++b)

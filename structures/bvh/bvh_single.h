@@ -167,7 +167,7 @@ void bvh_closest_hit(const Accel& accel, std::span<const Ray> rays, std::span<Hi
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Ray& ray = rays[i];
     NearestHit best{ray.tfar};
-    if (is_valid(ray)) SingleRay<N, Block, Intersector, Padded, Counting>::template trace<false>(base, root, max_coordinate, stack.data(), ray, best, counting);
+    if (is_valid_in_lanes(ray)) SingleRay<N, Block, Intersector, Padded, Counting>::template trace<false>(base, root, max_coordinate, stack.data(), ray, best, counting);
     const bool hit = best.primitive != NearestHit::kNone;
     hits[i] = Hit{hit ? best.t : std::numeric_limits<float>::infinity(), best.u, best.v, hit ? std::uint32_t(best.primitive) : kNoPrimitive};
   }
@@ -185,7 +185,7 @@ void bvh_any_hit(const Accel& accel, std::span<const Ray> rays, std::span<std::u
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Ray& ray = rays[i];
     NearestHit best{ray.tfar};
-    occluded[i] = is_valid(ray) && SingleRay<N, Block, Intersector, Padded, Counting>::template trace<true>(base, root, max_coordinate, stack.data(), ray, best, counting);
+    occluded[i] = is_valid_in_lanes(ray) && SingleRay<N, Block, Intersector, Padded, Counting>::template trace<true>(base, root, max_coordinate, stack.data(), ray, best, counting);
   }
   if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
 }
