@@ -27,6 +27,7 @@ static_assert(sizeof(BinaryNode) == 32);
 /// are consecutive in `primitives`; `first` gives where a leaf's begin.
 struct BinaryTree {
   MeteredVector<BinaryNode> nodes;
+  std::size_t node_count = 0;  ///< indices below this are in use, but for gaps
   MeteredVector<std::uint32_t> primitives;
   MeteredVector<std::uint32_t> first;  ///< one a node; set for leaves
 

@@ -26,10 +26,13 @@ class BinnedSah {
       start = now;
     };
     references_[0].resize(n), references_[1].resize(n);
-    tree_.nodes.resize(n > 0 ? 2 * n : 1), tree_.first.resize(tree_.nodes.size()), tree_.primitives.resize(n);
+    // Fewer than n / kParallel + 1 pools (both sides of a split into tasks are larger than that) leave a block unfinished each.
+    tree_.nodes.resize(2 * n + (n / kParallel + 2) * kNodeBlock), tree_.first.resize(tree_.nodes.size()), tree_.primitives.resize(n);
     const Range root = make_references(n);
     phase("references");
-    recurse(root, 0);
+    NodePool pool;
+    recurse(root, 0, pool);
+    tree_.node_count = next_node_.load();
     phase("splits");
   }
 
@@ -54,6 +57,7 @@ class BinnedSah {
   static constexpr unsigned kMaxBins = 64;
   static constexpr std::size_t kChunk = 1u << 14;     ///< references a task takes at a time
   static constexpr std::size_t kParallel = 1u << 12;  ///< smaller subtrees are built by one task
+  static constexpr std::uint32_t kNodeBlock = 256;
 
   /// Bins of the three axes, twice over: consecutive references go to different sets, so that a read after a write to the
   /// same bin does not wait.
@@ -375,9 +379,23 @@ class BinnedSah {
     }
   }
 
-  /// The children of a split at `m` stand at 2m - 1 and 2m: every position is split at most once, so no counter is needed
-  /// and the tree's numbering is the same for any number of threads.
-  void recurse(const Range& range, std::uint32_t index) {
+  /// Node indices that one task may give out.
+  struct NodePool {
+    std::uint32_t next = 0, end = 0;
+  };
+
+  /// Two neighbouring nodes. Tasks take indices in blocks, so that a task's nodes lie together and the array's used part stays
+  /// dense; numbers depend on scheduling, the tree does not.
+  std::uint32_t take_pair(NodePool& pool) {
+    if (pool.next + 2 > pool.end) {
+      pool.next = next_node_.fetch_add(kNodeBlock, std::memory_order_relaxed);
+      pool.end = pool.next + kNodeBlock;
+    }
+    pool.next += 2;
+    return pool.next - 2;
+  }
+
+  void recurse(const Range& range, std::uint32_t index, NodePool& pool) {
     if (range.size() <= leaf_width_) return make_leaf(index, range);
     Range left, right;
     if (range.size() > 4 * kChunk) {
@@ -385,13 +403,18 @@ class BinnedSah {
     } else {
       split_small(range, left, right);
     }
-    const std::uint32_t first = std::uint32_t(2 * right.begin - 1);
+    const std::uint32_t first = take_pair(pool);
     make_node(index, range, first);
-    if (range.size() > kParallel) {
-      tbb::parallel_invoke([&] { recurse(left, first); }, [&] { recurse(right, first + 1); });
+    if (left.size() > kParallel && right.size() > kParallel) {
+      tbb::parallel_invoke(
+          [&] {
+            NodePool own;
+            recurse(left, first, own);
+          },
+          [&] { recurse(right, first + 1, pool); });
     } else {
-      recurse(left, first);
-      recurse(right, first + 1);
+      recurse(left, first, pool);
+      recurse(right, first + 1, pool);
     }
   }
 
@@ -400,6 +423,7 @@ class BinnedSah {
   const unsigned leaf_width_;
   BinaryTree& tree_;
   MeteredVector<Reference> references_[2];
+  std::atomic<std::uint32_t> next_node_{1};  // 0 is the root
 };
 
 inline void build_binned_sah(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report) {

@@ -1,5 +1,6 @@
 // One translation unit of the builders for one ISA; the stub defines ARBORETUM_TARGET.
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cstring>
 #include <limits>

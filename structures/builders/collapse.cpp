@@ -18,10 +18,10 @@ struct Collapse::Costs {
 };
 
 Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : tree_(tree), settings_(settings) {
-  plan_.resize(tree.nodes.size());
+  plan_.resize(tree.node_count);
   if (tree.primitives.empty()) return;
   if (settings_.optimal) {
-    choice_.resize(tree.nodes.size() * settings_.branching);
+    choice_.resize(tree.node_count * settings_.branching);
     Costs root;
     optimise(0, root);
   } else {
