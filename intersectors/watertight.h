@@ -9,9 +9,11 @@
 // as in the paper.
 //
 // t is a mean of the vertices' depths, so its error grows with their distance, not with t: beside a large triangle a ray
-// that starts on it could meet it again. With L = max |x|, |y| and Z = max |z| of the sheared vertices, the edge functions
-// are off by less than 12.5 u L (Z + L) (docs/numerics.md), t by less than some 100 u Z |1/dz| L (Z + L) / |det|; in tests by no more than a third
-// of it. Where t is nearer to tnear than 64 u of that, it is computed again from the triangle's plane, in double.
+// that starts on it could meet it again. With L = max |x|, |y| and Z = max |z| of the sheared vertices, t is off by less than
+// some 164 u Z |1/dz| L (Z + L) / |det| (the edge functions by 12.5 u L (Z + L)); in tests by no more than a third of that.
+// Where 64 u of it could turn t across tnear, and where t is below 2^-10 of the depth, so that t itself would be inaccurate,
+// t is computed again from the triangle's plane, in double. What lies clearly before tnear, as the triangle that a ray has just
+// left, is not.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -65,7 +67,9 @@ struct Watertight {
       }
       const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz));
       const F width = max_x86(max_x86(max_x86(abs(ax), abs(ay)), max_x86(abs(bx), abs(by))), max_x86(abs(cx), abs(cy)));
-      const vm<W> near = inside & (abs(hits.t - F(ray.tnear)) * abs(det) <= (F(0x1p-18f * __builtin_fabsf(ray.sz)) * depth) * (width * (depth + width)));
+      const F reach = depth * F(__builtin_fabsf(ray.sz));
+      const F beyond = (hits.t - F(ray.tnear)) * abs(det), error = F(0x1p-18f) * reach * (width * (depth + width));
+      const vm<W> near = inside & (beyond >= -error) & ((hits.t <= F(0x1p-10f) * reach) | (beyond <= error));
       if (__builtin_expect(any(near), 0)) plane_distance_in_double(near, ray, block, hits);
     }
     return inside;
