@@ -65,7 +65,6 @@ constexpr KnownLimit kKnownLimits[] = {
      "ray in the common edge's plane, through sheer triangles: t is rounding noise"},
     {"H01", "moller_trumbore", "wrong_surface", any, kBeyondRange},
     {"H01", "pluecker", "wrong_surface", any, kBeyondRange},
-    {"H01", "watertight", "wrong_surface", any, kBeyondRange},
     {"H02", "moller_trumbore", "missed", any, kBeyondRange},
     {"H02", "pluecker", "missed", any, kBeyondRange},
     {"H04", "moller_trumbore", "missed", any, kBeyondRange},
