@@ -24,6 +24,11 @@ struct NearestHit {
   std::int32_t primitive = kNone;
 };
 
+/// What a batch reports for a ray.
+ARBORETUM_INLINE Hit to_hit(const NearestHit& best) {
+  return best.primitive != NearestHit::kNone ? Hit{best.t, best.u, best.v, std::uint32_t(best.primitive)} : Hit{};
+}
+
 template <class Intersector, class Block>
 ARBORETUM_INLINE bool closest_hit_block(const typename Intersector::RayData& ray, const Block& block, float tnear, NearestHit& best) {
   constexpr int W = Block::kWidth;

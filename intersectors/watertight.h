@@ -11,8 +11,8 @@
 // t is a mean of the vertices' depths, so its error grows with their distance, not with t: beside a large triangle a ray
 // that starts on it could meet it again. With L = max |x|, |y| and Z = max |z| of the sheared vertices, t is off by less than
 // some 164 u Z |1/dz| L (Z + L) / |det| (the edge functions by 12.5 u L (Z + L)); in tests by no more than a third of that.
-// Where 64 u of it could turn t across tnear, and where t is below 2^-10 of the depth, so that t itself would be inaccurate,
-// t is computed again from the triangle's plane, in double. What lies clearly before tnear, as the triangle that a ray has just
+// Where that, with 64 u for 164 u, could turn t across tnear, and where t is below 2^-10 of the depth and so inaccurate
+// itself, t is computed again from the triangle's plane, in double. What lies clearly before tnear, as the triangle that a ray has just
 // left, is not.
 #pragma once
 

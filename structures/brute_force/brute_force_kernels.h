@@ -40,8 +40,7 @@ void brute_force_closest_hit(const Accel& structure, std::span<const Ray> rays, 
         closest_hit_block<Intersector>(data, blocks[b], ray.tnear, best);
       count_brute_force<Block>(accel, blocks.size(), counting);
     }
-    const bool hit = best.primitive != NearestHit::kNone;
-    hits[i] = hit ? Hit{best.t, best.u, best.v, std::uint32_t(best.primitive)} : Hit{};
+    hits[i] = to_hit(best);
   }
   if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
 }

@@ -168,8 +168,7 @@ void bvh_closest_hit(const Accel& accel, std::span<const Ray> rays, std::span<Hi
     const Ray& ray = rays[i];
     NearestHit best{ray.tfar};
     if (is_valid_in_lanes(ray)) SingleRay<N, Block, Intersector, Padded, Counting>::template trace<false>(base, root, max_coordinate, stack.data(), ray, best, counting);
-    const bool hit = best.primitive != NearestHit::kNone;
-    hits[i] = Hit{hit ? best.t : std::numeric_limits<float>::infinity(), best.u, best.v, hit ? std::uint32_t(best.primitive) : kNoPrimitive};
+    hits[i] = to_hit(best);
   }
   if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
 }
