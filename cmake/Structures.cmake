@@ -2,7 +2,7 @@
 # each structure and instruction set, and the list of those units (generated/kernel_units.h).
 #
 # Sets ARBORETUM_STRUCTURE_SOURCES (the folders' .cpp files), ARBORETUM_KERNEL_UNITS and ARBORETUM_BUILDER_UNITS.
-set(ARBORETUM_ISAS scalar sse avx2 avx512)
+set(ARBORETUM_ISAS "scalar;sse;avx2;avx512" CACHE STRING "Instruction sets to compile kernels for; fewer make a faster build while a kernel is written")
 set(generated ${PROJECT_BINARY_DIR}/generated)
 
 # Writes only what changed, so that a configure run rebuilds nothing.
@@ -85,7 +85,7 @@ inline void add_all_rows(KernelRows& rows) {
 ${calls}}
 }  // namespace arboretum
 ")
-foreach(isa IN LISTS ARBORETUM_ISAS)
+foreach(isa scalar sse avx2 avx512)
   string(TOUPPER ${isa} upper)
   set(unit ${generated}/builders/builders_${isa}.cpp)
   arboretum_write(${unit} "#define ARBORETUM_TARGET ARBORETUM_TARGET_${upper}\n#include \"structures/builders/builder_unit.h\"\n")

@@ -7,6 +7,8 @@
 
 #include <cstdint>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "core/vec3.h"
 
@@ -39,5 +41,18 @@ static_assert(sizeof(Hit) == 16);
   return is_finite(ray.origin) && is_finite(ray.direction) &&
          (ray.direction.x != 0.0f || ray.direction.y != 0.0f || ray.direction.z != 0.0f) && ray.tnear <= ray.tfar;
 }
+
+/// What a kernel is handed: rays, and where the scene moves the time of each.
+struct RayBatch {
+  std::span<const Ray> rays;
+  std::span<const float> times;  ///< within [0, 1] of the shutter, one a ray; empty: 0 for all
+
+  RayBatch() = default;
+  RayBatch(std::span<const Ray> r, std::span<const float> t = {}) noexcept : rays(r), times(t) {}
+  RayBatch(const std::vector<Ray>& r) noexcept : rays(r) {}
+  [[nodiscard]] std::size_t size() const noexcept { return rays.size(); }
+  [[nodiscard]] const Ray& operator[](std::size_t i) const noexcept { return rays[i]; }
+  [[nodiscard]] float time(std::size_t i) const noexcept { return times.empty() ? 0.0f : times[i]; }
+};
 
 }  // namespace arboretum

@@ -26,6 +26,15 @@ const std::vector<Field>& fields() {
       {.name = "traversal_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::traversal_cost},
       {.name = "intersection_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::intersection_cost},
       {.name = "max_leaf_blocks", .low = 1, .high = 7, .integer = &BuilderParameters::max_leaf_blocks},
+      {.name = "morton_bits", .low = 30, .high = 63, .integer = &BuilderParameters::morton_bits},
+      {.name = "ploc_radius", .low = 1, .high = 128, .integer = &BuilderParameters::ploc_radius},
+      {.name = "duplication_budget", .low = 0, .high = 4, .real = &BuilderParameters::duplication_budget},
+      {.name = "spatial_overlap", .low = 0, .high = 1, .real = &BuilderParameters::spatial_overlap},
+      {.name = "spatial_gain", .low = 0.01, .high = 1, .real = &BuilderParameters::spatial_gain},
+      {.name = "reinsertion_rounds", .low = 1, .high = 64, .integer = &BuilderParameters::reinsertion_rounds},
+      {.name = "empty_bonus", .low = 0, .high = 0.95, .real = &BuilderParameters::empty_bonus},
+      {.name = "max_depth", .low = 0, .high = 63, .integer = &BuilderParameters::max_depth},
+      {.name = "grid_density", .low = 0.01, .high = 64, .real = &BuilderParameters::grid_density},
       {.name = "collapse", .low = 0, .high = 0, .word = &BuilderParameters::collapse, .words = kCollapses},
   };
   return table;

@@ -29,6 +29,37 @@ ARBORETUM_INLINE Hit to_hit(const NearestHit& best) {
   return best.primitive != NearestHit::kNone ? Hit{best.t, best.u, best.v, std::uint32_t(best.primitive)} : Hit{};
 }
 
+/// A block as intersectors read it: itself, or the vertices that its indices name.
+template <class Block>
+ARBORETUM_INLINE const Block& readable(const Block& block, const Vec3f*) {
+  return block;
+}
+template <int M>
+ARBORETUM_INLINE VertexBlock<M> readable(const IndexBlock<M>& block, const Vec3f* vertices) {
+  VertexBlock<M> out;
+  const auto gather = [&](const std::uint32_t* index, float(&to)[3][M]) {
+    if constexpr (M == 1 || ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR) {
+      for (int i = 0; i < M; ++i) {
+        const Vec3f p = vertices[index[i]];
+        to[0][i] = p.x, to[1][i] = p.y, to[2][i] = p.z;
+      }
+    } else {
+      for (int i = 0; i < M; i += 4) {
+        __m128 row[4];
+        for (int j = 0; j < 4; ++j) {  // x y z 0, nothing read behind the vertex
+          const float* p = &vertices[index[i + j]].x;
+          row[j] = _mm_movelh_ps(_mm_castpd_ps(_mm_load_sd(reinterpret_cast<const double*>(p))), _mm_load_ss(p + 2));
+        }
+        _MM_TRANSPOSE4_PS(row[0], row[1], row[2], row[3]);
+        for (int axis = 0; axis < 3; ++axis) _mm_storeu_ps(&to[axis][i], row[axis]);
+      }
+    }
+  };
+  gather(block.vertex[0], out.v0), gather(block.vertex[1], out.v1), gather(block.vertex[2], out.v2);
+  std::memcpy(out.id, block.id, sizeof out.id);
+  return out;
+}
+
 template <class Intersector, class Block>
 ARBORETUM_INLINE bool closest_hit_block(const typename Intersector::RayData& ray, const Block& block, float tnear, NearestHit& best) {
   constexpr int W = Block::kWidth;

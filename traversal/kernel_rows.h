@@ -14,7 +14,7 @@ using KernelRows = std::vector<KernelRow>;
 
 /// An intersector can read a block's form.
 template <class Intersector, class Block>
-concept CanRead = !Intersector::kNeedsVertices || Block::kForm == TriangleForm::vertices;
+concept CanRead = !Intersector::kNeedsVertices || Block::kForm != TriangleForm::edges;
 
 /// One row for each (block, intersector, box) that can be. `Maker<Block, Intersector, Padded>` has four static
 /// functions: closest_hit, any_hit, count_closest_hit, count_any_hit.

@@ -33,9 +33,9 @@ struct Counters {
 };
 
 /// hits[i] answers rays[i]; both spans have the same size. The structure must be of the row's structure and leaf.
-using ClosestHitFunction = void (*)(const Accel&, std::span<const Ray> rays, std::span<Hit> hits, Counters*);
+using ClosestHitFunction = void (*)(const Accel&, RayBatch rays, std::span<Hit> hits, Counters*);
 /// occluded[i] becomes 1 when anything lies within [tnear, tfar] of rays[i], else 0.
-using AnyHitFunction = void (*)(const Accel&, std::span<const Ray> rays, std::span<std::uint8_t> occluded, Counters*);
+using AnyHitFunction = void (*)(const Accel&, RayBatch rays, std::span<std::uint8_t> occluded, Counters*);
 
 struct KernelRow {
   std::string_view structure, leaf, intersector, box, traversal;

@@ -15,7 +15,7 @@ const StructureInfo& BruteForce::static_info() {
     i.summary = "every ray tests every triangle: the reference, for small scenes";
     i.builders = {"in_order"};
     i.uses_parameters = false;
-    for_each_type(Blocks{},
+    for_each_type(AllBlocks{},
                   [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
     return i;
   }();
@@ -31,22 +31,15 @@ void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, 
       0x7ffffffe;  // ids are compared as int32, and INT_MAX stands for none
   if (mesh.size() > kMostTriangles)
     throw UserError("brute_force: the mesh has more than 2^31 - 2 triangles; split it");
-  bool known = false;
-  for_each_type(Blocks{}, [&]<class Block>(std::type_identity<Block>) {
-    if (settings.leaf != Block::kName) return;
-    known = true;
+  const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
     constexpr std::size_t kWidth = Block::kWidth;
     block_width_ = kWidth;
     block_count_ = (mesh.size() + kWidth - 1) / kWidth;
     arena_ = Arena();
     arena_ = Arena(block_count_ * sizeof(Block));
-    auto* blocks = reinterpret_cast<Block*>(arena_.data());
-    for (std::size_t b = 0; b < block_count_; ++b) {
-      const std::size_t first = b * kWidth;
-      fill_block(
-          blocks[b], int(std::min(kWidth, mesh.size() - first)),
-          [&](int i) { return mesh.corners(first + i); }, [&](int i) { return std::uint32_t(first + i); });
-    }
+    std::vector<std::uint32_t> ids(mesh.size());
+    std::iota(ids.begin(), ids.end(), 0u);
+    fill_blocks(reinterpret_cast<Block*>(arena_.data()), mesh, ids);
   });
   if (!known) {
     throw UserError(
@@ -55,6 +48,7 @@ void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, 
   }
   triangles_ = mesh.size();
   bounds_ = mesh.bounds();
+  vertices_ = mesh.vertices.data();
   leaf_ = settings.leaf;
 }
 

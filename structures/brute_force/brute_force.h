@@ -17,8 +17,6 @@ namespace arboretum::brute_force {
 class BruteForce final : public Accel {
  public:
   static constexpr std::string_view kName = "brute_force";
-  using Blocks = TypeList<EdgeBlock<1>, EdgeBlock<4>, EdgeBlock<8>, EdgeBlock<16>, VertexBlock<1>,
-                          VertexBlock<4>, VertexBlock<8>, VertexBlock<16>>;
 
   [[nodiscard]] static const StructureInfo& static_info();
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
@@ -30,6 +28,8 @@ class BruteForce final : public Accel {
 
   [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }
   [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }
+  /// The mesh's vertices, which leaf blocks of indices name.
+  [[nodiscard]] const Vec3f* vertices() const noexcept { return vertices_; }
   /// The leaf's blocks. `Block` must be the one that leaf() names.
   template <class Block>
   [[nodiscard]] std::span<const Block> blocks() const noexcept {
@@ -41,6 +41,7 @@ class BruteForce final : public Accel {
   std::size_t triangles_ = 0, block_count_ = 0;
   unsigned block_width_ = 1;
   Bounds3f bounds_;
+  const Vec3f* vertices_ = nullptr;
   std::string leaf_;
 };
 

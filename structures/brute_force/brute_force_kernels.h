@@ -26,7 +26,7 @@ ARBORETUM_INLINE void count_brute_force(const brute_force::BruteForce& accel, st
 }
 
 template <class Block, class Intersector, class Counting>
-void brute_force_closest_hit(const Accel& structure, std::span<const Ray> rays, std::span<Hit> hits,
+void brute_force_closest_hit(const Accel& structure, RayBatch rays, std::span<Hit> hits,
                              Counters* counters) {
   const auto& accel = static_cast<const brute_force::BruteForce&>(structure);
   const std::span<const Block> blocks = accel.blocks<Block>();
@@ -37,7 +37,7 @@ void brute_force_closest_hit(const Accel& structure, std::span<const Ray> rays, 
     if (is_valid_in_lanes(ray)) {
       const typename Intersector::RayData data(ray);
       for (std::size_t b = 0; b < blocks.size(); ++b)
-        closest_hit_block<Intersector>(data, blocks[b], ray.tnear, best);
+        closest_hit_block<Intersector>(data, readable(blocks[b], accel.vertices()), ray.tnear, best);
       count_brute_force<Block>(accel, blocks.size(), counting);
     }
     hits[i] = to_hit(best);
@@ -47,7 +47,7 @@ void brute_force_closest_hit(const Accel& structure, std::span<const Ray> rays, 
 
 /// Stops at the first block that holds a hit; the counters have what was tested until then.
 template <class Block, class Intersector, class Counting>
-void brute_force_any_hit(const Accel& structure, std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+void brute_force_any_hit(const Accel& structure, RayBatch rays, std::span<std::uint8_t> occluded,
                          Counters* counters) {
   const auto& accel = static_cast<const brute_force::BruteForce&>(structure);
   const std::span<const Block> blocks = accel.blocks<Block>();
@@ -59,7 +59,7 @@ void brute_force_any_hit(const Accel& structure, std::span<const Ray> rays, std:
     const typename Intersector::RayData data(ray);
     std::size_t b = 0;
     for (; b < blocks.size() && !occluded[i]; ++b)
-      occluded[i] = any_hit_block<Intersector>(data, blocks[b], ray.tnear, ray.tfar);
+      occluded[i] = any_hit_block<Intersector>(data, readable(blocks[b], accel.vertices()), ray.tnear, ray.tfar);
     count_brute_force<Block>(accel, b, counting);
   }
   if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
@@ -67,16 +67,16 @@ void brute_force_any_hit(const Accel& structure, std::span<const Ray> rays, std:
 
 template <class Block, class Intersector, bool /*Padded*/>
 struct BruteForceMaker {
-  static void closest_hit(const Accel& a, std::span<const Ray> r, std::span<Hit> h, Counters* c) {
+  static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) {
     brute_force_closest_hit<Block, Intersector, NoCounters>(a, r, h, c);
   }
-  static void any_hit(const Accel& a, std::span<const Ray> r, std::span<std::uint8_t> h, Counters* c) {
+  static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) {
     brute_force_any_hit<Block, Intersector, NoCounters>(a, r, h, c);
   }
-  static void count_closest_hit(const Accel& a, std::span<const Ray> r, std::span<Hit> h, Counters* c) {
+  static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) {
     brute_force_closest_hit<Block, Intersector, WithCounters>(a, r, h, c);
   }
-  static void count_any_hit(const Accel& a, std::span<const Ray> r, std::span<std::uint8_t> h, Counters* c) {
+  static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) {
     brute_force_any_hit<Block, Intersector, WithCounters>(a, r, h, c);
   }
 };
@@ -87,8 +87,11 @@ inline void add_kernels(std::type_identity<brute_force::BruteForce>, KernelRows&
                             TypeList<MollerTrumbore>{});
   add_rows<BruteForceMaker>(rows, name, "single", kIsa, BlocksOfWidth<VertexBlock, kRegisterWidth>{},
                             TypeList<Watertight>{});
+  add_rows<BruteForceMaker>(rows, name, "single", kIsa, BlocksOfWidth<IndexBlock, kRegisterWidth>{},
+                            TypeList<Watertight>{});
   add_rows<BruteForceMaker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{},
                             TypeList<MollerTrumbore, Pluecker>{});
+  add_rows<BruteForceMaker>(rows, name, "single", kIsa, TypeList<IndexBlock<4>>{}, TypeList<MollerTrumbore>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -1,5 +1,8 @@
-// The builders of binary trees, by name and instruction set.
+// The builders of binary trees, by name.
 #pragma once
+
+#include <string_view>
+#include <vector>
 
 #include "core/mesh.h"
 #include "structures/accel.h"
@@ -7,12 +10,17 @@
 
 namespace arboretum {
 
-/// Builds a binary tree with leaves of at most `leaf_width` references (more only when max leaves say so). Deterministic:
-/// the tree depends on the mesh, the parameters and `leaf_width`, not on threads or ISA. Runs in the caller's TBB arena.
+/// Builds a binary tree with leaves of at most `leaf_width` references. Deterministic: the tree depends on the mesh, the
+/// parameters and `leaf_width`, not on threads or ISA. Runs in the caller's TBB arena. The mesh may be empty: then the tree is, too.
 using BinaryBuilder = void (*)(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
                                BinaryTree& tree, BuildReport& report);
 
-/// Throws UserError where there is no such builder.
-[[nodiscard]] BinaryBuilder binary_builder(std::string_view name, Isa isa);
+/// Every builder that makes a binary tree; the first is the default.
+[[nodiscard]] const std::vector<std::string_view>& binary_builder_names();
+
+/// Builds with settings.builder, using kernels of settings.isa. Throws UserError where there is no such builder, and for
+/// parameters out of range.
+void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, unsigned leaf_width, BinaryTree& tree,
+                       BuildReport& report);
 
 }  // namespace arboretum

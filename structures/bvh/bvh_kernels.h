@@ -13,10 +13,10 @@ template <int N>
 struct BvhSingle {
   template <class Block, class Intersector, bool Padded>
   struct Maker {
-    static void closest_hit(const Accel& a, std::span<const Ray> r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
-    static void any_hit(const Accel& a, std::span<const Ray> r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
-    static void count_closest_hit(const Accel& a, std::span<const Ray> r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
-    static void count_any_hit(const Accel& a, std::span<const Ray> r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
+    static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
+    static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
+    static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
+    static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
   };
 };
 
@@ -29,6 +29,8 @@ void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Edges{}, TypeList<MollerTrumbore>{});
   add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Vertices{}, TypeList<Watertight>{});
   add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
+  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, BlocksOfWidth<IndexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
+  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, TypeList<IndexBlock<4>>{}, TypeList<MollerTrumbore>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -69,8 +69,8 @@ struct SingleRay {
   using F = vf<W>;
 
   template <bool AnyHit>
-  static ARBORETUM_INLINE bool trace(const std::byte* base, bvh::NodeReference root, float max_coordinate, StackEntry* stack,
-                                     const Ray& ray, NearestHit& best, Counting counting) {
+  static ARBORETUM_INLINE bool trace(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Vec3f* vertices,
+                                     StackEntry* stack, const Ray& ray, NearestHit& best, Counting counting) {
     const BoxLanes<N, Padded> box(BoxRay<N, Padded>(ray, max_coordinate));
     const typename Intersector::RayData data(ray);
     const F tnear(ray.tnear);
@@ -102,9 +102,9 @@ struct SingleRay {
         bool changed = false;
         do {
           if constexpr (AnyHit) {
-            if (any_hit_block<Intersector>(data, *block, ray.tnear, ray.tfar)) return true;
+            if (any_hit_block<Intersector>(data, readable(*block, vertices), ray.tnear, ray.tfar)) return true;
           } else {
-            changed |= closest_hit_block<Intersector>(data, *block, ray.tnear, best);
+            changed |= closest_hit_block<Intersector>(data, readable(*block, vertices), ray.tnear, best);
           }
         } while (++block != end);
         if constexpr (!AnyHit) {
@@ -134,7 +134,7 @@ struct SingleRay {
     for (; block != end; ++block) {
       ++counting.counters.blocks;
       counting.counters.lanes += Block::kWidth;
-      for (std::uint32_t id : block->id) counting.counters.triangles += id != kNoPrimitive, counting.counters.lanes_active += id != kNoPrimitive;
+      counting.counters.triangles += unsigned(triangles_in(*block)), counting.counters.lanes_active += unsigned(triangles_in(*block));
     }
   }
 };
@@ -157,7 +157,7 @@ class TraversalStack {
 };
 
 template <int N, class Block, class Intersector, bool Padded, class Counting>
-void bvh_closest_hit(const Accel& accel, std::span<const Ray> rays, std::span<Hit> hits, Counters* counters) {
+void bvh_closest_hit(const Accel& accel, RayBatch rays, std::span<Hit> hits, Counters* counters) {
   const auto& tree = static_cast<const bvh::Bvh<N>&>(accel);
   const std::byte* const base = tree.base();
   const bvh::NodeReference root = tree.root();
@@ -167,14 +167,14 @@ void bvh_closest_hit(const Accel& accel, std::span<const Ray> rays, std::span<Hi
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Ray& ray = rays[i];
     NearestHit best{ray.tfar};
-    if (is_valid_in_lanes(ray)) SingleRay<N, Block, Intersector, Padded, Counting>::template trace<false>(base, root, max_coordinate, stack.data(), ray, best, counting);
+    if (is_valid_in_lanes(ray)) SingleRay<N, Block, Intersector, Padded, Counting>::template trace<false>(base, root, max_coordinate, tree.vertices(), stack.data(), ray, best, counting);
     hits[i] = to_hit(best);
   }
   if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
 }
 
 template <int N, class Block, class Intersector, bool Padded, class Counting>
-void bvh_any_hit(const Accel& accel, std::span<const Ray> rays, std::span<std::uint8_t> occluded, Counters* counters) {
+void bvh_any_hit(const Accel& accel, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
   const auto& tree = static_cast<const bvh::Bvh<N>&>(accel);
   const std::byte* const base = tree.base();
   const bvh::NodeReference root = tree.root();
@@ -184,7 +184,7 @@ void bvh_any_hit(const Accel& accel, std::span<const Ray> rays, std::span<std::u
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Ray& ray = rays[i];
     NearestHit best{ray.tfar};
-    occluded[i] = is_valid_in_lanes(ray) && SingleRay<N, Block, Intersector, Padded, Counting>::template trace<true>(base, root, max_coordinate, stack.data(), ray, best, counting);
+    occluded[i] = is_valid_in_lanes(ray) && SingleRay<N, Block, Intersector, Padded, Counting>::template trace<true>(base, root, max_coordinate, tree.vertices(), stack.data(), ray, best, counting);
   }
   if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
 }

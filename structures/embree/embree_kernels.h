@@ -11,11 +11,11 @@ struct EmbreeSingle {
   static const embree::EmbreeAccel& scene(const Accel& accel) {
     return static_cast<const embree::EmbreeAccel&>(accel).expect(kIsa, Robust);
   }
-  static void closest_hit(const Accel& a, std::span<const Ray> r, std::span<Hit> h, Counters*) {
-    scene(a).intersect_single(r, h);
+  static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters*) {
+    scene(a).intersect_single(r.rays, h);
   }
-  static void any_hit(const Accel& a, std::span<const Ray> r, std::span<std::uint8_t> h, Counters*) {
-    scene(a).occluded_single(r, h);
+  static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters*) {
+    scene(a).occluded_single(r.rays, h);
   }
 };
 

@@ -1,0 +1,180 @@
+// How a wide BVH is made from a binary tree, whatever the format of its nodes.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "core/timer.h"
+#include "structures/builders/builders.h"
+#include "structures/builders/collapse.h"
+#include "structures/bvh/bvh.h"
+#include "structures/leaves/blocks.h"
+
+namespace arboretum::bvh {
+
+inline constexpr std::uint32_t kParallel = 1u << 12;
+
+[[nodiscard]] inline std::size_t round_up(std::size_t bytes) noexcept { return (bytes + 31) / 32 * 32; }
+
+/// Writes the wide tree into the arena: a node, then its leaves, then its inner children's subtrees.
+template <class Format, class Block>
+class Emitter {
+ public:
+  using Node = typename Format::Node;
+
+  Emitter(const TriangleMesh& mesh, const BinaryTree& tree, const Collapse& collapse, std::byte* base)
+      : mesh_(mesh), tree_(tree), collapse_(collapse), base_(base) {}
+
+  /// Returns the depth of the deepest leaf below.
+  unsigned subtree(std::uint32_t index, std::size_t offset) const {
+    auto* node = new (base_ + offset) Node;
+    std::size_t next = offset + round_up(sizeof(Node));
+    const Slots slots = collapse_.children(index);
+    std::size_t child_offset[kMaxBranching];
+    for (const bool leaves : {true, false}) {
+      for (unsigned i = 0; i < slots.size; ++i) {
+        if (collapse_.is_leaf(slots.node[i]) != leaves) continue;
+        child_offset[i] = next;
+        next += collapse_.bytes(slots.node[i]);
+      }
+    }
+    Bounds3f boxes[kMaxBranching];
+    NodeReference references[kMaxBranching] = {};
+    for (unsigned i = 0; i < slots.size; ++i) {
+      boxes[i] = {tree_.nodes[slots.node[i]].lower, tree_.nodes[slots.node[i]].upper};
+      references[i] = reference(slots.node[i], child_offset[i]);
+    }
+    Format::write(*node, boxes, references, slots.size);
+    unsigned depth[kMaxBranching] = {};
+    const auto descend = [&](unsigned i) {
+      if (collapse_.is_leaf(slots.node[i])) {
+        leaf(slots.node[i], child_offset[i]);
+      } else {
+        depth[i] = subtree(slots.node[i], child_offset[i]);
+      }
+    };
+    if (tree_.nodes[index].count > kParallel) {
+      tbb::parallel_for(0u, slots.size, descend);
+    } else {
+      for (unsigned i = 0; i < slots.size; ++i) descend(i);
+    }
+    return 1 + *std::max_element(depth, depth + slots.size);
+  }
+
+  void leaf(std::uint32_t index, std::size_t offset) const {
+    fill_blocks(reinterpret_cast<Block*>(base_ + offset), mesh_, {tree_.primitives.data() + tree_.begin_of(index), tree_.nodes[index].count});
+  }
+
+  [[nodiscard]] NodeReference reference(std::uint32_t index, std::size_t offset) const {
+    return NodeReference(offset) | (collapse_.is_leaf(index) ? kLeafBit | (collapse_.blocks(index) - 1) : 0u);
+  }
+
+ private:
+  const TriangleMesh& mesh_;
+  const BinaryTree& tree_;
+  const Collapse& collapse_;
+  std::byte* base_;
+};
+
+template <class Format>
+const StructureInfo& WideBvh<Format>::static_info() {
+  static const StructureInfo info = [] {
+    StructureInfo i;
+    i.name = kName;
+    i.summary = Format::kSummary;
+    i.builders = binary_builder_names();
+    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    return i;
+  }();
+  return info;
+}
+
+template <class Format>
+void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
+  const BuilderParameters& p = settings.parameters;
+  if (p.max_leaf_blocks < 1 || p.max_leaf_blocks > kMaxLeafBlocks) {
+    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. " + std::to_string(kMaxLeafBlocks));
+  }
+  if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
+  if (p.collapse != "optimal" && p.collapse != "greedy") throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
+  if (mesh.size() >= (1u << 30)) throw UserError(std::string(kName) + " takes at most 2^30 - 1 triangles");
+
+  const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
+    BinaryTree tree;
+    build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
+
+    double start = wall_seconds();
+    const Collapse collapse(tree, {unsigned(kBranching), unsigned(Block::kWidth), p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
+                                   p.collapse == "optimal", sizeof(typename Format::Node), sizeof(Block)});
+    report.phases.emplace_back("collapse", wall_seconds() - start);
+
+    start = wall_seconds();
+    leaf_ = settings.leaf, vertices_ = mesh.vertices.data();
+    if (mesh.size() == 0) {  // a node without children: every ray misses
+      arena_ = Arena(round_up(sizeof(typename Format::Node)));
+      Format::write(*new (arena_.data()) typename Format::Node, nullptr, nullptr, 0);
+      root_ = 0, stack_entries_ = 2 * kBranching, bounds_ = {}, max_coordinate_ = 0.0f;
+      return;
+    }
+    const std::uint64_t bytes = collapse.bytes(0);
+    if (bytes > std::numeric_limits<NodeReference>::max()) {
+      throw UserError(std::string(kName) + " with " + settings.leaf + " would take " + std::to_string(bytes >> 20) +
+                      " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
+    }
+    arena_ = Arena(bytes);
+    const Emitter<Format, Block> emitter(mesh, tree, collapse, arena_.data());
+    root_ = emitter.reference(0, 0);
+    unsigned depth = 0;
+    if (is_leaf(root_)) {
+      emitter.leaf(0, 0);
+    } else {
+      depth = emitter.subtree(0, 0);
+    }
+    stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
+    bounds_ = {tree.nodes[0].lower, tree.nodes[0].upper};
+    max_coordinate_ = 0.0f;
+    for (int axis = 0; axis < 3; ++axis) {
+      max_coordinate_ = std::max({max_coordinate_, std::fabs(bounds_.lower[axis]), std::fabs(bounds_.upper[axis])});
+    }
+    report.phases.emplace_back("leaves", wall_seconds() - start);
+  });
+  if (!known) throw UserError(std::string(kName) + " has no leaf '" + settings.leaf + "'");
+}
+
+template <class Format>
+bool WideBvh<Format>::visit(StructureVisitor& visitor) const {
+  struct Entry {
+    NodeReference reference;
+    Bounds3f bounds;
+    unsigned depth;
+  };
+  with_block(leaf_, [&]<class Block>(std::type_identity<Block>) {
+    std::vector<Entry> stack{{root_, bounds_, 0}};
+    std::vector<std::uint32_t> primitives;
+    while (!stack.empty()) {
+      const Entry e = stack.back();
+      stack.pop_back();
+      const std::byte* at = base() + offset_of(e.reference);
+      if (bvh::is_leaf(e.reference)) {
+        const auto* block = reinterpret_cast<const Block*>(at);
+        const unsigned blocks = block_count(e.reference);
+        primitives.clear();
+        append_primitives(block, blocks, primitives);
+        visitor.leaf({e.bounds, primitives, e.depth, blocks, unsigned(Block::kWidth), round_up(blocks * sizeof(Block))});
+        continue;
+      }
+      Bounds3f boxes[kMaxBranching];
+      NodeReference references[kMaxBranching];
+      const unsigned count = Format::read(*reinterpret_cast<const typename Format::Node*>(at), boxes, references);
+      visitor.node({e.bounds, {boxes, count}, e.depth, round_up(sizeof(typename Format::Node))});
+      for (unsigned i = count; i-- > 0;) stack.push_back({references[i], boxes[i], e.depth + 1});
+    }
+  });
+  return true;
+}
+
+}  // namespace arboretum::bvh
