@@ -2,20 +2,23 @@
 
 #include <tbb/task_arena.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/memory_meter.h"
 #include "core/names.h"
 #include "core/timer.h"
-#include "structure_list.h"
+#include "structures/registry.h"
 
 namespace arboretum {
 
 std::span<const StructureEntry> all_structures() {
   static const std::vector<StructureEntry> entries = [] {
-    std::vector<StructureEntry> list;
-    for_each_type(AllStructures{}, [&]<class S>(std::type_identity<S>) {
-      list.push_back({S::static_info(), []() -> std::unique_ptr<Accel> { return std::make_unique<S>(); }});
-    });
+    std::vector<StructureEntry> list = registered_structures();
+    for (const StructureEntry& e : list) {
+      if (std::ranges::count(list, e.info.name, [](const StructureEntry& o) { return o.info.name; }) > 1)
+        throw UserError("two structures are called " + std::string(e.info.name) + "; give one another kName");
+    }
     return list;
   }();
   return entries;

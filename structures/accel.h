@@ -104,13 +104,13 @@ class Accel {
   [[nodiscard]] virtual std::size_t bytes() const noexcept = 0;
 };
 
-/// One structure of the list in structures/all.h.
+/// One structure of an executable.
 struct StructureEntry {
   StructureInfo info;
   std::unique_ptr<Accel> (*create)();
 };
 
-/// Every structure of this build, in the order of structures/all.h.
+/// Every structure of this executable: those of structures/all.h in their order, then its own.
 [[nodiscard]] std::span<const StructureEntry> all_structures();
 /// nullptr where there is none of that name.
 [[nodiscard]] const StructureEntry* find_structure(std::string_view name);

@@ -5,8 +5,7 @@
 #include <tuple>
 
 #include "core/error.h"
-#include "kernel_units.h"
-#include "structures/accel.h"
+#include "structures/registry.h"
 
 namespace arboretum {
 namespace {
@@ -43,11 +42,7 @@ Counters& Counters::operator+=(const Counters& o) noexcept {
 }
 
 std::span<const KernelRow> kernel_table() {
-  static const std::vector<KernelRow> rows = [] {
-    std::vector<KernelRow> list;
-    add_all_rows(list);
-    return list;
-  }();
+  static const std::vector<KernelRow> rows = registered_kernels();
   return rows;
 }
 

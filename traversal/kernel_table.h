@@ -46,7 +46,7 @@ struct KernelRow {
   AnyHitFunction count_any_hit = nullptr;
 };
 
-/// Every row of this build, those of ISAs that this machine lacks included (do not call them).
+/// Every row of this executable, those of ISAs that this machine lacks included (do not call them).
 [[nodiscard]] std::span<const KernelRow> kernel_table();
 /// nullptr where there is none.
 [[nodiscard]] const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,

@@ -1,5 +1,5 @@
 // What every kernel unit includes before its ISA begins: standard headers and the project's baseline headers, so that
-// nothing of them is compiled for the ISA. Units are generated (cmake/Structures.cmake).
+// nothing of them is compiled for the ISA. Units are generated (cmake/ArboretumStructures.cmake).
 #pragma once
 
 #include <array>

@@ -1,0 +1,127 @@
+# Structures and the executables that have them. Comes with the source tree and with the installed package.
+#
+# A structure is a folder <folder>/ with <name>.h, which says `using Structures = TypeList<...>;` in namespace
+# arboretum::<folder>, its .cpp files, and <name>_kernels.h. For each of its types and each instruction set a kernel unit is
+# generated; a generated registry.cpp says which structures and kernels an executable has. What the functions below hand to
+# each other is a record `<header as included>|<folder>|<types, comma-separated>`.
+#
+#   arboretum_read_structure(<out> <header> <as included>)     the record of a structure's header
+#   arboretum_kernel_units(<out> <folder> <record>...)         writes kernel units into <folder>, sets their compile options
+#   arboretum_registry(<file> <record>...)                     writes registry.cpp
+#   arboretum_executable(<target> STRUCTURES <folder>... [LIBRARIES <library>...])
+#                                                              an `arboretum` of one's own (docs/add-a-structure.md)
+
+# Writes only what changed, so that a configure run rebuilds nothing.
+function(arboretum_write path content)
+  if(EXISTS "${path}")
+    file(READ "${path}" old)
+    if(old STREQUAL content)
+      return()
+    endif()
+  endif()
+  file(WRITE "${path}" "${content}")
+endfunction()
+
+function(arboretum_read_structure out header include)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${header}")
+  get_filename_component(folder "${header}" DIRECTORY)
+  get_filename_component(folder "${folder}" NAME)
+  file(READ "${header}" text)
+  if(NOT text MATCHES "using Structures = TypeList<([A-Za-z0-9_, \n]+)>;")
+    message(FATAL_ERROR "${header}: no line 'using Structures = TypeList<...>;'")
+  endif()
+  string(REGEX MATCHALL "[A-Za-z0-9_]+" types "${CMAKE_MATCH_1}")
+  list(JOIN types "," types)
+  set(${out} "${include}|${folder}|${types}" PARENT_SCOPE)
+endfunction()
+
+# Sets <prefix>_header, _folder and _types in the caller.
+macro(arboretum_split_record prefix record)
+  string(REPLACE "|" ";" ${prefix}_parts "${record}")
+  list(GET ${prefix}_parts 0 ${prefix}_header)
+  list(GET ${prefix}_parts 1 ${prefix}_folder)
+  list(GET ${prefix}_parts 2 ${prefix}_types)
+  string(REPLACE "," ";" ${prefix}_types "${${prefix}_types}")
+endmacro()
+
+function(arboretum_kernel_units out folder)
+  set(units "")
+  foreach(record IN LISTS ARGN)
+    arboretum_split_record(s "${record}")
+    string(REGEX REPLACE "\\.h$" "_kernels.h" kernels "${s_header}")
+    foreach(type IN LISTS s_types)
+      foreach(isa IN LISTS ARBORETUM_ISAS)
+        string(TOUPPER ${isa} upper)
+        set(function rows_of_${s_folder}_${type})
+        set(unit ${folder}/${s_folder}_${type}_${isa}.cpp)
+        arboretum_write(${unit}
+"#define ARBORETUM_TARGET ARBORETUM_TARGET_${upper}
+#include \"traversal/kernel_unit.h\"
+#include \"${s_header}\"
+#include \"simd/target_begin.h\"
+#include \"simd/simd.h\"
+#include \"${kernels}\"
+#include \"simd/target_end.h\"
+
+namespace arboretum::isa_${isa} {
+void ${function}(KernelRows& rows);
+void ${function}(KernelRows& rows) { add_kernels(std::type_identity<${s_folder}::${type}>{}, rows); }
+}  // namespace arboretum::isa_${isa}
+")
+        # GCC's own AVX-512 headers set off -Wmaybe-uninitialized.
+        set(options "-Wno-uninitialized;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
+        # The scalar kernels are the reference, not a race: unrolling their lane loops would cost a minute of compile time each.
+        # Units of ISAs with FMA are scheduled for the machines that have it (2 to 3 % on incoherent rays); tuning uses no
+        # instruction that the pragma does not allow.
+        if(isa MATCHES "^avx")
+          list(APPEND options "-mtune=haswell")
+        elseif(isa STREQUAL "scalar")
+          list(APPEND options "$<$<CONFIG:Release>:-O2>")
+        endif()
+        set_source_files_properties(${unit} PROPERTIES GENERATED ON COMPILE_OPTIONS "${options}")
+        list(APPEND units ${unit})
+      endforeach()
+    endforeach()
+  endforeach()
+  set(${out} ${units} PARENT_SCOPE)
+endfunction()
+
+function(arboretum_registry file)
+  set(includes "")
+  set(folders "")
+  set(lists "")
+  set(declarations "")
+  set(calls "")
+  foreach(record IN LISTS ARGN)
+    arboretum_split_record(s "${record}")
+    if(s_folder IN_LIST folders)
+      message(FATAL_ERROR "two folders of structures are called '${s_folder}'; rename one, and its namespace")
+    endif()
+    list(APPEND folders ${s_folder})
+    string(APPEND includes "#include \"${s_header}\"\n")
+    list(APPEND lists "${s_folder}::Structures")
+    foreach(type IN LISTS s_types)
+      foreach(isa IN LISTS ARBORETUM_ISAS)
+        set(function rows_of_${s_folder}_${type})
+        string(APPEND declarations "namespace isa_${isa} { void ${function}(KernelRows& rows); }\n")
+        string(APPEND calls "  isa_${isa}::${function}(rows);\n")
+      endforeach()
+    endforeach()
+  endforeach()
+  list(JOIN lists ", " lists)
+  arboretum_write("${file}"
+"// Made by cmake/ArboretumStructures.cmake: the structures of this executable and their kernels.
+#include \"structures/registry.h\"
+#include \"traversal/kernel_rows.h\"
+${includes}
+namespace arboretum {
+${declarations}
+std::vector<StructureEntry> registered_structures() { return structure_entries(ConcatLists<${lists}>{}); }
+
+std::vector<KernelRow> registered_kernels() {
+  std::vector<KernelRow> rows;
+${calls}  return rows;
+}
+}  // namespace arboretum
+")
+endfunction()
