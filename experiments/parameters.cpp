@@ -16,9 +16,11 @@ struct Field {
   float BuilderParameters::*real = nullptr;
   std::string BuilderParameters::*word = nullptr;
   std::span<const std::string_view> words = {};
+  std::span<const unsigned> choices = {};  ///< of an integer that may take no other value between low and high
 };
 
 constexpr std::string_view kCollapses[] = {"optimal", "greedy"};
+constexpr unsigned kMortonBits[] = {30, 63};
 
 const std::vector<Field>& fields() {
   static const std::vector<Field> table{
@@ -26,7 +28,7 @@ const std::vector<Field>& fields() {
       {.name = "traversal_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::traversal_cost},
       {.name = "intersection_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::intersection_cost},
       {.name = "max_leaf_blocks", .low = 1, .high = 7, .integer = &BuilderParameters::max_leaf_blocks},
-      {.name = "morton_bits", .low = 30, .high = 63, .integer = &BuilderParameters::morton_bits},
+      {.name = "morton_bits", .low = 30, .high = 63, .integer = &BuilderParameters::morton_bits, .choices = kMortonBits},
       {.name = "ploc_radius", .low = 1, .high = 128, .integer = &BuilderParameters::ploc_radius},
       {.name = "duplication_budget", .low = 0, .high = 4, .real = &BuilderParameters::duplication_budget},
       {.name = "spatial_overlap", .low = 0, .high = 1, .real = &BuilderParameters::spatial_overlap},
@@ -46,6 +48,7 @@ const Field& field(std::string_view name) {
 
 std::string expectation(const Field& f) {
   if (f.word) return fmt::format("one of {}", fmt::join(f.words, ", "));
+  if (!f.choices.empty()) return fmt::format("one of {}", fmt::join(f.choices, ", "));
   return fmt::format("{} from {} to {}", f.integer ? "an integer" : "a number", f.low, f.high);
 }
 
@@ -80,6 +83,10 @@ std::string set_parameter(BuilderParameters& parameters, std::string_view name, 
   if (f.word) {
     done = std::ranges::find(f.words, value) != f.words.end();
     if (done) parameters.*f.word = value;
+  } else if (!f.choices.empty()) {
+    unsigned chosen = 0;
+    done = parse_within(value, f.low, f.high, chosen) && std::ranges::find(f.choices, chosen) != f.choices.end();
+    if (done) parameters.*f.integer = chosen;
   } else {
     done = f.integer ? parse_within(value, f.low, f.high, parameters.*f.integer)
                      : parse_within(value, f.low, f.high, parameters.*f.real);

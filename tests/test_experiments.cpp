@@ -145,6 +145,7 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\nplots: [rays]\n", ":2", "did you mean"},
       {"scenes: [bunny]\nmetrics: [trace]\nplots: [sah_cost]\n", ":3", "has no data"},
       {"scenes: [bunny]\nparameters: {bins: 1000}\n", ":2", "bins must be an integer from 4 to 64"},
+      {"scenes: [bunny]\nparameters: {morton_bits: 31}\n", ":2", "morton_bits must be one of 30, 63"},
       {"scenes: [bunny]\nparameters: {colapse: greedy}\n", ":2", "did you mean 'collapse'"},
       {"scenes: [bunny]\ninclude: [{builder: morton}]\n", ":2", "names its structure"},
       {"scenes: [bunny]\nexclude: {structure: tree}\n", ":2", "must be a list of maps"},

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "structures/builders/fast_builders.h"
 
 namespace arboretum {
 
@@ -35,6 +36,7 @@ struct Entry {
 
 constexpr Entry kBuilders[] = {
     {"binned_sah", binned_sah},
+    {"morton", on_any<build_morton>},
 };
 
 }  // namespace

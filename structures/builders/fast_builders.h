@@ -1,0 +1,11 @@
+// The builders that are written once for all instruction sets; builders.cpp lists them. Contract: BinaryBuilder in builders.h.
+#pragma once
+
+#include "structures/builders/builders.h"
+
+namespace arboretum {
+
+/// `morton`: linear BVH. Reads morton_bits.
+void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report);
+
+}  // namespace arboretum

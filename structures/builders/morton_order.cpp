@@ -1,0 +1,142 @@
+#include "structures/builders/morton_order.h"
+
+#include <algorithm>
+#include <bit>
+#include <string>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "structures/builders/radix_sort.h"
+
+namespace arboretum {
+namespace {
+
+constexpr std::size_t kChunk = 1u << 14;
+constexpr unsigned kRestBits = 31;
+
+/// Twice the centroid of the triangle's box.
+Vec3f centroid(const TriangleMesh& mesh, std::size_t i) noexcept {
+  const Triangle t = mesh.triangles[i];
+  const Vec3f a = mesh.vertices[t.a], b = mesh.vertices[t.b], c = mesh.vertices[t.c];
+  return min(min(a, b), c) + max(max(a, b), c);
+}
+
+/// Bit i goes to bit 3 i; 21 bits at most.
+std::uint64_t spread(std::uint32_t x) noexcept {
+  std::uint64_t v = x;
+  v = (v | v << 32) & 0x001f00000000ffff;
+  v = (v | v << 16) & 0x001f0000ff0000ff;
+  v = (v | v << 8) & 0x100f00f00f00f00f;
+  v = (v | v << 4) & 0x10c30c30c30c30c3;
+  v = (v | v << 2) & 0x1249249249249249;
+  return v;
+}
+
+template <class F>
+void for_chunks(std::size_t n, const F& f) {
+  tbb::parallel_for(std::size_t{0}, (n + kChunk - 1) / kChunk, [&](std::size_t c) { f(c, c * kChunk, std::min(n, (c + 1) * kChunk)); });
+}
+
+/// Cells of a cube around the centroids: cells as wide on each axis make better boxes than the scene's own proportions.
+class Cells {
+ public:
+  Cells(const Bounds3f& centroids, unsigned bits_an_axis) : lower_(centroids.lower), last_(float((1u << bits_an_axis) - 1)) {
+    const Vec3f extent = centroids.extent();
+    const float largest = std::max({extent.x, extent.y, extent.z});
+    if (largest > 1e-30f) scale_ = float(1u << bits_an_axis) / largest;
+  }
+  [[nodiscard]] std::uint64_t code(Vec3f c) const noexcept {
+    const Vec3f d = (c - lower_) * scale_;
+    return spread(cell(d.x)) << 2 | spread(cell(d.y)) << 1 | spread(cell(d.z));
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t cell(float x) const noexcept { return std::uint32_t(std::int32_t(x > 0.0f ? (x < last_ ? x : last_) : 0.0f)); }
+  Vec3f lower_;
+  float last_, scale_ = 0.0f;
+};
+
+}  // namespace
+
+void check_morton_bits(unsigned bits) {
+  if (bits != 30 && bits != 63) throw UserError("morton_bits: " + std::to_string(bits) + " is neither 30 nor 63");
+}
+
+MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits) : keys_(mesh.size()), rest_(bits == 63 ? mesh.size() : 0) {
+  check_morton_bits(bits);
+  const std::size_t n = mesh.size();
+  if (n == 0) return;
+  MeteredVector<Vec3f> centroids(n);
+  MeteredVector<Bounds3f> partial((n + kChunk - 1) / kChunk);
+  for_chunks(n, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    Bounds3f box;
+    for (std::size_t i = begin; i < end; ++i) box.extend(centroids[i] = centroid(mesh, i));
+    partial[c] = box;
+  });
+  Bounds3f box;
+  for (const Bounds3f& b : partial) box.extend(b);
+  const Cells cells(box, bits / 3);
+  for_chunks(n, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint64_t code = cells.code(centroids[i]);
+      if (bits == 30) {
+        keys_[i] = code << 32 | i;
+      } else {
+        keys_[i] = code >> kRestBits << 32 | i;
+        rest_[i] = std::uint32_t(code) & ((1u << kRestBits) - 1);
+      }
+    }
+  });
+  radix_sort(keys_, 32, bits == 30 ? 62 : 64);
+  if (bits == 63) refine();
+}
+
+/// Sorts runs of keys with the same upper half by the lower; each is done with the chunk that it begins in.
+void MortonOrder::refine() {
+  const std::size_t n = keys_.size();
+  const auto upper = [&](std::size_t i) { return keys_[i] >> 32; };
+  // Upper halves stay where they are, so that a chunk may look at its neighbours' while these are sorted.
+  for_chunks(n, [&](std::size_t, std::size_t begin, std::size_t end) {
+    MeteredVector<std::uint64_t> run;
+    if (begin > 0) {
+      while (begin < end && upper(begin) == upper(begin - 1)) ++begin;
+    }
+    while (begin < end) {
+      std::size_t last = begin + 1;
+      while (last < n && upper(last) == upper(begin)) ++last;
+      if (last - begin > 1) {
+        run.resize(last - begin);
+        const std::uint64_t high = upper(begin) << 32;
+        for (std::size_t i = begin; i < last; ++i) run[i - begin] = std::uint64_t{rest_[id(i)]} << 32 | id(i);
+        radix_sort(run, 32, 32 + kRestBits);
+        for (std::size_t i = begin; i < last; ++i) keys_[i] = high | std::uint32_t(run[i - begin]);
+      }
+      begin = last;
+    }
+  });
+}
+
+template <class Code>
+std::size_t MortonOrder::split_at_bit(std::size_t begin, std::size_t end, const Code& code) noexcept {
+  // The first index whose code has the bit: all codes here share what stands above it.
+  const std::uint32_t bit = std::bit_floor(code(begin) ^ code(end - 1));
+  std::size_t first = begin, count = end - 1 - begin;
+  while (count > 0) {
+    const std::size_t half = count / 2;
+    const bool below = (code(first + half) & bit) == 0;
+    first += below ? half + 1 : 0;
+    count = below ? count - half - 1 : half;
+  }
+  return first;
+}
+
+std::size_t MortonOrder::split(std::size_t begin, std::size_t end) const noexcept {
+  if (keys_[begin] >> 32 != keys_[end - 1] >> 32) {
+    return split_at_bit(begin, end, [this](std::size_t i) { return std::uint32_t(keys_[i] >> 32); });
+  }
+  if (rest_.empty() || rest_[id(begin)] == rest_[id(end - 1)]) return begin + (end - begin) / 2;
+  return split_at_bit(begin, end, [this](std::size_t i) { return rest_[id(i)]; });
+}
+
+}  // namespace arboretum
