@@ -8,10 +8,12 @@
 
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <thread>
 
+#include "core/data_folder.h"
 #include "experiments/build_info.h"
 
 namespace arboretum {
@@ -35,10 +37,9 @@ std::string first_line(const char* path) {
   return line;
 }
 
-/// Output of git in the source folder; empty when there is no git or no repository. Arguments are constants
-/// of ours.
-std::string git(const std::string& arguments) {
-  std::string quoted = build_info::kSourceDirectory;
+/// Output of git in the folder; empty when there is no git or no repository. Arguments are constants of ours.
+std::string git(const std::filesystem::path& folder, const std::string& arguments) {
+  std::string quoted = folder.string();
   for (std::size_t i = 0; (i = quoted.find('\'', i)) != std::string::npos; i += 4)
     quoted.replace(i, 1, "'\\''");
   const std::string command =
@@ -49,6 +50,27 @@ std::string git(const std::string& arguments) {
   while (pipe && std::fgets(buffer, sizeof buffer, pipe.get())) text += buffer;
   while (text.ends_with('\n')) text.pop_back();
   return text;
+}
+
+struct Revision {
+  std::string hash;
+  bool dirty = false;
+};
+
+/// Of the sources that a build tree links to, else what was written down when the program was installed.
+Revision revision() {
+  const std::filesystem::path data = data_folder();
+  Revision r;
+  if (std::filesystem::exists(data / "source")) {
+    r.hash = git(data / "source", "rev-parse HEAD");
+    r.dirty = !r.hash.empty() && !git(data / "source", "status --porcelain --untracked-files=no").empty();
+  } else {
+    std::ifstream stream(data / "revision");
+    std::string word;
+    stream >> r.hash >> word;
+    r.dirty = word == "dirty";
+  }
+  return r;
 }
 
 }  // namespace
@@ -92,9 +114,9 @@ Json machine_context(const Experiment& experiment, const std::string& configurat
   context["compiler_flags"] = build_info::kFlags;
   context["build_type"] = build_info::kBuildType;
   context["version"] = build_info::kVersion;
-  const std::string revision = git("rev-parse HEAD");
-  context["git_revision"] = revision.empty() ? "unknown" : revision;
-  context["git_dirty"] = !revision.empty() && !git("status --porcelain --untracked-files=no").empty();
+  const Revision at = revision();
+  context["git_revision"] = at.hash.empty() ? "unknown" : at.hash;
+  context["git_dirty"] = at.dirty;
   context["configuration_hash"] = configuration_hash;
   context["seed"] = experiment.measure.seed;
   context["plots"] = experiment.plots;

@@ -8,7 +8,7 @@
 
 #include <cstdlib>
 
-#include "experiments/build_info.h"
+#include "core/data_folder.h"
 
 extern char** environ;
 
@@ -48,10 +48,8 @@ std::optional<std::string> find_plot_python() {
 
 std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures,
                        bool quiet) {
-  const std::filesystem::path script =
-      std::filesystem::path(build_info::kSourceDirectory) / "plots" / "plot.py";
-  if (!std::filesystem::exists(script))
-    return fmt::format("no plots: {} is missing; run from the project's own build", script.string());
+  const std::filesystem::path script = data_folder() / "plots" / "plot.py";
+  if (!std::filesystem::exists(script)) return fmt::format("no plots: {} is missing; install again", script.string());
   const std::optional<std::string> python = find_plot_python();
   if (!python)
     return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the "

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "core/data_folder.h"
 #include "core/error.h"
 #include "core/names.h"
 #include "scenes/generators/generators.h"
@@ -17,7 +18,7 @@ namespace {
 std::filesystem::path catalogue_file() {
   const char* other = std::getenv("ARBORETUM_CATALOGUE");
   return other && *other ? std::filesystem::path(other)
-                         : std::filesystem::path(ARBORETUM_SCENES_DIR) / "catalogue.yaml";
+                         : data_folder() / "scenes" / "catalogue.yaml";
 }
 
 CatalogueEntry read_entry(const YamlFile& file, const YAML::Node& node) {

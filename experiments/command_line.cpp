@@ -1,0 +1,160 @@
+// The command line: reads the words, runs the command, turns errors into one line and an exit status.
+#include "experiments/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <new>
+#include <system_error>
+
+#include "core/names.h"
+#include "experiments/build_info.h"
+#include "experiments/commands.h"
+
+namespace arboretum {
+namespace {
+
+struct Arguments {
+  RunCommand run;
+  std::string axis, scene;
+  bool json = false;
+  std::filesystem::path results;
+  std::vector<std::string> figures, fetched;
+};
+
+void declare_run(CLI::App& app, RunCommand& run) {
+  CLI::App* c =
+      app.add_subcommand("run", "Run the sweep of a configuration; table, results, plots and report");
+  c->add_option("CONFIG", run.config, "The configuration, a YAML file")->required();
+  c->add_option("AXIS", run.overrides.axes,
+                "axis=value,value in place of the configuration's (isa=avx2,avx512)");
+  c->add_option("--out", run.out, "Result folder (default: results/<experiment>)");
+  c->add_flag("--list", run.list, "Print the cells' names and measure nothing");
+  c->add_flag("--dry-run", run.dry_run,
+              "Print cells, skipped ones with reasons and a time estimate; measure nothing");
+  c->add_option("--filter", run.filter, "Only cells whose name this regular expression finds");
+  c->add_option("--skip", run.skip, "No cells whose name this regular expression finds");
+  c->add_flag("--resume", run.resume, "Go on with a run that was cut off");
+  c->add_option("--repetitions", run.overrides.repetitions, "Timed repetitions of each cell")
+      ->check(CLI::Range(1, 100000));
+  c->add_option("--threads", run.overrides.threads, "Threads, in place of the configuration's")
+      ->check(CLI::Range(1, 4096));
+  c->add_option("--seed", run.overrides.seed, "Seed of the workloads' random numbers");
+  c->add_flag("--fail-fast", run.fail_fast, "Stop at the first wrong answer");
+  c->add_flag("--no-plots", run.no_plots, "Draw no plots and write no report");
+  c->footer("Google Benchmark's --benchmark_* flags pass through.");
+}
+
+void declare(CLI::App& app, Arguments& a) {
+  app.require_subcommand(0, 1);
+  app.set_version_flag("--version", std::string(build_info::kVersion));
+  declare_run(app, a.run);
+  CLI::App* list = app.add_subcommand("list", "What can be swept");
+  list->add_option(
+      "AXIS", a.axis,
+      "structures, builders, leaves, intersectors, boxes, traversals, isas, workloads, scenes, effects");
+  list->add_flag("--json", a.json, "As JSON");
+  CLI::App* info = app.add_subcommand("info", "What a scene holds");
+  info->add_option("SCENE", a.scene, "A catalogue name, a file, or generator:triangles[:seed]")->required();
+  info->add_flag("--json", a.json, "As JSON");
+  CLI::App* plot = app.add_subcommand("plot", "Draw the figures and the report of a result folder again");
+  plot->add_option("RESULTS", a.results, "A folder that `run` wrote")->required();
+  plot->add_option("--only", a.figures, "These figures alone")->delimiter(',');
+  CLI::App* fetch = app.add_subcommand("fetch", "Bring catalogue scenes from their packages");
+  fetch->add_option("SCENE", a.fetched, "Names of `list scenes`")->required();
+  for (CLI::App* c : app.get_subcommands({}))
+    c->allow_extras();  // unknown options are named by us, with the nearest
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* c : app.get_subcommands({})) names.push_back(c->get_name());
+  return names;
+}
+
+void refuse_extras(const CLI::App& command) {
+  for (const std::string& word : command.remaining()) {
+    if (!word.starts_with("-"))
+      throw UserError(fmt::format("{}: '{}' is one word too many; see `arboretum {} --help`",
+                                  command.get_name(), word, command.get_name()));
+    std::vector<std::string> options;
+    for (const CLI::Option* option : command.get_options({})) {
+      for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
+    }
+    throw UserError(fmt::format("{}: {}", command.get_name(),
+                                unknown_name_message("option", word.substr(0, word.find('=')), options)));
+  }
+}
+
+ExitStatus dispatch(std::vector<std::string> words) {
+  Arguments a;
+  a.run.command_line = fmt::format("arboretum {}", fmt::join(words, " "));
+  CLI::App app("Arboretum: a research testbed of ray-tracing acceleration structures", "arboretum");
+  declare(app, a);
+  const std::vector<std::string> commands = command_names(app);
+  if (words.empty())
+    throw UserError(
+        fmt::format("no command; one of {} (arboretum --help says more)", fmt::join(commands, ", ")));
+  if (!words.front().starts_with("-") && std::ranges::find(commands, words.front()) == commands.end()) {
+    throw UserError(unknown_name_message("command", words.front(), commands));
+  }
+  if (words.front() == "run") a.run.benchmark = take_benchmark_flags(words);
+  try {
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes the words in reverse
+  } catch (const CLI::CallForHelp&) {
+    fmt::print("{}", app.help());
+    return ExitStatus::kDone;
+  } catch (const CLI::CallForVersion& version) {
+    fmt::print("{}\n", version.what());
+    return ExitStatus::kDone;
+  } catch (const CLI::ParseError& e) {
+    std::string line = e.what();
+    std::ranges::replace(line, '\n', ' ');
+    throw UserError(fmt::format("{}: {}; see `arboretum {} --help`", words.front(), line, words.front()));
+  }
+  const auto used = app.get_subcommands();
+  if (used.empty()) throw UserError(fmt::format("no command; one of {}", fmt::join(commands, ", ")));
+  refuse_extras(*used.front());
+  const std::string name = used.front()->get_name();
+  if (name == "run") return command_run(std::move(a.run));
+  if (name == "list") return command_list(a.axis, a.json);
+  if (name == "info") return command_info(a.scene, a.json);
+  if (name == "plot") return command_plot(a.results, a.figures);
+  return command_fetch(a.fetched);
+}
+
+/// One line, whatever the message holds.
+int fail(std::string message) {
+  std::ranges::replace(message, '\n', ' ');
+  fmt::print(stderr, "arboretum: {}\n", message);
+  return static_cast<int>(ExitStatus::kUsage);
+}
+
+}  // namespace
+
+int command_line(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file-size limit is told by the failing write, not by a signal
+  std::signal(SIGPIPE, SIG_IGN);
+  try {
+    const int status = static_cast<int>(dispatch({argv + 1, argv + argc}));
+    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+      return fail("output cannot be written: stdout is full or closed");
+    return status;
+  } catch (const UserError& e) {
+    std::fflush(stdout);
+    return fail(e.what());
+  } catch (const std::bad_alloc&) {
+    return fail("out of memory; lower the number of triangles or the resolution");
+  } catch (const std::system_error& e) {
+    return fail(
+        fmt::format("output cannot be written: {}; free some space or write elsewhere", e.code().message()));
+  } catch (const std::exception& e) {
+    return fail(fmt::format("internal error: {}; please report it with the command line", e.what()));
+  }
+}
+
+}  // namespace arboretum
