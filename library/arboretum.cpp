@@ -1,0 +1,149 @@
+#include "library/arboretum.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/names.h"
+
+namespace arboretum {
+namespace {
+
+[[noreturn]] void throw_unknown(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) {
+  const std::vector<std::string> names(valid.begin(), valid.end());
+  throw UserError(unknown_name_message(kind, name, names));
+}
+
+void check_name(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) {
+  if (std::ranges::find(valid, name) == valid.end()) throw_unknown(kind, name, valid);
+}
+
+void check_mesh(const TriangleMesh& mesh) {
+  const auto number = [](std::size_t n) { return std::to_string(n); };
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const Triangle t = mesh.triangles[i];
+    for (std::uint32_t vertex : {t.a, t.b, t.c}) {
+      if (vertex >= mesh.vertices.size())
+        throw UserError("triangle " + number(i) + " names vertex " + number(vertex) + " of " + number(mesh.vertices.size()) +
+                        "; indices count from 0");
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (!(std::abs(mesh.vertices[vertex][axis]) <= kMaxCoordinate))
+          throw UserError("triangle " + number(i) + ": vertex " + number(vertex) +
+                          " is not finite or beyond 2^40; drop such triangles or scale the mesh");
+      }
+    }
+  }
+}
+
+std::vector<std::string_view> isa_names(std::span<const Isa> isas) {
+  std::vector<std::string_view> names;
+  for (Isa isa : isas) names.push_back(to_string(isa));
+  return names;
+}
+
+const KernelRow* find(const TracerSettings& s, std::string_view traversal, Isa isa) {
+  const std::string_view leaf = s.leaf.empty() ? default_leaf(s.structure, s.intersector, isa) : std::string_view(s.leaf);
+  return find_kernel(s.structure, leaf, s.intersector, s.box, traversal, isa);
+}
+
+/// The instruction sets that the settings allow, the best first.
+std::vector<Isa> allowed_isas(const TracerSettings& s) {
+  const std::span<const Isa> available = available_isas();
+  if (s.isa.empty()) return {available.rbegin(), available.rend()};
+  const std::optional<Isa> isa = parse_isa(s.isa);
+  if (!isa) throw_unknown("isa", s.isa, isa_names(kAllIsas));
+  if (!is_available(*isa)) {
+    std::string line = "isa " + s.isa + " is not available here; use one of";
+    for (std::string_view name : isa_names(available)) line.append(" ").append(name);
+    throw UserError(line);
+  }
+  return {*isa};
+}
+
+void check_sizes(const RayBatch& rays, std::size_t answers) {
+  if (answers != rays.size())
+    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with room for " + std::to_string(answers) + " answers");
+  if (!rays.times.empty() && rays.times.size() != rays.size())
+    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with " + std::to_string(rays.times.size()) + " times");
+}
+
+/// The row for batches. Fills in the ISA and the leaf.
+const KernelRow& resolve_kernel(TracerSettings& s) {
+  const AxisValues& known = axis_values();
+  if (!s.leaf.empty()) check_name("leaf", s.leaf, find_structure(s.structure)->info.leaves);
+  check_name("intersector", s.intersector, known.intersectors);
+  check_name("box", s.box, known.boxes);
+  check_name("traversal", s.traversal, known.traversals);
+  const std::vector<Isa> isas = allowed_isas(s);
+  for (Isa isa : isas) {
+    if (const KernelRow* row = find(s, s.traversal, isa)) {
+      s.isa = to_string(isa), s.leaf = row->leaf;
+      return *row;
+    }
+  }
+  const std::string_view leaf = s.leaf.empty() ? default_leaf(s.structure, s.intersector, isas.front()) : std::string_view(s.leaf);
+  throw UserError(why_no_kernel(s.structure, leaf, s.intersector, s.box, s.traversal, isas.front()));
+}
+
+}  // namespace
+
+TriangleMesh make_mesh(std::span<const float> coordinates, std::span<const std::uint32_t> indices) {
+  if (coordinates.size() % 3 != 0)
+    throw UserError("make_mesh: " + std::to_string(coordinates.size()) + " coordinates; a vertex has three");
+  if (indices.size() % 3 != 0) throw UserError("make_mesh: " + std::to_string(indices.size()) + " indices; a triangle has three");
+  TriangleMesh mesh;
+  mesh.vertices.reserve(coordinates.size() / 3);
+  for (std::size_t i = 0; i < coordinates.size(); i += 3)
+    mesh.vertices.push_back({coordinates[i], coordinates[i + 1], coordinates[i + 2]});
+  mesh.triangles.reserve(indices.size() / 3);
+  for (std::size_t i = 0; i < indices.size(); i += 3) mesh.triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
+  return mesh;
+}
+
+TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles) {
+  TriangleMesh mesh;
+  mesh.vertices.assign(vertices.begin(), vertices.end());
+  mesh.triangles.assign(triangles.begin(), triangles.end());
+  return mesh;
+}
+
+Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
+    : mesh_(std::make_unique<const TriangleMesh>(std::move(mesh))), settings_(std::move(settings)) {
+  check_mesh(*mesh_);
+  const StructureEntry* entry = find_structure(settings_.structure);
+  if (!entry) {
+    std::vector<std::string_view> names;
+    for (const StructureEntry& e : all_structures()) names.push_back(e.info.name);
+    throw_unknown("structure", settings_.structure, names);
+  }
+  if (settings_.builder.empty()) settings_.builder = entry->info.builders.front();
+  if (settings_.threads == 0) settings_.threads = std::max(1u, std::thread::hardware_concurrency());
+  batch_ = &resolve_kernel(settings_);
+  const auto row_or_batch = [&](const std::string& traversal) {
+    const KernelRow* row = find(settings_, traversal, batch_->isa);
+    return row ? row : batch_;
+  };
+  one_ = row_or_batch("single");
+  for (std::size_t i = 0; i < kPacketSizes.size(); ++i) packet_[i] = row_or_batch("packet" + std::to_string(kPacketSizes[i]));
+
+  BuildSettings build;
+  build.builder = settings_.builder, build.leaf = settings_.leaf, build.isa = batch_->isa, build.threads = settings_.threads;
+  build.parameters = settings_.parameters;
+  accel_ = build_structure(settings_.structure, *mesh_, build, report_);
+}
+
+void Tracer::closest_hit(RayBatch rays, std::span<Hit> hits) const {
+  check_sizes(rays, hits.size());
+  batch_->closest_hit(*accel_, rays, hits, nullptr);
+}
+
+void Tracer::any_hit(RayBatch rays, std::span<std::uint8_t> occluded) const {
+  check_sizes(rays, occluded.size());
+  batch_->any_hit(*accel_, rays, occluded, nullptr);
+}
+
+}  // namespace arboretum

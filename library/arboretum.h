@@ -1,0 +1,115 @@
+// Arboretum as a library: a mesh, a structure built over it, and rays traced through it, one, a few together or many.
+//
+//   #include <arboretum/arboretum.h>
+//   arboretum::Tracer tracer(arboretum::make_mesh(coordinates, indices));
+//   arboretum::Hit hit = tracer.closest_hit({.origin = {0, 0, -3}, .direction = {0, 0, 1}});
+//
+// What a ray, a hit and a tie are: core/ray.h. Errors are UserError (core/error.h): one line that says what, and the mend.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/error.h"
+#include "core/isa.h"
+#include "core/mesh.h"
+#include "core/ray.h"
+#include "structures/accel.h"
+#include "traversal/kernel_table.h"
+
+namespace arboretum {
+
+/// A mesh of `coordinates` x y z x y z ..., in any unit of length, and `indices`, three a triangle. Copies both. Throws
+/// UserError where a count is no multiple of three; Tracer checks the rest.
+[[nodiscard]] TriangleMesh make_mesh(std::span<const float> coordinates, std::span<const std::uint32_t> indices);
+[[nodiscard]] TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles);
+
+/// How a Tracer is built and how it traces, by the keys that `arboretum list` shows. The defaults put correctness first:
+/// no hit is lost at an edge, nor between two boxes.
+struct TracerSettings {
+  std::string structure = "bvh8";
+  std::string builder;  ///< empty: the structure's first
+  std::string leaf;     ///< empty: the block that suits structure, intersector and instruction set
+  std::string intersector = "watertight";
+  std::string box = "padded";
+  std::string traversal = "single";  ///< of batches; one ray goes by `single`, a packet of N by `packetN`, where the structure has them
+  std::string isa;                   ///< empty: the best of this machine for which there is such a kernel
+  unsigned threads = 0;              ///< of the build; 0: one a core. The structure is the same for any number.
+  BuilderParameters parameters;
+};
+
+/// A mesh with a structure over it, ready for rays. Moves, does not copy; a Tracer that was moved from can only be assigned to
+/// or destroyed. The const functions may be called from any number of threads at once; each works on the calling thread.
+class Tracer {
+ public:
+  /// Builds. Throws UserError for a key that does not exist (naming the nearest), for keys that do not go together, for an
+  /// instruction set that the machine lacks, for an index beyond the vertices, and for a vertex of a triangle that is not finite
+  /// or beyond kMaxCoordinate (2^40). An empty mesh is none of these: every ray misses it.
+  explicit Tracer(TriangleMesh mesh, TracerSettings settings = {});
+
+  /// The nearest hit within the closed interval [tnear, tfar], t in units of the direction's length. A miss has t = infinity.
+  [[nodiscard]] Hit closest_hit(const Ray& ray) const {
+    Hit hit;
+    one_->closest_hit(*accel_, RayBatch({&ray, 1}), {&hit, 1}, nullptr);
+    return hit;
+  }
+  /// Whether anything lies within [tnear, tfar].
+  [[nodiscard]] bool any_hit(const Ray& ray) const {
+    std::uint8_t occluded = 0;
+    one_->any_hit(*accel_, RayBatch({&ray, 1}), {&occluded, 1}, nullptr);
+    return occluded != 0;
+  }
+
+  /// N rays that go together, answered in order: by the kernel `packetN` where there is one, else as a batch of N.
+  template <std::size_t N>
+  [[nodiscard]] std::array<Hit, N> closest_hit(const std::array<Ray, N>& packet) const {
+    std::array<Hit, N> hits;
+    kernel_of_packet(N).closest_hit(*accel_, std::span<const Ray>(packet), hits, nullptr);
+    return hits;
+  }
+  /// As above; 1 for a ray that meets something, else 0.
+  template <std::size_t N>
+  [[nodiscard]] std::array<std::uint8_t, N> any_hit(const std::array<Ray, N>& packet) const {
+    std::array<std::uint8_t, N> occluded;
+    kernel_of_packet(N).any_hit(*accel_, std::span<const Ray>(packet), occluded, nullptr);
+    return occluded;
+  }
+
+  /// hits[i] answers rays[i]. Throws UserError when the two, or times that are given, are not equally many.
+  void closest_hit(RayBatch rays, std::span<Hit> hits) const;
+  /// occluded[i] becomes 1 when rays[i] meets something, else 0. Throws as above.
+  void any_hit(RayBatch rays, std::span<std::uint8_t> occluded) const;
+
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
+  /// The structure itself: its bytes, and its nodes and leaves by visit().
+  [[nodiscard]] const Accel& structure() const noexcept { return *accel_; }
+  /// Seconds, peak memory and phases of the build.
+  [[nodiscard]] const BuildReport& report() const noexcept { return report_; }
+  /// The settings with every empty key filled in.
+  [[nodiscard]] const TracerSettings& settings() const noexcept { return settings_; }
+  /// The row of the kernel table that traces batches.
+  [[nodiscard]] const KernelRow& kernel() const noexcept { return *batch_; }
+  /// The row that traces packets of `rays` rays.
+  [[nodiscard]] const KernelRow& kernel_of_packet(std::size_t rays) const noexcept {
+    for (std::size_t i = 0; i < kPacketSizes.size(); ++i)
+      if (kPacketSizes[i] == rays) return *packet_[i];
+    return *batch_;
+  }
+
+ private:
+  static constexpr std::array<std::size_t, 5> kPacketSizes{4, 8, 16, 32, 64};
+
+  std::unique_ptr<const TriangleMesh> mesh_;  ///< on the heap: the structure points at it
+  TracerSettings settings_;
+  BuildReport report_;
+  std::unique_ptr<const Accel> accel_;
+  const KernelRow* one_ = nullptr;
+  const KernelRow* batch_ = nullptr;
+  std::array<const KernelRow*, kPacketSizes.size()> packet_{};
+};
+
+}  // namespace arboretum

@@ -1,0 +1,190 @@
+// Arboretum as a library: one ray, a packet and a batch give the kernel's own answers, bit for bit, defaults are what the
+// header says, and every misuse is one line.
+#include "library/arboretum.h"
+
+#include <type_traits>
+
+#include "oracle/oracle.h"
+#include "tests/catch.h"
+#include "tests/kernel_runner.h"
+#include "tests/kernel_scenes.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+namespace {
+
+static_assert(std::is_nothrow_move_constructible_v<Tracer> && std::is_nothrow_move_assignable_v<Tracer>);
+static_assert(!std::is_copy_constructible_v<Tracer>);
+
+constexpr std::size_t kGeneric = 203;
+
+std::vector<Ray> test_rays(const TriangleMesh& mesh) {
+  std::vector<Ray> rays = generic_rays(mesh, kGeneric, 5);
+  for (const Ray& ray : aimed_rays(mesh, {0.3f, 0.2f, 2.5f}, 200, 6)) rays.push_back(ray);
+  for (const Ray& ray : invalid_rays()) rays.push_back(ray);
+  return rays;
+}
+
+template <std::size_t N>
+void check_packets(const Tracer& tracer, const std::vector<Ray>& rays, const std::vector<Hit>& hits,
+                   const std::vector<std::uint8_t>& occluded) {
+  for (std::size_t first = 0; first + N <= rays.size(); first += N) {
+    std::array<Ray, N> packet;
+    std::copy_n(rays.begin() + std::ptrdiff_t(first), N, packet.begin());
+    REQUIRE(same_bits(tracer.closest_hit(packet), std::span(hits).subspan(first, N)));
+    const std::array<std::uint8_t, N> any = tracer.any_hit(packet);
+    REQUIRE(std::equal(any.begin(), any.end(), occluded.begin() + std::ptrdiff_t(first)));
+  }
+}
+
+/// One ray, packets and the batch agree bit for bit; returns the batch's hits.
+std::vector<Hit> check_three_ways(const Tracer& tracer, const std::vector<Ray>& rays) {
+  std::vector<Hit> hits(rays.size());
+  std::vector<std::uint8_t> occluded(rays.size(), 7);
+  tracer.closest_hit(rays, hits);
+  tracer.any_hit(rays, occluded);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Hit hit = tracer.closest_hit(rays[i]);
+    REQUIRE(same_bits({&hit, 1}, {&hits[i], 1}));
+    REQUIRE(tracer.any_hit(rays[i]) == (occluded[i] == 1));
+    REQUIRE(occluded[i] == std::uint8_t(hit.is_hit()));
+  }
+  check_packets<1>(tracer, rays, hits, occluded);
+  check_packets<4>(tracer, rays, hits, occluded);
+  check_packets<7>(tracer, rays, hits, occluded);
+  check_packets<8>(tracer, rays, hits, occluded);
+  check_packets<16>(tracer, rays, hits, occluded);
+  check_packets<64>(tracer, rays, hits, occluded);
+  return hits;
+}
+
+std::string message_of(const TracerSettings& settings, TriangleMesh mesh = sphere(4)) {
+  try {
+    const Tracer tracer(std::move(mesh), settings);
+  } catch (const UserError& e) {
+    CHECK(std::string_view(e.what()).find('\n') == std::string_view::npos);
+    return e.what();
+  }
+  return {};
+}
+
+TracerSettings with(std::string TracerSettings::*key, std::string value) {
+  TracerSettings settings;
+  settings.*key = std::move(value);
+  return settings;
+}
+
+}  // namespace
+
+TEST_CASE("one ray, a packet and a batch agree on every structure and ISA, and with the exact answers by default") {
+  const TriangleMesh mesh = sphere(16);
+  const std::vector<Ray> rays = test_rays(mesh);
+  const std::vector<ExactHit> truth = Oracle(mesh).closest_hit(rays);
+  for (const StructureEntry& entry : all_structures()) {
+    for (Isa isa : available_isas()) {
+      INFO(entry.info.name << " " << to_string(isa));
+      TracerSettings settings;
+      settings.structure = entry.info.name, settings.isa = to_string(isa);
+      if (entry.info.name == "embree") settings.intersector = "pluecker";
+      if (default_leaf(settings.structure, settings.intersector, isa).empty()) continue;  // not compiled in
+      const Tracer tracer(mesh, settings);
+      CHECK(tracer.settings().isa == to_string(isa));
+      CHECK(tracer.settings().builder == entry.info.builders.front());
+      CHECK(tracer.structure().info().name == entry.info.name);
+      CHECK(tracer.kernel().leaf == tracer.settings().leaf);
+      const std::vector<Hit> hits = check_three_ways(tracer, rays);
+      if (entry.info.name == "embree") continue;
+      std::size_t found = 0;
+      for (std::size_t i = 0; i < kGeneric; ++i) {  // at the silhouette rounding decides
+        found += truth[i].hit.is_hit();
+        REQUIRE(hits[i].is_hit() == truth[i].hit.is_hit());
+      }
+      CHECK(found > 100);
+    }
+  }
+}
+
+TEST_CASE("the defaults: watertight, padded, the best instruction set") {
+  const Tracer tracer(sphere(8));
+  CHECK(tracer.settings().structure == "bvh8");
+  CHECK(tracer.kernel().intersector == "watertight");
+  CHECK(tracer.kernel().box == "padded");
+  CHECK(tracer.settings().threads >= 1);
+  CHECK(tracer.report().seconds > 0);
+  CHECK(tracer.structure().bytes() > 0);
+  const Isa best = tracer.kernel().isa;
+  for (Isa isa : available_isas()) CHECK((isa <= best || default_leaf("bvh8", "watertight", isa).empty()));
+}
+
+TEST_CASE("a tracer moves with its mesh") {
+  TracerSettings settings;
+  settings.leaf = "triangle4i";  // reads the mesh's vertices while it traces
+  Tracer first(sphere(8), settings);
+  const Ray ray{{0.1f, 0.2f, -3}, 0, {0, 0, 1}, kInfinity};
+  const Hit before = first.closest_hit(ray);
+  CHECK(before.is_hit());
+  Tracer second(std::move(first));
+  first = Tracer(sphere(3));
+  const Hit after = second.closest_hit(ray);
+  CHECK(same_bits({&before, 1}, {&after, 1}));
+  CHECK(second.mesh().size() == sphere(8).size());
+}
+
+TEST_CASE("an empty mesh is missed, an empty batch is nothing") {
+  const Tracer tracer(TriangleMesh{});
+  CHECK_FALSE(tracer.closest_hit({{0, 0, -3}, 0, {0, 0, 1}, kInfinity}).is_hit());
+  CHECK_FALSE(tracer.any_hit(Ray{{0, 0, -3}, 0, {0, 0, 1}, kInfinity}));
+  tracer.closest_hit(RayBatch{}, {});
+}
+
+TEST_CASE("make_mesh takes flat arrays and vectors of points alike") {
+  const float xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::uint32_t abc[] = {0, 1, 2};
+  const TriangleMesh flat = make_mesh(std::span(xyz), std::span(abc));
+  const TriangleMesh points = make_mesh(std::span<const Vec3f>(flat.vertices), std::span<const Triangle>(flat.triangles));
+  CHECK(flat.vertices == points.vertices);
+  CHECK(flat.triangles == points.triangles);
+  CHECK(flat.triangles.front() == Triangle{0, 1, 2});
+  CHECK_THROWS_AS(make_mesh(std::span(xyz).first(8), std::span(abc)), UserError);
+  CHECK_THROWS_AS(make_mesh(std::span(xyz), std::span(abc).first(2)), UserError);
+}
+
+TEST_CASE("misuse is told in one line that names the mend") {
+  struct Case {
+    TracerSettings settings;
+    const char* says;
+  };
+  TracerSettings unreadable = with(&TracerSettings::leaf, "triangle4");
+  const Case cases[] = {
+      {with(&TracerSettings::structure, "bhv8"), "did you mean 'bvh8'"},
+      {with(&TracerSettings::builder, "binned_sha"), "did you mean 'binned_sah'"},
+      {with(&TracerSettings::leaf, "triangel4v"), "did you mean 'triangle4v'"},
+      {with(&TracerSettings::intersector, "watretight"), "did you mean 'watertight'"},
+      {with(&TracerSettings::box, "paded"), "did you mean 'padded'"},
+      {with(&TracerSettings::traversal, "singel"), "did you mean 'single'"},
+      {with(&TracerSettings::isa, "avx3"), "unknown isa 'avx3'"},
+      {unreadable, "watertight cannot read leaf triangle4 in bvh8: use"},
+  };
+  for (const Case& c : cases) {
+    INFO(c.says);
+    CHECK_THAT(message_of(c.settings), Catch::Contains(c.says));
+  }
+
+  TriangleMesh beyond = sphere(4);
+  beyond.triangles[3].b = 4000;
+  CHECK_THAT(message_of({}, beyond), Catch::Contains("triangle 3 names vertex 4000 of"));
+  TriangleMesh infinite = sphere(4);
+  infinite.vertices[0].y = kInfinity;
+  CHECK_THAT(message_of({}, infinite), Catch::Contains("vertex 0 is not finite"));
+  infinite.vertices[0].y = 3e12f;
+  CHECK_THAT(message_of({}, infinite), Catch::Contains("beyond 2^40"));
+
+  const Tracer tracer(sphere(4));
+  const std::vector<Ray> rays(3);
+  std::vector<Hit> hits(2);
+  CHECK_THROWS_WITH(tracer.closest_hit(rays, hits), "a batch of 3 rays with room for 2 answers");
+  hits.resize(3);
+  const float times[] = {0.0f, 0.5f};
+  CHECK_THROWS_WITH(tracer.closest_hit(RayBatch(rays, times), hits), "a batch of 3 rays with 2 times");
+}
