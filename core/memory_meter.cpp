@@ -25,16 +25,23 @@ std::size_t MemoryMeter::current() noexcept { return current_bytes.load(std::mem
 std::size_t MemoryMeter::peak() noexcept { return peak_bytes.load(std::memory_order_relaxed); }
 void MemoryMeter::reset_peak() noexcept { peak_bytes.store(current(), std::memory_order_relaxed); }
 
-void* allocate_metered(std::size_t bytes) {
+void* allocate_uncounted(std::size_t bytes) {
   void* data = ::operator new(bytes, alignment_of(bytes));
   if (bytes >= kHugePage) (void)madvise(data, bytes, MADV_HUGEPAGE);  // a wish, not a need
+  return data;
+}
+
+void release_uncounted(void* data, std::size_t bytes) noexcept { ::operator delete(data, alignment_of(bytes)); }
+
+void* allocate_metered(std::size_t bytes) {
+  void* data = allocate_uncounted(bytes);
   MemoryMeter::add(bytes);
   return data;
 }
 
 void release_metered(void* data, std::size_t bytes) noexcept {
   MemoryMeter::remove(bytes);
-  ::operator delete(data, alignment_of(bytes));
+  release_uncounted(data, bytes);
 }
 
 }  // namespace arboretum

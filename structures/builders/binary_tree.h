@@ -5,6 +5,7 @@
 
 #include "core/bounds.h"
 #include "core/memory_meter.h"
+#include "core/reserved_array.h"
 
 namespace arboretum {
 
@@ -26,10 +27,11 @@ static_assert(sizeof(BinaryNode) == 32);
 /// Node 0 is the root. Slots of `nodes` that no parent names are unused and uninitialised. The references below a node
 /// are consecutive in `primitives`; `first` gives where a leaf's begin.
 struct BinaryTree {
-  MeteredVector<BinaryNode> nodes;
+  ReservedArray<BinaryNode> nodes;
   std::size_t node_count = 0;  ///< indices below this are in use, but for gaps
   MeteredVector<std::uint32_t> primitives;
-  MeteredVector<std::uint32_t> first;  ///< one a node; set for leaves
+  ReservedArray<std::uint32_t> first;  ///< one a node; set for leaves
+  bool duplicates = false;  ///< a primitive may be referenced by several leaves
 
   /// Where the references below `node` begin.
   [[nodiscard]] std::uint32_t begin_of(std::uint32_t node) const noexcept {

@@ -1,0 +1,265 @@
+// What the binned SAH builders share: references, the bins of three axes, the sweep over them, the partition.
+//
+// A reference is 32 bytes, [-lower, id, upper, 0], so that merging boxes is one maximum of eight lanes. Minima, maxima and
+// counts do not depend on order and no arithmetic is fused, so bins are the same however the references are cut into
+// chunks, and on any ISA.
+#pragma once
+
+#include "simd/simd.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+namespace sah {
+
+using Box = vf<8>;  ///< [-lower.xyz, any, upper.xyz, any]
+
+struct alignas(32) Reference {
+  float neg_lower[3];
+  std::uint32_t id;
+  float upper[3];
+  float zero;
+};
+static_assert(sizeof(Reference) == 32);
+
+inline constexpr unsigned kMaxBins = 64;
+inline constexpr std::size_t kChunk = 1u << 14;     ///< references a task takes at a time
+inline constexpr std::size_t kLarge = 4 * kChunk;   ///< more references than this are split by several tasks
+inline constexpr std::size_t kParallel = 1u << 12;  ///< smaller subtrees are built by one task
+
+/// Bins of the three axes, twice over: consecutive references go to different sets, so that a read after a write to the
+/// same bin does not wait.
+struct Bins {
+  Box box[2][3][kMaxBins];
+  std::int32_t count4[kMaxBins][4];  ///< references by bin, then axis; exact as float below 2^24, good enough above
+};
+
+struct Split {
+  float cost = std::numeric_limits<float>::infinity();
+  int axis = -1;
+  unsigned bin = 0;
+  std::size_t left_count = 0;
+};
+
+ARBORETUM_INLINE Box empty_box() { return Box(-std::numeric_limits<float>::infinity()); }
+ARBORETUM_INLINE vf<4> low_half(Box b) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+  return b.lo;
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  return vf<4>::load(b.lane);
+#else
+  return vf<4>(_mm256_castps256_ps128(b.v));
+#endif
+}
+ARBORETUM_INLINE vf<4> high_half(Box b) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+  return b.hi;
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  return vf<4>::load(b.lane + 4);
+#else
+  return vf<4>(_mm256_extractf128_ps(b.v, 1));
+#endif
+}
+ARBORETUM_INLINE Box both_halves(vf<4> low, vf<4> high) {
+  alignas(32) float v[8];
+  low.store(v), high.store(v + 4);
+  return Box::load(v);
+}
+/// The centroid, doubled: upper + lower.
+ARBORETUM_INLINE vf<4> centroid(const Reference& r) { return vf<4>::load(r.upper) - vf<4>::load(r.neg_lower); }
+
+inline float lane_of(vf<4> v, int lane) {
+  alignas(16) float lanes[4];
+  v.store(lanes);
+  return lanes[lane];
+}
+
+/// Maps a centroid to a bin on each axis.
+struct BinMap {
+  vf<4> lower, scale;
+  unsigned bins;
+  BinMap(Box centroids, std::size_t n, unsigned max_bins) {
+    bins = std::min(max_bins, n < 48 ? 8u : n < 1024 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
+    const vf<4> low = -low_half(centroids), extent = high_half(centroids) - low;
+    lower = low;
+    // A flat axis gets scale 0: all in bin 0, and no split there.
+    scale = select(extent > vf<4>(std::numeric_limits<float>::min()), vf<4>(float(bins) * 0.9999f) / extent, vf<4>(0.0f));
+  }
+  ARBORETUM_INLINE void operator()(const Reference& r, std::int32_t* bin) const {
+    truncate_to_int((centroid(r) - lower) * scale).store(bin);
+  }
+};
+
+inline void clear(Bins& bins, unsigned n, int sets) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int set = 0; set < sets; ++set) {
+      for (unsigned b = 0; b < n; ++b) bins.box[set][axis][b] = empty_box();
+    }
+  }
+  std::memset(bins.count4, 0, n * sizeof bins.count4[0]);
+}
+
+inline void bin(const Reference* r, const Reference* end, const BinMap& map, Bins& bins) {
+  const int sets = end - r < 64 ? 1 : 2;
+  clear(bins, map.bins, sets);
+  const auto put = [&](const Reference& ref, int set) {
+    alignas(16) std::int32_t b[4];
+    map(ref, b);
+    const Box box = Box::load(&ref);
+    for (int axis = 0; axis < 3; ++axis) {
+      bins.box[set][axis][b[axis]] = max_x86(box, bins.box[set][axis][b[axis]]);
+      ++bins.count4[b[axis]][axis];
+    }
+  };
+  if (sets == 1) {
+    for (; r < end; ++r) put(*r, 0);
+    return;
+  }
+  for (; r + 1 < end; r += 2) put(r[0], 0), put(r[1], 1);
+  if (r < end) put(*r, 0);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (unsigned b = 0; b < map.bins; ++b) bins.box[0][axis][b] = max_x86(bins.box[0][axis][b], bins.box[1][axis][b]);
+  }
+}
+
+inline void merge(Bins& into, const Bins& from, unsigned n) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (unsigned b = 0; b < n; ++b) {
+      into.box[0][axis][b] = max_x86(into.box[0][axis][b], from.box[0][axis][b]);
+      into.count4[b][axis] += from.count4[b][axis];
+    }
+  }
+}
+
+/// Rows a, b, c of x y z become columns: x holds the three first components.
+ARBORETUM_INLINE void transpose(vf<4> a, vf<4> b, vf<4> c, vf<4>& x, vf<4>& y, vf<4>& z) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  for (int i = 0; i < 4; ++i) {
+    const vf<4>& row = i == 0 ? a : i == 1 ? b : c;
+    x.lane[i] = row.lane[0], y.lane[i] = row.lane[1], z.lane[i] = row.lane[2];
+  }
+#else
+  const __m128 ab_low = _mm_unpacklo_ps(a.v, b.v);   // ax bx ay by
+  const __m128 ab_high = _mm_unpackhi_ps(a.v, b.v);  // az bz
+  x = vf<4>(_mm_movelh_ps(ab_low, c.v));             // ax bx cx cy
+  y = vf<4>(_mm_shuffle_ps(ab_low, c.v, _MM_SHUFFLE(1, 1, 3, 2)));
+  z = vf<4>(_mm_shuffle_ps(ab_high, c.v, _MM_SHUFFLE(2, 2, 1, 0)));
+#endif
+}
+
+/// Half the areas of three boxes, in lanes 0 to 2.
+ARBORETUM_INLINE vf<4> half_areas(const Box (&box)[3]) {
+  const vf<4> a = high_half(box[0]) + low_half(box[0]), b = high_half(box[1]) + low_half(box[1]), c = high_half(box[2]) + low_half(box[2]);
+  vf<4> x, y, z;
+  transpose(a, b, c, x, y, z);
+  return x * (y + z) + y * z;
+}
+
+ARBORETUM_INLINE vf<4> counts_of(const Bins& bins, unsigned b) {
+  return to_float(vi<4>::load(bins.count4[b]));
+}
+
+/// The cheapest plane: area times blocks on both sides, a block holding leaf_width references; the three axes in lanes.
+inline Split best_split(const Bins& bins, unsigned n, std::size_t total, unsigned leaf_width) {
+  const vf<4> per_block(1.0f / float(leaf_width)), one(1.0f), zero(0.0f), none(std::numeric_limits<float>::infinity());
+  vf<4> right_cost[kMaxBins];
+  Box box[3] = {empty_box(), empty_box(), empty_box()};
+  vf<4> count(0.0f);
+  for (unsigned b = n; --b > 0;) {
+    for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b], box[axis]);
+    count = count + counts_of(bins, b);
+    right_cost[b] = select(count > zero, half_areas(box) * max_x86(count * per_block, one), none);
+  }
+  for (Box& side : box) side = empty_box();
+  count = vf<4>(0.0f);
+  vf<4> best_cost = none;
+  vi<4> best_bin(0);
+  for (unsigned b = 1; b < n; ++b) {
+    for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b - 1], box[axis]);
+    count = count + counts_of(bins, b - 1);
+    const vf<4> cost = select(count > zero, half_areas(box) * max_x86(count * per_block, one) + right_cost[b], none);
+    const vm<4> better = cost < best_cost;
+    best_cost = select(better, cost, best_cost);
+    best_bin = select(better, vi<4>(std::int32_t(b)), best_bin);
+  }
+  alignas(16) float costs[4];
+  alignas(16) std::int32_t planes[4];
+  best_cost.store(costs), best_bin.store(planes);
+  Split best;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (costs[axis] < best.cost) best = {costs[axis], axis, unsigned(planes[axis]), 0};
+  }
+  if (best.axis < 0) return best;
+  for (unsigned b = 0; b < best.bin; ++b) best.left_count += std::uint32_t(bins.count4[b][best.axis]);
+  if (best.left_count == total) best.axis = -1;
+  return best;
+}
+
+/// Box of the bins on each side of a split.
+inline void child_bounds(const Bins& bins, unsigned n, const Split& split, Box& left, Box& right) {
+  left = right = empty_box();
+  for (unsigned b = 0; b < split.bin; ++b) left = max_x86(bins.box[0][split.axis][b], left);
+  for (unsigned b = split.bin; b < n; ++b) right = max_x86(bins.box[0][split.axis][b], right);
+}
+
+/// Moves references [r, end) to left_out and right_out, in order; returns the sides' centroid bounds.
+inline void partition(const Reference* r, const Reference* end, const BinMap& map, const Split& split, Reference* left_out,
+                      Reference* right_out, Box& left_centroids, Box& right_centroids) {
+  vf<4> bounds[4] = {-std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
+                     -std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
+  const vf<4> none = -std::numeric_limits<float>::infinity();
+  const float lower = lane_of(map.lower, split.axis), scale = lane_of(map.scale, split.axis);
+  for (; r < end; ++r) {
+    const vf<4> c = centroid(*r);
+    const float position = r->upper[split.axis] - r->neg_lower[split.axis];
+    const bool left = std::int32_t((position - lower) * scale) < std::int32_t(split.bin);
+    const Box box = Box::load(r);
+    box.store(left ? left_out : right_out);
+    left_out += left, right_out += !left;
+    const vm<4> is_left(left);
+    const vf<4> l = select(is_left, c, none), neg_l = select(is_left, -c, none);
+    const vf<4> h = select(is_left, none, c), neg_h = select(is_left, none, -c);
+    bounds[0] = max_x86(neg_l, bounds[0]), bounds[1] = max_x86(l, bounds[1]);
+    bounds[2] = max_x86(neg_h, bounds[2]), bounds[3] = max_x86(h, bounds[3]);
+  }
+  left_centroids = both_halves(bounds[0], bounds[1]);
+  right_centroids = both_halves(bounds[2], bounds[3]);
+}
+
+/// Bins of references [r, end) in `total`; many are binned in parallel, and `chunks` keeps the bins of each kChunk of them.
+inline void bin_range(const Reference* r, const Reference* end, const BinMap& map, Bins& total, MeteredVector<Bins>& chunks) {
+  const std::size_t n = std::size_t(end - r);
+  if (n <= kLarge) return bin(r, end, map, total);
+  chunks.resize((n + kChunk - 1) / kChunk);
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) { bin(r + c * kChunk, std::min(end, r + (c + 1) * kChunk), map, chunks[c]); });
+  clear(total, map.bins, 1);
+  for (const Bins& b : chunks) merge(total, b, map.bins);
+}
+
+/// partition(), in parallel where bin_range() left chunks: a chunk's bins say where its two sides go.
+inline void partition_range(const Reference* r, const Reference* end, const BinMap& map, const Split& split, const MeteredVector<Bins>& chunks,
+                            Reference* left_out, Reference* right_out, Box& left_centroids, Box& right_centroids) {
+  if (chunks.empty()) return partition(r, end, map, split, left_out, right_out, left_centroids, right_centroids);
+  struct Target {
+    Reference *left, *right;
+    Box left_centroids, right_centroids;
+  };
+  MeteredVector<Target> targets(chunks.size());
+  for (std::size_t c = 0; c < chunks.size(); ++c) {
+    targets[c].left = left_out, targets[c].right = right_out;
+    std::size_t to_left = 0;
+    for (unsigned b = 0; b < split.bin; ++b) to_left += std::size_t(chunks[c].count4[b][split.axis]);
+    left_out += to_left, right_out += std::min<std::size_t>(kChunk, std::size_t(end - r) - c * kChunk) - to_left;
+  }
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    Target& t = targets[c];
+    partition(r + c * kChunk, std::min(end, r + (c + 1) * kChunk), map, split, t.left, t.right, t.left_centroids, t.right_centroids);
+  });
+  left_centroids = right_centroids = empty_box();
+  for (const Target& t : targets) {
+    left_centroids = max_x86(t.left_centroids, left_centroids), right_centroids = max_x86(t.right_centroids, right_centroids);
+  }
+}
+
+}  // namespace sah
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
