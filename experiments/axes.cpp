@@ -100,6 +100,14 @@ void append_new(std::vector<std::string>& list, std::string_view value) {
   if (std::ranges::find(list, value) == list.end()) list.emplace_back(value);
 }
 
+/// Builders of BVHs have a second key, with reinsertion behind them.
+std::string builder_summary(std::string_view builder) {
+  constexpr std::string_view suffix = "_reinsertion";
+  if (!builder.ends_with(suffix)) return std::string(look_up(kBuilders, builder));
+  builder.remove_suffix(suffix.size());
+  return std::string(look_up(kBuilders, builder)) + "; then subtrees reinserted where they cost least";
+}
+
 }  // namespace
 
 std::optional<Axis> parse_axis(std::string_view name) noexcept {
@@ -173,7 +181,7 @@ std::string summary_of(Axis axis, std::string_view value, const Registry& regist
       if (const StructureEntry* e = registry.structure(value)) return std::string(e->info.summary);
       return "not in this build: libembree was not found";
     case Axis::builder:
-      return std::string(look_up(kBuilders, value));
+      return builder_summary(value);
     case Axis::leaf:
       return leaf_summary(value);
     case Axis::intersector:

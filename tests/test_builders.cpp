@@ -142,13 +142,13 @@ std::vector<KernelScene> degenerate_scenes() {
   std::vector<KernelScene> scenes;
   scenes.push_back({"one triangle", random_triangles(1, 0.5f, 1)});
   scenes.push_back({"flat", flat_grid(64)});
-  std::vector<float> sizes(20000);
+  std::vector<float> sizes(8000);
   for (std::size_t i = 0; i < sizes.size(); ++i) sizes[i] = 1.0f + float(i % 1000);
-  scenes.push_back({"concentric: equal centroids", copies(std::vector<Vec3f>(20000), sizes)});
-  std::vector<Vec3f> cluster = random_points(20000, 1e-7f, 2);  // B16: one Morton cell of a unit scene
+  scenes.push_back({"concentric: equal centroids", copies(std::vector<Vec3f>(8000), sizes)});
+  std::vector<Vec3f> cluster = random_points(8000, 1e-7f, 2);  // B16: one Morton cell of a unit scene
   cluster.push_back({1, 1, 1});
   scenes.push_back({"a cluster in one Morton cell", copies(cluster, std::vector<float>(cluster.size(), 1e-8f))});
-  std::vector<Vec3f> outlier = random_points(20000, 1.0f, 3);
+  std::vector<Vec3f> outlier = random_points(8000, 1.0f, 3);
   outlier.push_back({1e12f, 0, 0});
   scenes.push_back({"an outlier at 1e12", copies(outlier, std::vector<float>(outlier.size(), 0.01f))});
   std::vector<Vec3f> powers;
@@ -181,7 +181,7 @@ double sah_of(std::string_view builder, const TriangleMesh& mesh) {
 
 TEST_CASE("every builder: references, boxes, the same tree for any number of threads") {
   std::vector<KernelScene> scenes = kernel_scenes();
-  scenes.push_back({"random 150000", random_triangles(150000, 0.01f, 9)});
+  scenes.push_back({"random 100000", random_triangles(100000, 0.01f, 9)});
   scenes.push_back({"large sphere", sphere(150)});
   scenes.push_back({"empty", {}});
   const tbb::global_control more_threads_than_cores(tbb::global_control::max_allowed_parallelism, 7);

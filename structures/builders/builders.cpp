@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "structures/builders/fast_builders.h"
+#include "structures/builders/reinsertion.h"
 
 namespace arboretum {
 
@@ -37,14 +38,24 @@ struct Entry {
 constexpr Entry kBuilders[] = {
     {"binned_sah", binned_sah},
     {"morton", on_any<build_morton>},
+    {"ploc", on_any<build_ploc>},
 };
+
+/// Every builder has a second key, this behind its own: its tree improved by reinsertion.
+constexpr std::string_view kReinsertion = "_reinsertion";
 
 }  // namespace
 
 const std::vector<std::string_view>& binary_builder_names() {
+  static const std::vector<std::string> reinserted = [] {
+    std::vector<std::string> list;
+    for (const Entry& e : kBuilders) list.push_back(std::string(e.name) + std::string(kReinsertion));
+    return list;
+  }();
   static const std::vector<std::string_view> names = [] {
     std::vector<std::string_view> list;
     for (const Entry& e : kBuilders) list.push_back(e.name);
+    list.insert(list.end(), reinserted.begin(), reinserted.end());
     return list;
   }();
   return names;
@@ -52,8 +63,16 @@ const std::vector<std::string_view>& binary_builder_names() {
 
 void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, unsigned leaf_width, BinaryTree& tree,
                        BuildReport& report) {
+  std::string_view builder = settings.builder;
+  const bool reinserts = builder.ends_with(kReinsertion);
+  if (reinserts) builder.remove_suffix(kReinsertion.size());
+  const unsigned rounds = settings.parameters.reinsertion_rounds;
+  if (reinserts && (rounds < 1 || rounds > 64)) throw UserError("reinsertion_rounds: " + std::to_string(rounds) + " is not within 1 .. 64");
   for (const Entry& e : kBuilders) {
-    if (e.name == settings.builder) return e.on(settings.isa)(mesh, settings.parameters, leaf_width, tree, report);
+    if (e.name != builder) continue;
+    e.on(settings.isa)(mesh, settings.parameters, leaf_width, tree, report);
+    if (reinserts) reinsert(tree, rounds, leaf_width, report);
+    return;
   }
   const std::vector<std::string> names(binary_builder_names().begin(), binary_builder_names().end());
   throw UserError(unknown_name_message("builder", settings.builder, names));

@@ -8,4 +8,7 @@ namespace arboretum {
 /// `morton`: linear BVH. Reads morton_bits.
 void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report);
 
+/// `ploc`: locally ordered clustering. Reads morton_bits and ploc_radius.
+void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report);
+
 }  // namespace arboretum

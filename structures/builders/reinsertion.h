@@ -1,0 +1,15 @@
+// Reinsertion (Meister and Bittner, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", Eurographics 2018): subtrees
+// move to where they make the tree's inner nodes smallest.
+#pragma once
+
+#include "structures/accel.h"
+#include "structures/builders/binary_tree.h"
+
+namespace arboretum {
+
+/// Improves `tree` in `rounds` passes, fewer where nothing is left to gain, and lays it out again with leaves of at most
+/// `leaf_width` references. The sum of the inner nodes' areas never grows. The result depends on the tree and not on threads or
+/// on how its nodes are numbered. Runs in the caller's TBB arena; adds phases to the report.
+void reinsert(BinaryTree& tree, unsigned rounds, unsigned leaf_width, BuildReport& report);
+
+}  // namespace arboretum
