@@ -163,7 +163,7 @@ class ConfigReader {
   void read_measure(const YAML::Node& map) {
     yaml_.check_map(map, "measure",
                     std::vector<std::string>{"repetitions", "warmup", "min_time", "resolution", "threads",
-                                             "memory", "seed"});
+                                             "memory", "seed", "structure_cache"});
     MeasureSettings& m = experiment_.measure;
     if (const auto n = map["repetitions"])
       m.repetitions = static_cast<unsigned>(yaml_.integer(n, "repetitions", 1, 100000));
@@ -172,6 +172,8 @@ class ConfigReader {
     if (const auto n = map["threads"]) threads_ = std::to_string(yaml_.integer(n, "threads", 1, kMaxThreads));
     if (const auto n = map["memory"]) m.memory = yaml_.bytes(n, "memory");
     if (const auto n = map["seed"]) m.seed = yaml_.integer(n, "seed", 0, ~std::uint64_t{0});
+    if (const auto n = map["structure_cache"])
+      m.structure_cache = experiment_.file.parent_path() / yaml_.text(n, "structure_cache");
     if (const auto n = map["resolution"]) {
       if (!n.IsSequence() || n.size() != 2)
         yaml_.fail(n, "resolution must be [width, height], as in [512, 512]");

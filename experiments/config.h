@@ -36,6 +36,7 @@ struct MeasureSettings {
   unsigned width = 512, height = 512;
   std::size_t memory = std::size_t{8} << 30;  ///< bytes of structures held at once
   std::uint64_t seed = 1;
+  std::filesystem::path structure_cache = {};  ///< folder of built structures to load and keep; empty: none
 };
 
 struct Metrics {

@@ -52,7 +52,8 @@ void emit_choices(YAML::Emitter& out, std::string_view key, const std::vector<Ce
   out << YAML::EndSeq;
 }
 
-std::string text(const Experiment& e, bool with_plots) {
+/// `whole`: with what changes no measured number: plots, and the folder of saved structures.
+std::string text(const Experiment& e, bool whole) {
   YAML::Emitter out;
   out << YAML::BeginMap << YAML::Key << "experiment" << YAML::Value << e.name;
   out << YAML::Key << "scenes" << YAML::Value << YAML::BeginSeq;
@@ -77,7 +78,11 @@ std::string text(const Experiment& e, bool with_plots) {
       << m.repetitions << YAML::Key << "warmup" << YAML::Value << m.warmup << YAML::Key << "min_time"
       << YAML::Value << fmt::format("{}", m.min_time) << YAML::Key << "resolution" << YAML::Value
       << YAML::Flow << YAML::BeginSeq << m.width << m.height << YAML::EndSeq << YAML::Key << "memory"
-      << YAML::Value << m.memory << YAML::Key << "seed" << YAML::Value << m.seed << YAML::EndMap;
+      << YAML::Value << m.memory << YAML::Key << "seed" << YAML::Value << m.seed;
+  if (whole && !m.structure_cache.empty()) {
+    out << YAML::Key << "structure_cache" << YAML::Value << std::filesystem::absolute(m.structure_cache).lexically_normal().string();
+  }
+  out << YAML::EndMap;
   std::vector<std::string> metrics;
   for (const auto& [name, on] : {std::pair{"trace", e.metrics.trace},
                                  {"build", e.metrics.build},
@@ -87,7 +92,7 @@ std::string text(const Experiment& e, bool with_plots) {
   }
   out << YAML::Key << "metrics" << YAML::Value;
   emit_list(out, metrics);
-  if (with_plots) {
+  if (whole) {
     out << YAML::Key << "plots" << YAML::Value;
     emit_list(out, e.plots);
   }

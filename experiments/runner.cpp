@@ -33,7 +33,8 @@ class Runner {
         registry_(registry),
         journal_(journal),
         options_(options),
-        progress_(pending_cells(), pending_units()) {}
+        progress_(pending_cells(), pending_units()),
+        cache_(experiment.measure.structure_cache, [this](const std::string& line) { progress_.note(line); }) {}
 
   RunOutcome run() {
     try {
@@ -89,7 +90,7 @@ class Runner {
     if (builds.empty() && traces.empty()) return;
     SceneData data(experiment_.scenes[index], experiment_.measure,
                    [this](const std::string& line) { progress_.note(line); });
-    StructurePool pool(data.mesh(), registry_, experiment_.metrics.quality);
+    StructurePool pool(data.mesh(), registry_, experiment_.metrics.quality, cache_);
     if (!builds.empty()) run_builds(builds, data, pool);
     run_traces(traces, data, pool);
   }
@@ -248,6 +249,7 @@ class Runner {
   Journal& journal_;
   const RunOptions& options_;
   Progress progress_;
+  StructureCache cache_;
   RunOutcome outcome_;
   std::map<std::string, Running> running_;
   std::map<std::string, CellResult> finished_;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "core/timer.h"
+
 namespace arboretum {
 
 BuildSettings settings_of(const Cell& cell) {
@@ -15,8 +17,8 @@ BuildSettings settings_of(const Cell& cell) {
           .parameters = cell.parameters};
 }
 
-StructurePool::StructurePool(const TriangleMesh& mesh, const Registry& registry, bool quality)
-    : mesh_(mesh), registry_(registry), quality_(quality) {}
+StructurePool::StructurePool(const TriangleMesh& mesh, const Registry& registry, bool quality, StructureCache& cache)
+    : mesh_(mesh), registry_(registry), quality_(quality), cache_(cache) {}
 
 std::string StructurePool::key(const Cell& cell) const {
   std::string key = fmt::format("{}/{}/{}", cell.structure, cell.builder_name(), cell.leaf);
@@ -42,13 +44,22 @@ const Accel& StructurePool::get(const Cell& cell) {
   if (!info.build_depends_on_threads) settings.threads = std::max(1u, std::thread::hardware_concurrency());
   SharedBuild& build = builds_[name];
   build.threads = settings.threads;
-  return *held_.emplace(name, registry_.build(cell.structure, mesh_, settings, build.report)).first->second;
+  const double begin = wall_seconds();
+  std::unique_ptr<Accel> accel = cache_.find(cell.structure, mesh_, settings);
+  build.loaded = accel != nullptr;
+  if (build.loaded) {
+    build.report.seconds = wall_seconds() - begin;
+  } else {
+    accel = registry_.build(cell.structure, mesh_, settings, build.report);
+    cache_.keep(*accel, mesh_, settings);
+  }
+  return *held_.emplace(name, std::move(accel)).first->second;
 }
 
 void StructurePool::add_build_facts(const Cell& cell, Json& facts) const {
   const SharedBuild& build = builds_.at(key(cell));
-  facts["shared_build_seconds"] = build.report.seconds;
-  facts["shared_build_threads"] = build.threads;
+  facts[build.loaded ? "shared_load_seconds" : "shared_build_seconds"] = build.report.seconds;
+  if (!build.loaded) facts["shared_build_threads"] = build.threads;
 }
 
 std::size_t StructurePool::held_bytes() const {

@@ -10,6 +10,7 @@
 #include "experiments/registry.h"
 #include "experiments/result.h"
 #include "experiments/scene_data.h"
+#include "experiments/structure_cache.h"
 
 namespace arboretum {
 
@@ -19,17 +20,17 @@ namespace arboretum {
 class StructurePool {
  public:
   /// `quality`: compute statistics (SAH, EPO, depths) of every structure.
-  StructurePool(const TriangleMesh& mesh, const Registry& registry, bool quality);
+  StructurePool(const TriangleMesh& mesh, const Registry& registry, bool quality, StructureCache& cache);
 
   /// Cells with the same key trace the same structure: structure, builder, parameters, leaf, and ISA or
   /// threads where the structure says that its build depends on them.
   [[nodiscard]] std::string key(const Cell& cell) const;
   /// Bytes that the cell's structure may take: as measured, else guessed from its triangles.
   [[nodiscard]] std::size_t expected_bytes(const Cell& cell) const;
-  /// The structure, built at the first call with all threads of the machine (the tree is the same for any
-  /// number).
+  /// The structure, at the first call loaded from the cache, or built with all threads of the machine (the tree
+  /// is the same for any number) and kept in the cache.
   [[nodiscard]] const Accel& get(const Cell& cell);
-  /// Seconds and threads of the shared build, apart from what build cells measure.
+  /// Seconds and threads of the shared build, apart from what build cells measure; or seconds of loading it.
   void add_build_facts(const Cell& cell, Json& facts) const;
   void release(const std::string& key) { held_.erase(key); }
   [[nodiscard]] std::size_t held_bytes() const;
@@ -40,10 +41,12 @@ class StructurePool {
   const TriangleMesh& mesh_;
   const Registry& registry_;
   bool quality_;
+  StructureCache& cache_;
   std::map<std::string, std::unique_ptr<Accel>> held_;
   struct SharedBuild {
     BuildReport report;
     unsigned threads = 1;
+    bool loaded = false;  ///< from the cache; report.seconds are then those of loading
   };
   std::map<std::string, SharedBuild> builds_;
   std::map<std::string, Json> facts_;

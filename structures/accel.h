@@ -19,6 +19,8 @@
 
 namespace arboretum {
 
+class Archive;
+
 /// Parameters of a builder; a builder reads those that concern it. Part of the cell when they are swept.
 struct BuilderParameters {
   unsigned bins = 32;             ///< binned SAH: bins an axis, 4 .. 64
@@ -100,6 +102,9 @@ class Accel {
   /// Shows every node and leaf, parents before children, depth first: what follows a node with a greater depth is below
   /// it. Returns false where the structure cannot be looked into (embree).
   [[nodiscard]] virtual bool visit(StructureVisitor& visitor) const = 0;
+  /// Saves or loads, the same members in the same order: all that tracing and visit() need, but what is the mesh's. On
+  /// loading the object is fresh. Throws UserError where the structure cannot be saved, as here.
+  virtual void archive(Archive& archive);
   /// Bytes that tracing needs, the mesh's own arrays not counted.
   [[nodiscard]] virtual std::size_t bytes() const noexcept = 0;
 };

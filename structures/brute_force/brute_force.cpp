@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "structures/archive.h"
 
 namespace arboretum::brute_force {
 
@@ -50,6 +51,11 @@ void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, 
   bounds_ = mesh.bounds();
   vertices_ = mesh.vertices.data();
   leaf_ = settings.leaf;
+}
+
+void BruteForce::archive(Archive& archive) {
+  archive(leaf_, arena_, triangles_, block_count_, block_width_, bounds_);
+  vertices_ = archive.mesh().vertices.data();
 }
 
 bool BruteForce::visit(StructureVisitor& visitor) const {

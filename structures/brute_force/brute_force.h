@@ -24,6 +24,7 @@ class BruteForce final : public Accel {
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   /// One leaf at depth 0; nothing for an empty mesh.
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
+  void archive(Archive& archive) override;
   [[nodiscard]] std::size_t bytes() const noexcept override { return arena_.bytes(); }
 
   [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }

@@ -60,6 +60,7 @@ class WideBvh final : public BvhBase {
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
+  void archive(Archive& archive) override;
 };
 
 /// planes[2 * axis + side][child], side 0 lower, 1 upper. 64, 112, 224, 448 bytes of planes and references for N = 2, 4,

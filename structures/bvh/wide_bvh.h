@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/timer.h"
+#include "structures/archive.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
@@ -175,6 +176,13 @@ bool WideBvh<Format>::visit(StructureVisitor& visitor) const {
     }
   });
   return true;
+}
+
+template <class Format>
+void WideBvh<Format>::archive(Archive& archive) {
+  archive.expect(sizeof(typename Format::Node));
+  archive(leaf_, arena_, root_, stack_entries_, max_coordinate_, bounds_);
+  vertices_ = archive.mesh().vertices.data();
 }
 
 }  // namespace arboretum::bvh

@@ -107,6 +107,21 @@ class CommandLine(unittest.TestCase):
             with self.subTest(part=part):
                 self.assert_error(self.call("run", self.write("bad.yaml", text), "--no-plots"), "bad.yaml", part)
 
+    def test_structures_are_loaded_from_the_cache_in_the_next_run(self):
+        self.config = self.write("cached.yaml", CONFIG.replace("measure: {", "measure: {structure_cache: trees, "))
+        words = ("structure=bvh4", "isa=scalar", "workload=primary", "--out", "out")
+        self.assertEqual(self.run_small(*words).returncode, 0)
+        saved = list((self.folder / "trees").iterdir())
+        self.assertEqual(len(saved), 2)  # triangle4 and triangle4v
+        damaged = bytearray(saved[0].read_bytes())
+        damaged[-9] ^= 1
+        saved[0].write_bytes(damaged)
+        again = self.run_small(*words)
+        self.assertEqual(again.returncode, 0, again.stderr)
+        self.assertEqual(again.stderr.count("is damaged"), 1, again.stderr)
+        traced = [c for c in read_jsonl(self.folder / "out/cells.jsonl") if c["metric"] == "trace"]
+        self.assertEqual(sorted(("shared_load_seconds" in c, "shared_build_seconds" in c) for c in traced), [(False, True), (True, False)])
+
     def test_bad_scenes(self):
         config = "scenes: [{file: model.obj}]\naxes: {structure: bvh4, isa: scalar}\nmeasure: {resolution: [16, 16], min_time: 0.001}\n"
         path = self.write("scene.yaml", config)

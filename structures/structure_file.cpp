@@ -1,0 +1,228 @@
+#include "structures/structure_file.h"
+
+#include <tbb/parallel_for.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/crc.hpp>
+#include <boost/interprocess/file_mapping.hpp>
+#include <boost/interprocess/mapped_region.hpp>
+#include <charconv>
+#include <cstddef>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <span>
+#include <system_error>
+#include <type_traits>
+#include <vector>
+
+#include "core/error.h"
+#include "structures/archive.h"
+
+namespace arboretum {
+namespace {
+
+using Bytes = std::span<const std::byte>;
+using Crc64 = boost::crc_optimal<64, 0x42f0e1eba9ea3693u, ~std::uint64_t{0}, ~std::uint64_t{0}, true, true>;
+
+constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kByteOrder = 0x01020304;
+constexpr std::array<char, 8> kMagic{'a', 'r', 'b', 'o', 't', 'r', 'e', 'e'};
+
+/// The first bytes of a file; the archive follows.
+struct StructureFileHeader {
+  std::array<char, 8> magic = kMagic;
+  std::uint32_t version = kVersion;
+  std::uint32_t byte_order = kByteOrder;
+  std::uint64_t file_bytes = 0;
+  std::uint64_t checksum = 0;  ///< of the whole file, this field taken as 0
+  std::uint64_t mesh_hash = 0, mesh_vertices = 0, mesh_triangles = 0;
+};
+static_assert(sizeof(StructureFileHeader) == 56 && offsetof(StructureFileHeader, checksum) == 24);
+
+std::uint64_t crc_of_pieces(Bytes bytes) {
+  constexpr std::size_t kPiece = std::size_t{4} << 20;
+  std::vector<std::uint64_t> sums((bytes.size() + kPiece - 1) / kPiece);
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t i) {
+    const Bytes piece = bytes.subspan(i * kPiece, std::min(kPiece, bytes.size() - i * kPiece));
+    Crc64 crc;
+    crc.process_bytes(piece.data(), piece.size());
+    sums[i] = crc.checksum();
+  });
+  Crc64 crc;
+  crc.process_bytes(sums.data(), sums.size() * sizeof(std::uint64_t));
+  return crc.checksum();
+}
+
+std::uint64_t checksum_of(StructureFileHeader header, Bytes file) {
+  header.checksum = 0;
+  const std::uint64_t sums[] = {crc_of_pieces(std::as_bytes(std::span(&header, 1))), crc_of_pieces(file.subspan(sizeof header))};
+  return crc_of_pieces(std::as_bytes(std::span(sums)));
+}
+
+/// The file's bytes as the system maps them.
+class MappedFile {
+ public:
+  explicit MappedFile(const std::filesystem::path& file)
+      : region_(boost::interprocess::file_mapping(file.c_str(), boost::interprocess::read_only), boost::interprocess::read_only) {}
+  [[nodiscard]] Bytes bytes() const { return {static_cast<const std::byte*>(region_.get_address()), region_.get_size()}; }
+
+ private:
+  boost::interprocess::mapped_region region_;
+};
+
+StructureFileHeader header_of(const TriangleMesh& mesh) {
+  StructureFileHeader header;
+  header.mesh_hash = hash_of(mesh), header.mesh_vertices = mesh.vertices.size(), header.mesh_triangles = mesh.triangles.size();
+  return header;
+}
+
+/// f(name, value) for every parameter. The compiler refuses it when BuilderParameters has one that is not named here.
+template <class F>
+void for_each_parameter(const BuilderParameters& parameters, F&& f) {
+  const auto& [bins, traversal_cost, intersection_cost, max_leaf_blocks, morton_bits, ploc_radius, duplication_budget, spatial_overlap,
+               spatial_gain, reinsertion_rounds, empty_bonus, max_depth, grid_density, collapse] = parameters;
+  f("bins", bins), f("traversal_cost", traversal_cost), f("intersection_cost", intersection_cost), f("max_leaf_blocks", max_leaf_blocks);
+  f("morton_bits", morton_bits), f("ploc_radius", ploc_radius), f("duplication_budget", duplication_budget);
+  f("spatial_overlap", spatial_overlap), f("spatial_gain", spatial_gain), f("reinsertion_rounds", reinsertion_rounds);
+  f("empty_bonus", empty_bonus), f("max_depth", max_depth), f("grid_density", grid_density), f("collapse", collapse);
+}
+
+/// What of the settings' parameters the structure depends on.
+std::string parameters_of(const StructureInfo& info, const BuildSettings& settings) {
+  return info.uses_parameters ? text_of(settings.parameters) : std::string();
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
+  throw UserError(file.string() + ": " + why);
+}
+
+/// What a header is wrong in, before anything behind it is looked at.
+void check_header(const std::filesystem::path& file, const StructureFileHeader& header, std::uint64_t bytes) {
+  if (header.magic != kMagic) refuse(file, "is no saved structure; give a file that arboretum saved");
+  if (header.byte_order != kByteOrder) refuse(file, "was saved on a machine of the other byte order, or is damaged; build and save it again");
+  if (header.version != kVersion) {
+    refuse(file, "is of format version " + std::to_string(header.version) + ", this build reads version " + std::to_string(kVersion) +
+                     "; build and save it again");
+  }
+  if (bytes < header.file_bytes) {
+    refuse(file, "is truncated: " + std::to_string(bytes) + " of " + std::to_string(header.file_bytes) + " bytes; build and save it again");
+  }
+}
+
+/// Names in the file, in this order: what `archive` reads is compared with what is wanted.
+void check_name(const std::filesystem::path& file, Archive& archive, const char* what, std::string_view wanted) {
+  std::string saved;
+  archive(saved);
+  if (saved != wanted) {
+    refuse(file, std::string("holds ") + what + " '" + saved + "', not '" + std::string(wanted) + "'; ask for what it holds, or build anew");
+  }
+}
+
+void write_whole(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings, const std::filesystem::path& file) {
+  StructureFileHeader header = header_of(mesh);
+  std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
+  stream.write(reinterpret_cast<const char*>(&header), sizeof header);
+  Archive archive(stream, mesh);
+  std::string name(accel.info().name), builder = settings.builder, leaf = settings.leaf, parameters = parameters_of(accel.info(), settings);
+  archive(name, builder, leaf, parameters);
+  accel.archive(archive);
+  header.file_bytes = static_cast<std::uint64_t>(stream.tellp());
+  stream.flush();
+  if (stream) {
+    header.checksum = checksum_of(header, MappedFile(file).bytes());
+    stream.seekp(0);
+    stream.write(reinterpret_cast<const char*>(&header), sizeof header);
+    stream.close();
+  }
+  if (!stream) throw std::runtime_error("write failed");
+}
+
+}  // namespace
+
+std::string text_of(const BuilderParameters& parameters) {
+  std::string text;
+  for_each_parameter(parameters, [&]<class T>(const char* name, const T& value) {
+    text.append(text.empty() ? "" : " ").append(name).append("=");
+    if constexpr (std::is_same_v<T, std::string>) {
+      text += value;
+    } else {
+      char digits[32];
+      text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
+    }
+  });
+  return text;
+}
+
+std::uint64_t hash_of(const TriangleMesh& mesh) {
+  const std::uint64_t parts[] = {mesh.vertices.size(), mesh.triangles.size(), crc_of_pieces(std::as_bytes(std::span(mesh.vertices))),
+                                 crc_of_pieces(std::as_bytes(std::span(mesh.triangles)))};
+  return crc_of_pieces(std::as_bytes(std::span(parts)));
+}
+
+std::string structure_file_name(std::string_view name, const TriangleMesh& mesh, const BuildSettings& settings) {
+  const StructureEntry* entry = find_structure(name);
+  const std::string parameters = entry ? parameters_of(entry->info, settings) : std::string();
+  char hashes[64];
+  std::snprintf(hashes, sizeof hashes, "-%016llx-%08x.arbotree", static_cast<unsigned long long>(hash_of(mesh)),
+                static_cast<unsigned>(crc_of_pieces(std::as_bytes(std::span(parameters)))));
+  return std::string(name) + "-" + settings.builder + "-" + settings.leaf + hashes;
+}
+
+void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings, const std::filesystem::path& file) {
+  const std::filesystem::path unfinished = file.string() + "." + std::to_string(::getpid()) + ".unfinished";
+  try {
+    write_whole(accel, mesh, settings, unfinished);
+    std::filesystem::rename(unfinished, file);
+  } catch (const std::exception& e) {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+    if (dynamic_cast<const UserError*>(&e)) throw;
+    refuse(file, "cannot be written; is the folder there, writable and not full?");
+  }
+}
+
+std::unique_ptr<Accel> load_structure(std::string_view name, const TriangleMesh& mesh, const BuildSettings& settings,
+                                      const std::filesystem::path& file) {
+  const StructureEntry* entry = find_structure(name);
+  if (!entry) throw UserError("there is no structure '" + std::string(name) + "'; see `arboretum list structures`");
+  std::error_code error;
+  const std::uint64_t size = std::filesystem::is_regular_file(file, error) ? std::filesystem::file_size(file, error) : 0;
+  if (error || !std::filesystem::is_regular_file(file, error)) refuse(file, "is no file; build and save the structure first");
+  if (size < sizeof(StructureFileHeader)) refuse(file, "is no saved structure: too short; give a file that arboretum saved");
+  std::unique_ptr<MappedFile> mapped;
+  try {
+    mapped = std::make_unique<MappedFile>(file);
+  } catch (const boost::interprocess::interprocess_exception& e) {
+    refuse(file, std::string("cannot be read: ") + e.what());
+  }
+  const Bytes bytes = mapped->bytes();
+  StructureFileHeader header;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  check_header(file, header, bytes.size());
+  if (bytes.size() != header.file_bytes || checksum_of(header, bytes) != header.checksum)
+    refuse(file, "is damaged: its checksum does not fit; build and save it again");
+
+  Archive archive(bytes.subspan(sizeof header), mesh);
+  check_name(file, archive, "structure", name);
+  check_name(file, archive, "builder", settings.builder);
+  check_name(file, archive, "leaf", settings.leaf);
+  check_name(file, archive, "parameters", parameters_of(entry->info, settings));
+  const StructureFileHeader wanted = header_of(mesh);
+  if (header.mesh_hash != wanted.mesh_hash || header.mesh_vertices != wanted.mesh_vertices || header.mesh_triangles != wanted.mesh_triangles) {
+    refuse(file, "was built from another mesh (" + std::to_string(header.mesh_triangles) + " triangles, this one has " +
+                     std::to_string(mesh.size()) + "); load it with the mesh that it was built from");
+  }
+  std::unique_ptr<Accel> accel = entry->create();
+  try {
+    accel->archive(archive);
+    if (archive.rest() > 0) throw UserError("was saved by another build of arboretum: it holds more than this structure reads; build and save it again");
+  } catch (const UserError& e) {
+    refuse(file, e.what());
+  }
+  return accel;
+}
+
+}  // namespace arboretum

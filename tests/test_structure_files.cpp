@@ -1,0 +1,211 @@
+// Saving and loading built structures: equal answers and equal statistics after a round trip, for every structure that can
+// be saved; and every file that does not fit is refused in one line.
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "structures/statistics.h"
+#include "structures/structure_file.h"
+#include "tests/catch.h"
+#include "tests/kernel_runner.h"
+#include "tests/kernel_scenes.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of this test's own, gone at the end.
+class Folder {
+ public:
+  Folder() : path_(fs::path(ARBORETUM_BINARY_DIR) / "test_structure_files") { fs::remove_all(path_), fs::create_directories(path_); }
+  ~Folder() { std::error_code ignored; fs::remove_all(path_, ignored); }
+  [[nodiscard]] fs::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+std::string read(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void write(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary).write(bytes.data(), std::streamsize(bytes.size()));
+}
+
+/// The message of the UserError that loading throws; empty where it loads.
+std::string refusal(const char* name, const TriangleMesh& mesh, const BuildSettings& settings, const fs::path& file) {
+  try {
+    (void)load_structure(name, mesh, settings, file);
+    return "";
+  } catch (const UserError& e) {
+    CHECK(std::string(e.what()).find('\n') == std::string::npos);
+    CHECK(std::string(e.what()).find(file.string()) == 0);
+    return e.what();
+  }
+}
+
+bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
+
+BuildSettings settings_for(const StructureInfo& info, std::string_view leaf) {
+  BuildSettings settings;
+  settings.builder = info.builders.front(), settings.leaf = leaf, settings.isa = best_isa();
+  return settings;
+}
+
+}  // namespace
+
+TEST_CASE("a structure that was saved and loaded answers and measures as it did") {
+  const Folder folder;
+  const fs::path file = folder / "saved";
+  std::size_t saved = 0;
+  for (const std::size_t count : {0u, 1u, 700u}) {
+    const TriangleMesh mesh = random_triangles(count, 0.2f, 11);
+    // The vertices of the loaded one lie elsewhere: an index leaf must not point to those of the mesh that was built from.
+    const TriangleMesh again = mesh;
+    const std::vector<Ray> rays = count ? generic_rays(mesh, 400, 3) : std::vector<Ray>{Ray{{0, 0, -3}, 0, {0, 0, 1}, kInfinity}};
+    for (const StructureEntry& entry : all_structures()) {
+      if (entry.info.name == "embree") continue;
+      for (const std::string_view leaf : entry.info.leaves) {
+        INFO(entry.info.name << " " << leaf << " " << count);
+        const BuildSettings settings = settings_for(entry.info, leaf);
+        BuildReport report;
+        const auto built = build_structure(entry.info.name, mesh, settings, report);
+        try {
+          save_structure(*built, mesh, settings, file);
+        } catch (const UserError&) {
+          break;  // "cannot be saved": the structures that must be able to are named below
+        }
+        ++saved;
+        const auto loaded = load_structure(entry.info.name, again, settings, file);
+        CHECK(loaded->bytes() == built->bytes());
+        const BuilderParameters costs;
+        const StructureStatistics a = compute_statistics(*built, mesh, costs, true), b = compute_statistics(*loaded, again, costs, true);
+        CHECK(a.sah_cost == b.sah_cost);
+        CHECK(a.epo == b.epo);
+        CHECK(a.depth_histogram == b.depth_histogram);
+        CHECK(a.references == b.references);
+        for (const KernelRow& row : runnable_rows()) {
+          if (row.structure != entry.info.name || row.leaf != leaf) continue;
+          CHECK(same_bits(closest_hit(row, *built, rays), closest_hit(row, *loaded, rays)));
+          CHECK(any_hit(row, *built, rays) == any_hit(row, *loaded, rays));
+        }
+      }
+    }
+  }
+  CHECK(saved >= 3 * 5 * 12);
+}
+
+TEST_CASE("every structure of the project but Embree can be saved") {
+  const Folder folder;
+  const TriangleMesh mesh = random_triangles(20, 0.2f, 11);
+  for (const StructureEntry& entry : all_structures()) {
+    INFO(entry.info.name);
+    BuildReport report;
+    const BuildSettings settings = settings_for(entry.info, entry.info.leaves.front());
+    const auto built = build_structure(entry.info.name, mesh, settings, report);
+    if (entry.info.name == "embree") {
+      CHECK_THROWS_WITH(save_structure(*built, mesh, settings, folder / "x"), "embree cannot be saved to a file; build it anew");
+      CHECK_FALSE(fs::exists(folder / "x"));
+    } else {
+      CHECK_NOTHROW(save_structure(*built, mesh, settings, folder / std::string(entry.info.name).c_str()));
+    }
+  }
+}
+
+TEST_CASE("a file that does not fit is refused, and the message says why") {
+  const Folder folder;
+  const fs::path file = folder / "saved", other = folder / "other";
+  const TriangleMesh mesh = random_triangles(9, 0.2f, 11);
+  BuildSettings settings;
+  settings.leaf = "triangle4v", settings.isa = best_isa();
+  BuildReport report;
+  const auto built = build_structure("bvh4", mesh, settings, report);
+  save_structure(*built, mesh, settings, file);
+  REQUIRE(refusal("bvh4", mesh, settings, file) == "");
+  const std::string whole = read(file);
+
+  SECTION("no such file, a folder, an empty file, another file") {
+    CHECK(has(refusal("bvh4", mesh, settings, folder / "none"), "is no file"));
+    CHECK(has(refusal("bvh4", mesh, settings, folder / "."), "is no file"));
+    write(other, "");
+    CHECK(has(refusal("bvh4", mesh, settings, other), "is no saved structure"));
+    write(other, std::string(500, 'x'));
+    CHECK(has(refusal("bvh4", mesh, settings, other), "is no saved structure"));
+  }
+  SECTION("every truncation, and bytes at the end") {
+    for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
+      write(other, whole.substr(0, bytes));
+      CHECK(has(refusal("bvh4", mesh, settings, other), bytes < 56 ? "is no saved structure" : "is truncated"));
+    }
+    write(other, whole + "x");
+    CHECK(has(refusal("bvh4", mesh, settings, other), "is damaged"));
+  }
+  SECTION("every flipped byte") {
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      for (const int flip : {1 << i % 8, 0xff}) {
+        std::string damaged = whole;
+        damaged[i] = char(damaged[i] ^ flip);
+        write(other, damaged);
+        INFO("byte " << i << " xor " << flip);
+        REQUIRE(refusal("bvh4", mesh, settings, other) != "");
+      }
+    }
+  }
+  SECTION("another version, another byte order") {
+    std::string changed = whole;
+    changed[8] = 2;
+    write(other, changed);
+    CHECK(has(refusal("bvh4", mesh, settings, other), "is of format version 2, this build reads version 1"));
+    changed = whole;
+    std::reverse(changed.begin() + 12, changed.begin() + 16);
+    write(other, changed);
+    CHECK(has(refusal("bvh4", mesh, settings, other), "other byte order"));
+  }
+  SECTION("another structure, builder, leaf, parameter") {
+    CHECK(has(refusal("bvh8", mesh, settings, file), "holds structure 'bvh4', not 'bvh8'"));
+    CHECK_THROWS_AS(load_structure("bvh5", mesh, settings, file), UserError);
+    BuildSettings wanted = settings;
+    wanted.leaf = "triangle4";
+    CHECK(has(refusal("bvh4", mesh, wanted, file), "holds leaf 'triangle4v', not 'triangle4'"));
+    wanted = settings, wanted.builder = "none";
+    CHECK(has(refusal("bvh4", mesh, wanted, file), "holds builder 'binned_sah', not 'none'"));
+    wanted = settings, wanted.parameters.bins = 16;
+    CHECK(has(refusal("bvh4", mesh, wanted, file), "holds parameters 'bins=32 "));
+  }
+  SECTION("threads and instruction set do not matter") {
+    BuildSettings wanted = settings;
+    wanted.threads = 7, wanted.isa = Isa::scalar;
+    CHECK(refusal("bvh4", mesh, wanted, file) == "");
+  }
+  SECTION("another mesh: fewer triangles, one moved by an ulp, two swapped; materials do not matter") {
+    TriangleMesh changed = mesh;
+    changed.triangles.pop_back();
+    CHECK(has(refusal("bvh4", changed, settings, file), "was built from another mesh (9 triangles, this one has 8)"));
+    changed = mesh;
+    changed.vertices[5].y = std::nextafter(changed.vertices[5].y, 9.0f);
+    CHECK(has(refusal("bvh4", changed, settings, file), "another mesh"));
+    changed = mesh;
+    std::swap(changed.triangles[2], changed.triangles[3]);
+    CHECK(has(refusal("bvh4", changed, settings, file), "another mesh"));
+    changed = mesh;
+    changed.materials.assign(mesh.size(), 1);
+    CHECK(refusal("bvh4", changed, settings, file) == "");
+  }
+  SECTION("what cannot be written") {
+    CHECK_THROWS_AS(save_structure(*built, mesh, settings, folder / "none/saved"), UserError);
+    CHECK_FALSE(fs::exists(folder / "none"));
+  }
+  SECTION("saving is over the old file, and leaves nothing beside it") {
+    save_structure(*built, mesh, settings, file);
+    CHECK(read(file) == whole);
+    CHECK(std::distance(fs::directory_iterator(folder / "."), fs::directory_iterator{}) == 1);
+  }
+}
