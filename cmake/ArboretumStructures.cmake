@@ -125,3 +125,53 @@ ${calls}  return rows;
 }  // namespace arboretum
 ")
 endfunction()
+
+# Adds structures to an executable: it gets a registry of its own, with those of Arboretum and these. One folder a structure, absolute or
+# relative to the current source folder; <folder>/<folder>.h is its header.
+function(arboretum_add_structures target)
+  set(out ${CMAKE_CURRENT_BINARY_DIR}/${target}_structures)
+  set(records "")
+  foreach(path IN LISTS ARGN)
+    get_filename_component(path "${path}" ABSOLUTE)
+    get_filename_component(name "${path}" NAME)
+    if(NOT EXISTS "${path}/${name}.h")
+      message(FATAL_ERROR "arboretum_add_structures(${target}): ${path} has no ${name}.h")
+    endif()
+    arboretum_read_structure(record "${path}/${name}.h" "${path}/${name}.h")
+    list(APPEND records "${record}")
+    file(GLOB sources CONFIGURE_DEPENDS "${path}/*.cpp")
+    target_sources(${target} PRIVATE ${sources})
+  endforeach()
+  arboretum_kernel_units(units ${out} ${records})
+  arboretum_registry(${out}/registry.cpp ${ARBORETUM_STRUCTURES} ${records})
+  target_sources(${target} PRIVATE ${units} ${out}/registry.cpp)
+  # Includes as in the project's own structures: "structures/accel.h". What the flags are for: cmake/ArboretumFlags.cmake.
+  target_include_directories(${target} PRIVATE "${ARBORETUM_HEADERS}")
+  target_compile_options(${target} PRIVATE -ffp-contract=off $<$<CXX_COMPILER_ID:Clang>:-fno-slp-vectorize>)
+endfunction()
+
+# The `arboretum` program with structures of one's own beside Arboretum's: `list` shows them, `run` sweeps them.
+function(arboretum_executable target)
+  cmake_parse_arguments(PARSE_ARGV 1 words "" "" "STRUCTURES;LIBRARIES")
+  if(words_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "arboretum_executable(${target}): unknown words '${words_UNPARSED_ARGUMENTS}'; use STRUCTURES <folder>... LIBRARIES <library>...")
+  endif()
+  if(NOT TARGET arboretum::experiments)
+    message(FATAL_ERROR "arboretum_executable(${target}) needs find_package(arboretum REQUIRED COMPONENTS experiments)")
+  endif()
+  set(main ${CMAKE_CURRENT_BINARY_DIR}/${target}_structures/main.cpp)
+  arboretum_write("${main}"
+"// Made by cmake/ArboretumStructures.cmake.
+#include <cstdlib>
+
+#include \"experiments/command_line.h\"
+
+int main(int argc, char** argv) {
+  setenv(\"ARBORETUM_DATA\", R\"(${ARBORETUM_DATA})\", 0);  // catalogue and plot scripts, unless the user names others
+  return arboretum::command_line(argc, argv);
+}
+")
+  add_executable(${target} "${main}")
+  target_link_libraries(${target} PRIVATE arboretum::experiments ${words_LIBRARIES})
+  arboretum_add_structures(${target} ${words_STRUCTURES})
+endfunction()

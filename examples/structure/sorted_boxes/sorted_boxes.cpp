@@ -1,0 +1,116 @@
+#include "sorted_boxes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "core/error.h"
+#include "core/timer.h"
+#include "structures/builders/builders.h"
+#include "structures/leaves/blocks.h"
+
+namespace arboretum::sorted_boxes {
+namespace {
+
+/// The references of one block: up to Block::kWidth triangles that the builder put into one leaf.
+using References = std::span<const std::uint32_t>;
+
+/// Cuts the leaves of the tree, left to right, into what one block takes each.
+std::vector<References> references_by_block(const BinaryTree& tree, std::size_t block_width) {
+  std::vector<References> blocks;
+  std::vector<std::uint32_t> stack{0};
+  while (!stack.empty()) {
+    const std::uint32_t index = stack.back();
+    stack.pop_back();
+    const BinaryNode& node = tree.nodes[index];
+    if (!node.is_leaf()) {
+      stack.insert(stack.end(), {node.left + 1, node.left});
+      continue;
+    }
+    References rest(tree.primitives.data() + tree.first[index], node.count);
+    while (!rest.empty()) {
+      const std::size_t count = std::min(block_width, rest.size());
+      blocks.push_back(rest.first(count));
+      rest = rest.subspan(count);
+    }
+  }
+  return blocks;
+}
+
+Bounds3f bounds_of(const TriangleMesh& mesh, References references) {
+  Bounds3f box;
+  for (std::uint32_t primitive : references) box.extend(mesh.bounds(primitive));
+  return box;
+}
+
+Bounds3f read_box(const BoxGroup& group, std::size_t i) {
+  const auto& p = group.planes;
+  return {{p[0][i], p[2][i], p[4][i]}, {p[1][i], p[3][i], p[5][i]}};
+}
+
+void write_box(BoxGroup& group, std::size_t i, const Bounds3f& box) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    group.planes[2 * axis][i] = box.lower[axis], group.planes[2 * axis + 1][i] = box.upper[axis];
+}
+
+}  // namespace
+
+const StructureInfo& SortedBoxes::static_info() {
+  static const StructureInfo info = [] {
+    StructureInfo i;
+    i.name = kName;
+    i.summary = "a flat list of leaf blocks, each with a box: all boxes tested, hit ones visited from near to far";
+    i.builders = binary_builder_names();
+    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    return i;
+  }();
+  return info;
+}
+
+void SortedBoxes::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
+  if (mesh.size() >= (1u << 30)) throw UserError("sorted_boxes takes at most 2^30 - 1 triangles");
+  const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
+    BinaryTree tree;
+    if (mesh.size() > 0) build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
+
+    const double start = wall_seconds();
+    const std::vector<References> list = mesh.size() > 0 ? references_by_block(tree, Block::kWidth) : std::vector<References>{};
+    blocks_ = list.size();
+    arena_ = Arena(groups() * sizeof(BoxGroup) + blocks_ * sizeof(Block));
+    auto* group = reinterpret_cast<BoxGroup*>(arena_.data());
+    auto* block = reinterpret_cast<Block*>(arena_.data() + groups() * sizeof(BoxGroup));
+    for (std::size_t i = 0; i < groups() * BoxGroup::kWidth; ++i) {
+      const bool exists = i < blocks_;
+      write_box(group[i / BoxGroup::kWidth], i % BoxGroup::kWidth, exists ? bounds_of(mesh, list[i]) : Bounds3f{});
+      if (exists) fill_blocks(block + i, mesh, list[i]);
+    }
+    report.phases.emplace_back("blocks", wall_seconds() - start);
+  });
+  if (!known) throw UserError("sorted_boxes has no leaf " + settings.leaf);
+
+  leaf_ = settings.leaf, bounds_ = mesh.bounds(), vertices_ = mesh.vertices.data(), max_coordinate_ = 0.0f;
+  for (std::size_t axis = 0; axis < 3 && !bounds_.empty(); ++axis)
+    max_coordinate_ = std::max({max_coordinate_, std::abs(bounds_.lower[axis]), std::abs(bounds_.upper[axis])});
+}
+
+bool SortedBoxes::visit(StructureVisitor& visitor) const {
+  if (blocks_ == 0) return true;
+  std::vector<Bounds3f> boxes;
+  for (std::size_t i = 0; i < blocks_; ++i) boxes.push_back(read_box(this->boxes()[i / BoxGroup::kWidth], i % BoxGroup::kWidth));
+  visitor.node({.bounds = bounds_, .child_bounds = boxes, .depth = 0, .bytes = groups() * sizeof(BoxGroup)});
+  return with_block(leaf_, [&]<class Block>(std::type_identity<Block>) {
+    for (std::size_t i = 0; i < blocks_; ++i) {
+      const Block& block = block_data<Block>()[i];
+      visitor.leaf({.bounds = boxes[i],
+                    .primitives = {block.id, std::size_t(triangles_in(block))},
+                    .depth = 1,
+                    .blocks = 1,
+                    .block_width = unsigned(Block::kWidth),
+                    .bytes = sizeof(Block)});
+    }
+  });
+}
+
+}  // namespace arboretum::sorted_boxes

@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+"""The installed package from outside, as a user meets it.
+
+usage: test_package.py STEP SETTINGS.json    (written by CMake: tests/CMakeLists.txt)
+  install    installs the build tree and moves the result: nothing of it may know where it was built
+  library    examples/library, built against the installation and against the build tree, and run
+  structure  examples/structure, built out of tree: its structure is listed, and swept with right answers
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+STEP = sys.argv[1]
+SETTINGS = json.loads(Path(sys.argv[2]).read_text())
+BUILD, SOURCE = Path(SETTINGS["build"]), Path(SETTINGS["source"])
+WORK = BUILD / "package-test"
+PREFIX = WORK / "moved"
+ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith("ARBORETUM_DATA")}
+
+
+def call(*words, expect=0, **options):
+    result = subprocess.run([str(w) for w in words], capture_output=True, text=True, env=ENVIRONMENT, timeout=600, **options)
+    if (result.returncode == 0) != (expect == 0):
+        sys.exit(f"{' '.join(map(str, words))}\nended with status {result.returncode}\n{result.stdout}\n{result.stderr}")
+    return result
+
+
+def check(condition, message):
+    if not condition:
+        sys.exit(f"failed: {message}")
+
+
+def configure(source, build, *words, expect=0):
+    shutil.rmtree(build, ignore_errors=True)
+    return call(SETTINGS["cmake"], "-S", source, "-B", build, "-G", SETTINGS["generator"], f"-DCMAKE_CXX_COMPILER={SETTINGS['compiler']}",
+                f"-DCMAKE_BUILD_TYPE={SETTINGS['build_type']}", f"-DCMAKE_CXX_FLAGS={SETTINGS['flags']}", *words, expect=expect)
+
+
+def build(folder):
+    call(SETTINGS["cmake"], "--build", folder, "--parallel", os.cpu_count() or 2)
+
+
+def step_install():
+    shutil.rmtree(WORK, ignore_errors=True)
+    WORK.mkdir()
+    call(SETTINGS["cmake"], "--install", BUILD, "--prefix", WORK / "prefix")
+    (WORK / "prefix").rename(PREFIX)
+    # With assertions or debugging information a library names its sources; a release must not.
+    names = [str(p).encode() for p in (BUILD, SOURCE)] if SETTINGS["build_type"] == "Release" and not SETTINGS["sanitize"] else []
+    for path in (p for p in PREFIX.rglob("*") if p.is_file()):
+        content = path.read_bytes()
+        for name in names:
+            check(name not in content, f"{path} names {name.decode()}")
+        if path.suffix == ".h" and PREFIX / "include" in path.parents:
+            found = re.search(rb'#\s*include\s+"(?!arboretum/)[^"]*/', content)
+            check(not found, f"{path} includes {found and found[0]}")
+    check((PREFIX / "include/arboretum/arboretum.h").is_file(), "no <arboretum/arboretum.h>")
+    program = PREFIX / "bin/arboretum"
+    ours, theirs = (call(p, "list", "--json", cwd="/").stdout for p in (BUILD / "arboretum", program))
+    check(ours == theirs, "the installed program lists something else than the built one")
+    check("bunny" in call(program, "list", "scenes", cwd="/").stdout, "the installed program does not find its catalogue")
+    check((PREFIX / "share/arboretum/plots/plot.py").is_file(), "no plot scripts")
+    revision = (PREFIX / "share/arboretum/revision").read_text()
+    check(re.fullmatch(r"(unknown|[0-9a-f]{40})( dirty)?\n", revision), f"revision '{revision}'")
+
+
+def step_library():
+    example = PREFIX / "share/arboretum/examples/library"
+    for name, where in (("installed", f"-DCMAKE_PREFIX_PATH={PREFIX}"), ("build tree", f"-Darboretum_DIR={BUILD}")):
+        folder = WORK / f"library {name}"
+        configure(example, folder, where)
+        build(folder)
+        for words in (["24"], ["12", "bvh2"]):
+            output = call(folder / "sphere", *words).stdout
+            print(f"{name}: {output}", end="")
+            check(", 0 wrong" in output, "the three ways differ")
+    error = call(folder / "sphere", "12", "bhv8", expect=2).stderr
+    check("did you mean 'bvh8'" in error, error)
+
+    wrong = WORK / "wrong"
+    wrong.mkdir(exist_ok=True)
+    (wrong / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(wrong LANGUAGES CXX)\n"
+                                          "find_package(arboretum REQUIRED COMPONENTS forest)\n")
+    error = configure(wrong, wrong / "build", f"-DCMAKE_PREFIX_PATH={PREFIX}", expect=1).stderr
+    check("forest" in error, f"an unknown component passes, or is not named: {error}")
+
+
+def step_structure():
+    configure(SOURCE / "examples/structure", WORK / "structure of the build tree", f"-Darboretum_DIR={BUILD}")
+    folder = WORK / "structure"
+    configure(PREFIX / "share/arboretum/examples/structure", folder, f"-DCMAKE_PREFIX_PATH={PREFIX}")
+    build(folder)
+    program = folder / "my_arboretum"
+
+    built_in = [line.split()[0] for line in call(BUILD / "arboretum", "list", "structures").stdout.splitlines()]
+    listed = [line.split()[0] for line in call(program, "list", "structures", cwd="/").stdout.splitlines()]
+    check(sorted(listed) == sorted([*built_in, "sorted_boxes"]), f"list structures: {listed}")
+    entry = [e for e in json.loads(call(program, "list", "--json").stdout)["structures"] if e["name"] == "sorted_boxes"]
+    check(len(entry) == 1 and entry[0]["available"] and "binned_sah" in entry[0]["builders"], f"list --json: {entry}")
+
+    results = WORK / "results"
+    shutil.rmtree(results, ignore_errors=True)
+    call(program, "run", PREFIX / "share/arboretum/examples/structure/sweep.yaml", "--no-plots", "--out", results)
+    rows = json.loads((results / "results.json").read_text())["benchmarks"]
+    traces = [r for r in rows if r["name"].startswith("trace/") and r.get("run_type", "iteration") == "iteration"]
+    own = [r for r in traces if r["structure"] == "sorted_boxes"]
+    hits = {}
+    for row in traces:
+        check(row["wrong_answers"] == 0, f"{row['name']}: {row['wrong_answers']} wrong answers")
+        hits.setdefault((row["workload"], row["intersector"], row["box"]), set()).add(row["hits"])
+    check(len({(r["workload"], r["intersector"], r["box"]) for r in own}) == 12, f"{len(own)} rows of sorted_boxes")
+    check(all(len(numbers) == 1 for numbers in hits.values()), f"structures differ in their hits: {hits}")
+    check(all(0 < r["triangles_per_ray"] and 0 < r["nodes_per_ray"] for r in own), "no counters")
+    quality = [r for r in rows if r["structure"] == "sorted_boxes" and r.get("sah_cost")]
+    check(quality, "no SAH cost")
+    print(f"{len(traces)} timed repetitions, {len(own)} of sorted_boxes, no wrong answer")
+
+
+{"install": step_install, "library": step_library, "structure": step_structure}[STEP]()
