@@ -85,7 +85,11 @@ void add_facts(Json& facts, const StructureStatistics& s) {
   facts["sah_cost"] = s.sah_cost, facts["sah_child_cost"] = s.sah_child_cost, facts["epo"] = s.epo;
   facts["nodes"] = s.nodes, facts["leaves"] = s.leaves, facts["depth"] = s.depth;
   facts["node_bytes"] = s.node_bytes, facts["leaf_bytes"] = s.leaf_bytes;
+  facts["other_bytes"] = s.bytes - std::min(s.bytes, s.node_bytes + s.leaf_bytes);
   facts["epo_sampled"] = s.epo_sampled;
+  facts["lcv"] = s.lcv, facts["leaves_per_line"] = s.leaves_per_line;
+  facts["references"] = s.references, facts["blocks"] = s.blocks;
+  facts["depth_histogram"] = s.depth_histogram, facts["leaf_histogram"] = s.leaf_histogram;
   facts["leaf_fill"] = s.leaf_fill, facts["duplication"] = s.duplication,
   facts["children_per_node"] = s.children_per_node;
 }

@@ -12,10 +12,6 @@
 
 namespace arboretum {
 
-void Accel::archive(Archive&) {
-  throw UserError(std::string(info().name) + " cannot be saved to a file; build it anew");
-}
-
 std::span<const StructureEntry> all_structures() {
   static const std::vector<StructureEntry> entries = [] {
     std::vector<StructureEntry> list = registered_structures();

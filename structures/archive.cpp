@@ -3,6 +3,7 @@
 #include <ostream>
 
 #include "core/error.h"
+#include "structures/accel.h"
 
 namespace arboretum {
 namespace {
@@ -10,6 +11,10 @@ namespace {
 constexpr const char* kOtherLayout = "was saved by a build of arboretum that lays this structure out differently; build and save it again";
 
 }  // namespace
+
+void Accel::archive(Archive&) {
+  throw UserError(std::string(info().name) + " cannot be saved to a file; build it anew");
+}
 
 void Archive::expect(std::uint64_t meaning) {
   std::uint64_t saved = meaning;

@@ -3,9 +3,12 @@
 #include <algorithm>
 
 #include "structures/end_point_overlap.h"
+#include "structures/leaf_count_variability.h"
 
 namespace arboretum {
 namespace {
+
+constexpr std::size_t kMostFill = 32;  ///< fuller leaves share the histogram's last place
 
 /// Writes down what the structure shows, in its order: parents before children.
 class Recorder final : public StructureVisitor {
@@ -32,6 +35,9 @@ class Recorder final : public StructureVisitor {
     statistics.depth = std::max(statistics.depth, leaf.depth);
     if (statistics.depth_histogram.size() <= leaf.depth) statistics.depth_histogram.resize(leaf.depth + 1);
     ++statistics.depth_histogram[leaf.depth];
+    const std::size_t fill = std::min(leaf.primitives.size(), kMostFill);
+    if (statistics.leaf_histogram.size() <= fill) statistics.leaf_histogram.resize(fill + 1);
+    ++statistics.leaf_histogram[fill];
   }
 
   void finish(std::size_t triangles) {
@@ -89,7 +95,7 @@ class Recorder final : public StructureVisitor {
 }  // namespace
 
 StructureStatistics compute_statistics(const Accel& accel, const TriangleMesh& mesh,
-                                       const BuilderParameters& costs, bool with_epo) {
+                                       const BuilderParameters& costs, bool slow_ones) {
   Recorder recorder(costs);
   StructureStatistics none;
   none.bytes = accel.bytes();
@@ -98,10 +104,12 @@ StructureStatistics compute_statistics(const Accel& accel, const TriangleMesh& m
   StructureStatistics& statistics = recorder.statistics;
   statistics.available = true;
   statistics.bytes = accel.bytes();
-  if (with_epo) {
+  if (slow_ones) {
     const EndPointOverlap overlap = end_point_overlap(mesh, recorder.records, recorder.references);
     statistics.epo = overlap.value;
     statistics.epo_sampled = overlap.sampled;
+    const LeafCounts counts = leaf_counts(recorder.records);
+    statistics.lcv = counts.deviation, statistics.leaves_per_line = counts.mean, statistics.lcv_lines = counts.lines;
   }
   return statistics;
 }

@@ -7,6 +7,7 @@
 
 #include "core/random.h"
 #include "structures/end_point_overlap.h"
+#include "structures/leaf_count_variability.h"
 #include "tests/catch.h"
 #include "tests/small_meshes.h"
 
@@ -250,4 +251,62 @@ TEST_CASE("end-point overlap equals the definition, and its estimate comes near"
   CHECK(estimate.sampled < 0.5);
   CHECK(estimate.value == Approx(exact.value).epsilon(0.05));
   CHECK(end_point_overlap(mesh, records, references, 3e6).value == estimate.value);
+}
+
+TEST_CASE("leaf-count variability: its mean is the SAH's leaf share, its deviation that of chords") {
+  SECTION("one leaf, no leaf, leaves that fill the box") {
+    const Bounds3f box{{0, 0, 0}, {1, 2, 3}};
+    CHECK(leaf_counts({}).lines == 0);
+    const TreeRecord one{box, 1.0, 1, 0, 1, true};
+    const LeafCounts counts = leaf_counts(std::span(&one, 1));
+    CHECK(counts.mean == 1.0);
+    CHECK(counts.deviation == 0.0);
+    CHECK(counts.lines == 4096);
+    const std::vector<TreeRecord> same{{box, 1.0, 3, 0, 2, false}, {box, 1.0, 2, 0, 1, true}, {box, 1.0, 3, 1, 2, true}};
+    CHECK(leaf_counts(same).mean == 2.0);
+    CHECK(leaf_counts(same).deviation == 0.0);
+  }
+  SECTION("a cube halved: the chance to meet a half is 4/6, both are met by one line in three") {
+    const std::vector<TreeRecord> halves{{{{0, 0, 0}, {2, 2, 2}}, 1.0, 3, 0, 2, false},
+                                         {{{0, 0, 0}, {1, 2, 2}}, 1.0, 2, 0, 1, true},
+                                         {{{1, 0, 0}, {2, 2, 2}}, 1.0, 3, 1, 2, true}};
+    const LeafCounts counts = leaf_counts(halves);
+    CHECK(counts.mean == Approx(4.0 / 3.0).margin(0.03));       // 2 * 16 / 24
+    CHECK(counts.deviation == Approx(std::sqrt(2.0) / 3).margin(0.02));  // of 1 or 2 with chances 2/3 and 1/3
+  }
+  SECTION("a box without thickness and one without area") {
+    const std::vector<TreeRecord> flat{{{{0, 0, 5}, {2, 2, 5}}, 1.0, 3, 0, 2, false},
+                                       {{{0, 0, 5}, {1, 2, 5}}, 1.0, 2, 0, 1, true},
+                                       {{{1, 0, 5}, {2, 2, 5}}, 1.0, 3, 1, 2, true}};
+    CHECK(leaf_counts(flat).mean == Approx(1.0).margin(0.01));
+    const TreeRecord point{{{1, 1, 1}, {1, 1, 1}}, 1.0, 1, 0, 1, true};
+    CHECK(leaf_counts(std::span(&point, 1)).mean == 1.0);
+    CHECK(leaf_counts(std::span(&point, 1)).lines == 0);
+  }
+  SECTION("of a random tree, and within a bound of work") {
+    const TriangleMesh mesh = random_mesh(400, 0.2f);
+    std::vector<std::uint32_t> ids(mesh.size()), references;
+    std::iota(ids.begin(), ids.end(), 0u);
+    std::vector<TreeRecord> records;
+    write_records(mesh, halved(mesh, ids), records, references);
+    double expected = 0.0;
+    for (const TreeRecord& r : records) expected += r.is_leaf ? r.bounds.area() / records[0].bounds.area() : 0.0;
+    const LeafCounts counts = leaf_counts(records);
+    CHECK(counts.mean == Approx(expected).epsilon(0.05));
+    CHECK(counts.deviation > 1.0);
+    CHECK(leaf_counts(records, 1.0).lines == 128);
+  }
+}
+
+TEST_CASE("how full leaves are, as a histogram") {
+  const TriangleMesh mesh = two_that_overlap();
+  const HandMade both(mesh, {{leaf({0, 1}), leaf({1})}, {}});
+  const StructureStatistics s = compute_statistics(both, mesh, {}, true);
+  CHECK(s.leaf_histogram == std::vector<std::size_t>{0, 1, 1});
+  CHECK(s.depth_histogram == std::vector<std::size_t>{0, 2});
+  CHECK(s.leaves_per_line == Approx(1.0 + 1.0).margin(1.0));
+  const HandMade full(mesh, leaf(std::vector<std::uint32_t>(500, 0)));
+  CHECK(compute_statistics(full, mesh, {}, false).leaf_histogram.back() == 1);
+  CHECK(compute_statistics(full, mesh, {}, false).leaf_histogram.size() == 33);
+  CHECK(compute_statistics(full, mesh, {}, false).lcv_lines == 0);
 }
