@@ -8,3 +8,4 @@
 #include "structures/brute_force/brute_force.h"
 #include "structures/bvh/bvh.h"
 #include "structures/embree/embree.h"
+#include "structures/kdtree/kdtree.h"

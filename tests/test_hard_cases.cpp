@@ -95,6 +95,8 @@ std::string_view expected_fault(const HardCase& c, const KernelRow& row) {
   const bool has_fma = row.isa >= Isa::avx2;
   for (const KnownLimit& limit : kKnownLimits) {
     if (limit.id != c.id || limit.intersector != row.intersector) continue;
+    // The kd-tree's fast planes are padded along axes that a ray does not move on, and it culls with the scene's bounds.
+    if (row.structure == "kdtree" && row.box == "fast" && (limit.reason == kFlatBox || c.id == "S04")) continue;
     if ((limit.arithmetic == fused && !has_fma) || (limit.arithmetic == unfused && has_fma)) continue;
     if (limit.single_triangle_leaves_and_fast_boxes &&
         (row.box != "fast" || row.structure == "brute_force" ||

@@ -1,0 +1,121 @@
+#include "structures/kdtree/emit.h"
+
+#include <array>
+
+#include "core/error.h"
+
+namespace arboretum::kdtree {
+namespace {
+
+/// A node of the built tree, wherever it stands: in `part`, as its root when that is a plane, else at `index`.
+struct Place {
+  const Part* part;
+  std::uint32_t index;
+
+  [[nodiscard]] const BuildNode* own() const noexcept { return part->axis < 0 ? &part->nodes[index] : nullptr; }
+  [[nodiscard]] bool is_leaf() const noexcept { return own() && own()->axis == 3; }
+  [[nodiscard]] int axis() const noexcept { return own() ? int(own()->axis) : part->axis; }
+  [[nodiscard]] float plane() const noexcept { return own() ? own()->plane : part->plane; }
+  [[nodiscard]] Place child(std::uint32_t i) const noexcept {
+    return own() ? Place{part, own()->first + i} : Place{part->child[i].get(), 0};
+  }
+};
+
+void count(const Place& node, std::size_t& pairs, std::size_t& leaves, std::size_t& blocks, unsigned width) {
+  if (node.is_leaf()) {
+    ++leaves, blocks += (node.own()->count + width - 1) / width;
+    return;
+  }
+  ++pairs;
+  count(node.child(0), pairs, leaves, blocks, width), count(node.child(1), pairs, leaves, blocks, width);
+}
+
+/// Places pairs in groups of up to four, a cache line: a pair, its children's pairs, then theirs, breadth first; then the groups
+/// below, depth first. A ray that goes down meets a new line every second level or later.
+class Writer {
+ public:
+  Writer(std::byte* base, std::size_t next_leaf, unsigned width, std::size_t block_bytes, MeteredVector<LeafPlan>& leaves)
+      : base_(base), next_leaf_(next_leaf), width_(width), block_bytes_(block_bytes), align_(block_bytes % 64 == 0 ? 64 : 32), leaves_(leaves) {}
+
+  Node node(const Place& place, std::size_t pair_offset) {
+    if (!place.is_leaf()) return Node::inner(place.plane(), place.axis(), pair_offset);
+    const BuildNode& leaf = *place.own();
+    const std::uint32_t blocks = (leaf.count + width_ - 1) / width_;
+    const std::size_t at = next_leaf_;
+    next_leaf_ += (blocks * block_bytes_ + align_ - 1) / align_ * align_;
+    if (blocks != 0) leaves_.push_back({at, place.part->ids.data() + leaf.first, leaf.count});
+    return Node::leaf(blocks, at);
+  }
+
+  /// Writes all that is below `top`, an inner node; returns where its children are.
+  std::size_t below(const Place& top, unsigned depth) {
+    constexpr unsigned kGroup = 4;
+    struct Pair {
+      Place parent;
+      unsigned depth;
+    };
+    std::array<Pair, 3 * kGroup> queue;
+    unsigned taken = 0, size = 0;
+    queue[size++] = {top, depth};
+    const std::size_t first = next_pair_;
+    const auto offset_of = [&](unsigned i) { return first + i * 2 * sizeof(Node); };
+    // The group: queue entries that get a place in it. The others wait until the group is complete.
+    for (; taken < size && taken < kGroup; ++taken) {
+      for (std::uint32_t i = 0; i < 2; ++i) {
+        const Place child = queue[taken].parent.child(i);
+        if (!child.is_leaf()) queue[size++] = {child, queue[taken].depth + 1};
+      }
+    }
+    next_pair_ += taken * 2 * sizeof(Node);
+    unsigned next = 1;
+    for (unsigned p = 0; p < taken; ++p) {
+      for (std::uint32_t i = 0; i < 2; ++i) {
+        const Place child = queue[p].parent.child(i);
+        std::size_t at = 0;
+        if (!child.is_leaf()) {
+          at = next < taken ? offset_of(next) : below(child, queue[p].depth + 1);
+          ++next;
+        } else {
+          depth_ = std::max(depth_, queue[p].depth + 1);
+        }
+        new (base_ + offset_of(p) + i * sizeof(Node)) Node(node(child, at));
+      }
+    }
+    return first;
+  }
+
+  void start(std::size_t next_pair) { next_pair_ = next_pair; }
+  [[nodiscard]] unsigned depth() const noexcept { return depth_; }
+
+ private:
+  std::byte* base_;
+  std::size_t next_pair_ = 0, next_leaf_;
+  const unsigned width_;
+  const std::size_t block_bytes_, align_;
+  MeteredVector<LeafPlan>& leaves_;
+  unsigned depth_ = 0;
+};
+
+}  // namespace
+
+Layout lay_out(const Part& tree, unsigned width, std::size_t block_bytes) {
+  const Place root{&tree, 0};
+  std::size_t pairs = 0, leaves = 0, blocks = 0;
+  count(root, pairs, leaves, blocks, width);
+  const std::size_t align = block_bytes % 64 == 0 ? 64 : 32;
+  const std::size_t node_bytes = (pairs * 2 * sizeof(Node) + 63) / 64 * 64;
+  // A leaf may be followed by a gap of less than `align`.
+  const std::size_t bytes = node_bytes + blocks * block_bytes + (block_bytes % align == 0 ? 0 : leaves * (align - 1));
+  if (bytes > Node::kMostBytes) {
+    throw UserError("kdtree would take " + std::to_string(bytes >> 20) + " MiB; its links reach 16 GiB: use leaves of indices or a smaller mesh");
+  }
+  Layout out;
+  out.leaves.reserve(leaves);
+  out.arena = Arena(bytes);
+  Writer writer(out.arena.data(), node_bytes, width, block_bytes, out.leaves);
+  out.root = writer.node(root, root.is_leaf() ? 0 : writer.below(root, 0));
+  out.depth = writer.depth();
+  return out;
+}
+
+}  // namespace arboretum::kdtree

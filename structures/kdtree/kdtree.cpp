@@ -1,0 +1,114 @@
+#include "structures/kdtree/kdtree.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "core/timer.h"
+#include "structures/archive.h"
+#include "structures/kdtree/builders.h"
+#include "structures/kdtree/emit.h"
+#include "structures/leaves/blocks.h"
+
+namespace arboretum::kdtree {
+namespace {
+
+constexpr unsigned kDeepest = 63;       ///< the largest max_depth
+constexpr std::size_t kReferences = 8;  ///< references at most, times the triangles
+
+[[nodiscard]] unsigned depth_limit(const BuilderParameters& p, std::size_t n) {
+  return p.max_depth != 0 ? p.max_depth : std::min(kDeepest, unsigned(8.0 + 1.3 * std::log2(double(n) + 1.0)));
+}
+
+void check(const BuilderParameters& p, const TriangleMesh& mesh) {
+  if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
+  if (p.max_depth > kDeepest) throw UserError("max_depth: " + std::to_string(p.max_depth) + " is not within 0 .. " + std::to_string(kDeepest));
+  if (!(p.empty_bonus >= 0.0f && p.empty_bonus <= 0.95f)) throw UserError("empty_bonus: " + std::to_string(p.empty_bonus) + " is not within 0 .. 0.95");
+  if (p.max_leaf_blocks < 1) throw UserError("max_leaf_blocks: 0 is not at least 1");
+  if (mesh.size() >= (1u << 28)) throw UserError("kdtree takes at most 2^28 - 1 triangles");
+}
+
+}  // namespace
+
+const StructureInfo& KdTree::static_info() {
+  static const StructureInfo info = [] {
+    StructureInfo i;
+    i.name = kName;
+    i.summary = "kd-tree: axis-aligned planes, triangles clipped to their cells, 8-byte nodes";
+    i.builders = {"binned_sah", "sweep_sah"};
+    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    return i;
+  }();
+  return info;
+}
+
+void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
+  check(settings.parameters, mesh);
+  const Builder builder = settings.builder == "binned_sah" ? &build_binned : settings.builder == "sweep_sah" ? &build_sweep : nullptr;
+  if (!builder) throw UserError("kdtree has no builder '" + settings.builder + "'");
+  const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
+    leaf_ = settings.leaf, vertices_ = mesh.vertices.data();
+    bounds_ = mesh.size() == 0 ? Bounds3f{{0, 0, 0}, {0, 0, 0}} : mesh.bounds();
+    max_coordinate_ = 0.0f;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      max_coordinate_ = std::max({max_coordinate_, std::fabs(bounds_.lower[axis]), std::fabs(bounds_.upper[axis])});
+    }
+    Part tree;
+    if (mesh.size() == 0) {
+      tree.nodes.push_back({0.0f, 3, 0, 0});
+    } else {
+      const CostModel model(settings.parameters, unsigned(Block::kWidth));
+      const Limits limits{depth_limit(settings.parameters, mesh.size()), kReferences * mesh.size()};
+      builder(mesh, settings.parameters, model, limits, bounds_, tree, report);
+    }
+    const double start = wall_seconds();
+    arena_ = Arena();
+    Layout layout = lay_out(tree, unsigned(Block::kWidth), sizeof(Block));
+    arena_ = std::move(layout.arena), root_ = layout.root, depth_ = layout.depth;
+    tbb::parallel_for(std::size_t{0}, layout.leaves.size(), [&](std::size_t i) {
+      const LeafPlan& leaf = layout.leaves[i];
+      fill_blocks(reinterpret_cast<Block*>(arena_.data() + leaf.offset), mesh, {leaf.ids, leaf.count});
+    });
+    report.phases.emplace_back("leaves", wall_seconds() - start);
+  });
+  if (!known) throw UserError("kdtree has no leaf '" + settings.leaf + "'");
+}
+
+bool KdTree::visit(StructureVisitor& visitor) const {
+  struct Entry {
+    Node node;
+    Bounds3f cell;
+    unsigned depth;
+  };
+  with_block(leaf_, [&]<class Block>(std::type_identity<Block>) {
+    std::vector<Entry> stack{{root_, bounds_, 0}};
+    std::vector<std::uint32_t> primitives;
+    while (!stack.empty()) {
+      const auto [node, cell, depth] = stack.back();
+      stack.pop_back();
+      if (node.is_leaf()) {
+        primitives.clear();
+        append_primitives(reinterpret_cast<const Block*>(base() + node.offset()), node.blocks(), primitives);
+        visitor.leaf({cell, primitives, depth, node.blocks(), unsigned(Block::kWidth), sizeof(Node) + node.blocks() * sizeof(Block)});
+        continue;
+      }
+      Bounds3f child[2] = {cell, cell};
+      child[0].upper[std::size_t(node.axis())] = child[1].lower[std::size_t(node.axis())] = node.split;
+      visitor.node({cell, child, depth, sizeof(Node)});
+      const auto* pair = reinterpret_cast<const Node*>(base() + node.offset());
+      stack.push_back({pair[1], child[1], depth + 1});
+      stack.push_back({pair[0], child[0], depth + 1});
+    }
+  });
+  return true;
+}
+
+void KdTree::archive(Archive& archive) {
+  archive.expect(sizeof(Node));
+  archive(leaf_, arena_, root_, bounds_, depth_, max_coordinate_);
+  vertices_ = archive.mesh().vertices.data();
+}
+
+}  // namespace arboretum::kdtree
