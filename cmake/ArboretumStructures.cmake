@@ -10,6 +10,9 @@
 #   arboretum_registry(<file> <record>...)                     writes registry.cpp
 #   arboretum_executable(<target> STRUCTURES <folder>... [LIBRARIES <library>...])
 #                                                              an `arboretum` of one's own (docs/add-a-structure.md)
+#   arboretum_kernel_tests(<target> STRUCTURES <folder>... [LIBRARIES <library>...])
+#                                                              the tests of its kernels
+#   arboretum_add_structures(<target> <folder>...)             structures for any other executable
 
 # Writes only what changed, so that a configure run rebuilds nothing.
 function(arboretum_write path content)
@@ -126,28 +129,44 @@ ${calls}  return rows;
 ")
 endfunction()
 
+# Compiles a folder's structure and its kernels, once a project, as the object library arboretum_structure_<name>. Sets <out>
+# to its record.
+function(arboretum_own_structure out path)
+  get_filename_component(path "${path}" ABSOLUTE)
+  get_filename_component(name "${path}" NAME)
+  if(NOT EXISTS "${path}/${name}.h")
+    message(FATAL_ERROR "a structure's folder holds a header of its name: ${path} has no ${name}.h")
+  endif()
+  arboretum_read_structure(record "${path}/${name}.h" "${path}/${name}.h")
+  set(${out} "${record}" PARENT_SCOPE)
+  set(library arboretum_structure_${name})
+  if(TARGET ${library})
+    return()
+  endif()
+  arboretum_kernel_units(units ${CMAKE_CURRENT_BINARY_DIR}/${library} "${record}")
+  file(GLOB sources CONFIGURE_DEPENDS "${path}/*.cpp")
+  add_library(${library} OBJECT ${sources} ${units})
+  target_link_libraries(${library} PUBLIC arboretum::arboretum)
+  # Includes as in the project's own structures: "structures/accel.h". What the options are for: cmake/ArboretumFlags.cmake.
+  target_include_directories(${library} PRIVATE "${ARBORETUM_HEADERS}")
+  target_compile_options(${library} PRIVATE -ffp-contract=off $<$<CXX_COMPILER_ID:Clang>:-fno-slp-vectorize>)
+endfunction()
+
 # Adds structures to an executable: it gets a registry of its own, with those of Arboretum and these. One folder a structure, absolute or
-# relative to the current source folder; <folder>/<folder>.h is its header.
+# relative to the current source folder; <folder>/<folder>.h is its header. With ARBORETUM_STRUCTURES set to fewer records in the
+# caller, the executable has fewer of Arboretum's.
 function(arboretum_add_structures target)
-  set(out ${CMAKE_CURRENT_BINARY_DIR}/${target}_structures)
   set(records "")
   foreach(path IN LISTS ARGN)
-    get_filename_component(path "${path}" ABSOLUTE)
-    get_filename_component(name "${path}" NAME)
-    if(NOT EXISTS "${path}/${name}.h")
-      message(FATAL_ERROR "arboretum_add_structures(${target}): ${path} has no ${name}.h")
-    endif()
-    arboretum_read_structure(record "${path}/${name}.h" "${path}/${name}.h")
+    arboretum_own_structure(record "${path}")
     list(APPEND records "${record}")
-    file(GLOB sources CONFIGURE_DEPENDS "${path}/*.cpp")
-    target_sources(${target} PRIVATE ${sources})
+    get_filename_component(name "${path}" NAME)
+    target_link_libraries(${target} PRIVATE arboretum_structure_${name})
   endforeach()
-  arboretum_kernel_units(units ${out} ${records})
-  arboretum_registry(${out}/registry.cpp ${ARBORETUM_STRUCTURES} ${records})
-  target_sources(${target} PRIVATE ${units} ${out}/registry.cpp)
-  # Includes as in the project's own structures: "structures/accel.h". What the flags are for: cmake/ArboretumFlags.cmake.
+  set(registry ${CMAKE_CURRENT_BINARY_DIR}/${target}_registry.cpp)
+  arboretum_registry(${registry} ${ARBORETUM_STRUCTURES} ${records})
+  target_sources(${target} PRIVATE ${registry})
   target_include_directories(${target} PRIVATE "${ARBORETUM_HEADERS}")
-  target_compile_options(${target} PRIVATE -ffp-contract=off $<$<CXX_COMPILER_ID:Clang>:-fno-slp-vectorize>)
 endfunction()
 
 # The `arboretum` program with structures of one's own beside Arboretum's: `list` shows them, `run` sweeps them.
@@ -159,7 +178,7 @@ function(arboretum_executable target)
   if(NOT TARGET arboretum::experiments)
     message(FATAL_ERROR "arboretum_executable(${target}) needs find_package(arboretum REQUIRED COMPONENTS experiments)")
   endif()
-  set(main ${CMAKE_CURRENT_BINARY_DIR}/${target}_structures/main.cpp)
+  set(main ${CMAKE_CURRENT_BINARY_DIR}/${target}_main.cpp)
   arboretum_write("${main}"
 "// Made by cmake/ArboretumStructures.cmake.
 #include <cstdlib>
@@ -173,5 +192,20 @@ int main(int argc, char** argv) {
 ")
   add_executable(${target} "${main}")
   target_link_libraries(${target} PRIVATE arboretum::experiments ${words_LIBRARIES})
+  arboretum_add_structures(${target} ${words_STRUCTURES})
+endfunction()
+
+# Arboretum's tests of every kernel, over the kernels of these structures and of brute_force, which they are compared with.
+function(arboretum_kernel_tests target)
+  cmake_parse_arguments(PARSE_ARGV 1 words "" "" "STRUCTURES;LIBRARIES")
+  if(NOT TARGET arboretum::tests)
+    message(FATAL_ERROR "arboretum_kernel_tests(${target}) needs find_package(arboretum REQUIRED COMPONENTS tests)")
+  endif()
+  add_executable(${target} "${ARBORETUM_TESTS_FOLDER}/test_kernels.cpp")
+  target_link_libraries(${target} PRIVATE arboretum::arboretum arboretum::oracle arboretum::tests ${words_LIBRARIES})
+  target_compile_options(${target} PRIVATE -O1)  # Catch2 takes half as long to compile; the kernels have options of their own
+  get_filename_component(root "${ARBORETUM_TESTS_FOLDER}" DIRECTORY)
+  target_include_directories(${target} PRIVATE "${root}")
+  list(FILTER ARBORETUM_STRUCTURES INCLUDE REGEX "\\|brute_force\\|")
   arboretum_add_structures(${target} ${words_STRUCTURES})
 endfunction()

@@ -1,6 +1,6 @@
 # `cmake --install`: static libraries, headers, the program, its data, and a package for find_package(arboretum).
 #
-# Components of the package: library (always there), scenes, oracle, rendering, experiments; each is an export set of its own,
+# Components of the package: library (always there), scenes, oracle, rendering, experiments, tests; each is an export set of its own,
 # so that a program which only traces needs none of the others' libraries. The program finds its data relative to itself and
 # the package its files: an installed tree may be moved.
 include(CMakePackageConfigHelpers)
@@ -13,6 +13,10 @@ function(arboretum_install_component component)
   export(EXPORT arboretum-${component} NAMESPACE arboretum:: FILE ${PROJECT_BINARY_DIR}/arboretum-${component}-targets.cmake)
 endfunction()
 
+if(TARGET arboretum_catch_main)
+  set_target_properties(arboretum_catch_main PROPERTIES EXPORT_NAME tests)
+  arboretum_install_component(tests arboretum_catch_main)
+endif()
 foreach(name flags core structures statistics traversal registry scenes oracle rendering experiments)
   set_target_properties(arboretum_${name} PROPERTIES EXPORT_NAME ${name})
   add_library(arboretum::${name} ALIAS arboretum_${name})
@@ -61,6 +65,9 @@ install(TARGETS arboretum RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT 
 set(data ${CMAKE_INSTALL_DATADIR}/arboretum)
 install(FILES scenes/catalogue.yaml DESTINATION ${data}/scenes COMPONENT runtime)
 install(DIRECTORY plots configs DESTINATION ${data} COMPONENT runtime PATTERN __pycache__ EXCLUDE)
+if(TARGET arboretum_catch_main)  # for tests of structures that others write: arboretum_kernel_tests()
+  install(FILES tests/test_kernels.cpp tests/kernel_runner.h tests/kernel_scenes.h tests/catch.h DESTINATION ${data}/tests COMPONENT development)
+endif()
 install(DIRECTORY examples DESTINATION ${data} COMPONENT development PATTERN build* EXCLUDE)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(FILES README.md LICENSE CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)

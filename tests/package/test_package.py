@@ -97,6 +97,9 @@ def step_structure():
     build(folder)
     program = folder / "my_arboretum"
 
+    tests = call(folder / "test_my_structures").stdout
+    check("All tests passed" in tests, tests)
+
     built_in = [line.split()[0] for line in call(BUILD / "arboretum", "list", "structures").stdout.splitlines()]
     listed = [line.split()[0] for line in call(program, "list", "structures", cwd="/").stdout.splitlines()]
     check(sorted(listed) == sorted([*built_in, "sorted_boxes"]), f"list structures: {listed}")

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/timer.h"
+#include "structures/archive.h"
 #include "structures/builders/builders.h"
 #include "structures/leaves/blocks.h"
 
@@ -111,6 +112,12 @@ bool SortedBoxes::visit(StructureVisitor& visitor) const {
                     .bytes = sizeof(Block)});
     }
   });
+}
+
+void SortedBoxes::archive(Archive& archive) {
+  archive.expect(sizeof(BoxGroup));
+  archive(leaf_, arena_, blocks_, bounds_, max_coordinate_);
+  vertices_ = archive.mesh().vertices.data();
 }
 
 }  // namespace arboretum::sorted_boxes

@@ -28,6 +28,7 @@ class SortedBoxes final : public Accel {
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   /// One node that has every box as a child, and a leaf of one block for each; nothing for an empty mesh.
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
+  void archive(Archive& archive) override;
   [[nodiscard]] std::size_t bytes() const noexcept override { return arena_.bytes(); }
 
   [[nodiscard]] std::size_t groups() const noexcept { return (blocks_ + BoxGroup::kWidth - 1) / BoxGroup::kWidth; }
