@@ -30,6 +30,14 @@ const StructureEntry* find_structure(std::string_view name) {
   return nullptr;
 }
 
+void require_finite(const TriangleMesh& mesh) {
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    for (const Vec3f& p : mesh.corners(i)) {
+      if (!is_finite(p)) throw UserError("triangle " + std::to_string(i) + " has a vertex that is not finite; drop such triangles first, as load_scene() does");
+    }
+  }
+}
+
 std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh, const BuildSettings& settings,
                                        BuildReport& report) {
   const StructureEntry* entry = find_structure(name);
@@ -47,11 +55,7 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   check("builder", settings.builder, entry->info.builders);
   check("leaf", settings.leaf, entry->info.leaves);
 
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    for (const Vec3f& p : mesh.corners(i)) {
-      if (!is_finite(p)) throw UserError("triangle " + std::to_string(i) + " has a vertex that is not finite; drop such triangles first, as load_scene() does");
-    }
-  }
+  require_finite(mesh);
 
   std::unique_ptr<Accel> accel = entry->create();
   report = {};

@@ -99,6 +99,11 @@ class Accel {
   /// Builds from `mesh`, replacing what was there. The mesh must outlive the structure.
   /// Throws UserError when a setting is not one that info() names, or when the mesh is too large for the structure.
   virtual void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) = 0;
+  /// Fits the structure, as it was built, to the same triangles with moved vertices, for a moving mesh: quicker than a build, and
+  /// the further they moved the worse to trace. The mesh, which takes the place of the one built from, must outlive the structure.
+  /// Runs in the caller's TBB arena. Throws UserError where the structure cannot do it, for another number of triangles and for
+  /// vertices that are not finite; the structure is then as it was.
+  virtual void refit(const TriangleMesh& mesh);
   /// Shows every node and leaf, parents before children, depth first: what follows a node with a greater depth is below
   /// it. Returns false where the structure cannot be looked into (embree).
   [[nodiscard]] virtual bool visit(StructureVisitor& visitor) const = 0;
@@ -123,5 +128,8 @@ struct StructureEntry {
 /// the structure's, and for a triangle with a vertex that is not finite (looked for before the clock starts).
 [[nodiscard]] std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh,
                                                      const BuildSettings& settings, BuildReport& report);
+
+/// Throws UserError for a triangle with a vertex that is not finite.
+void require_finite(const TriangleMesh& mesh);
 
 }  // namespace arboretum

@@ -12,6 +12,8 @@ constexpr const char* kOtherLayout = "was saved by a build of arboretum that lay
 
 }  // namespace
 
+void Accel::refit(const TriangleMesh&) { throw UserError(std::string(info().name) + " cannot be refitted; build it anew"); }
+
 void Accel::archive(Archive&) {
   throw UserError(std::string(info().name) + " cannot be saved to a file; build it anew");
 }

@@ -1,8 +1,11 @@
 // Linear BVH (Lauterbach et al., Eurographics 2009): triangles in Morton order, cut from the top where the highest differing bit
 // of the codes changes; boxes on the way back. Equal codes are cut in the middle, so a million of them are 20 levels.
+#include <algorithm>
+
 #include <tbb/parallel_invoke.h>
 
 #include "core/timer.h"
+#include "structures/builders/box4.h"
 #include "structures/builders/fast_builders.h"
 #include "structures/builders/morton_order.h"
 #include "structures/builders/node_pool.h"
@@ -11,31 +14,43 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kParallel = 1u << 12;
+constexpr std::size_t kAhead = 12;  ///< vertices are asked for so many triangles before their use, triangles twice as many
 
 class Lbvh {
  public:
   Lbvh(const TriangleMesh& mesh, const MortonOrder& order, unsigned leaf_width, BinaryTree& tree)
-      : mesh_(mesh), order_(order), leaf_width_(leaf_width), tree_(tree) {}
+      : boxes_(mesh), order_(order), leaf_width_(leaf_width), tree_(tree), pool_(tree, order.size(), kParallel) {}
 
   void build() {
     const std::size_t n = order_.size();
-    tree_.nodes.resize(NodePool::capacity(n, kParallel)), tree_.first.resize(tree_.nodes.size()), tree_.primitives.resize(n);
+    tree_.primitives.resize(n);
     NodePool::Share share;
     recurse(0, n, 0, share);
-    tree_.node_count = pool_.used();
+    pool_.finish();
   }
 
  private:
-  Bounds3f recurse(std::size_t begin, std::size_t end, std::uint32_t index, NodePool::Share& share) {
-    Bounds3f box;
+  Box4 leaf(std::size_t begin, std::size_t end) noexcept {
+    const std::size_t last = order_.size() - 1;
+    Box4 box;
+    for (std::size_t i = begin; i < end; ++i) {
+      boxes_.prefetch_triangle(order_.id(std::min(i + 2 * kAhead, last)));
+      boxes_.prefetch_vertices(order_.id(std::min(i + kAhead, last)));
+      box.extend(boxes_.box(tree_.primitives[i] = order_.id(i)));
+    }
+    return box;
+  }
+
+  Box4 recurse(std::size_t begin, std::size_t end, std::uint32_t index, NodePool::Share& share) {
+    Box4 box;
     std::uint32_t left = 0;
     if (end - begin <= leaf_width_) {
       tree_.first[index] = std::uint32_t(begin);
-      for (std::size_t i = begin; i < end; ++i) box.extend(mesh_.bounds(tree_.primitives[i] = order_.id(i)));
+      box = leaf(begin, end);
     } else {
       const std::size_t middle = order_.split(begin, end);
       left = pool_.take_pair(share);
-      Bounds3f other;
+      Box4 other;
       if (middle - begin > kParallel && end - middle > kParallel) {
         tbb::parallel_invoke(
             [&] {
@@ -49,11 +64,11 @@ class Lbvh {
       }
       box.extend(other);
     }
-    tree_.nodes[index] = {box.lower, left, box.upper, std::uint32_t(end - begin)};
+    tree_.nodes[index] = {to_vec3f(box.lower), left, to_vec3f(box.upper), std::uint32_t(end - begin)};
     return box;
   }
 
-  const TriangleMesh& mesh_;
+  const TriangleBoxes boxes_;
   const MortonOrder& order_;
   const unsigned leaf_width_;
   BinaryTree& tree_;

@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
+#include "structures/builders/box4.h"
 #include "structures/builders/radix_sort.h"
 
 namespace arboretum {
@@ -14,13 +15,6 @@ namespace {
 
 constexpr std::size_t kChunk = 1u << 14;
 constexpr unsigned kRestBits = 31;
-
-/// Twice the centroid of the triangle's box.
-Vec3f centroid(const TriangleMesh& mesh, std::size_t i) noexcept {
-  const Triangle t = mesh.triangles[i];
-  const Vec3f a = mesh.vertices[t.a], b = mesh.vertices[t.b], c = mesh.vertices[t.c];
-  return min(min(a, b), c) + max(max(a, b), c);
-}
 
 /// Bit i goes to bit 3 i; 21 bits at most.
 std::uint64_t spread(std::uint32_t x) noexcept {
@@ -41,20 +35,21 @@ void for_chunks(std::size_t n, const F& f) {
 /// Cells of a cube around the centroids: cells as wide on each axis make better boxes than the scene's own proportions.
 class Cells {
  public:
-  Cells(const Bounds3f& centroids, unsigned bits_an_axis) : lower_(centroids.lower), last_(float((1u << bits_an_axis) - 1)) {
-    const Vec3f extent = centroids.extent();
+  Cells(const Box4& centroids, unsigned bits_an_axis) : lower_(centroids.lower), last_(_mm_set1_ps(float((1u << bits_an_axis) - 1))) {
+    const Vec3f extent = to_vec3f(_mm_sub_ps(centroids.upper, centroids.lower));
     const float largest = std::max({extent.x, extent.y, extent.z});
-    if (largest > 1e-30f) scale_ = float(1u << bits_an_axis) / largest;
+    scale_ = _mm_set1_ps(largest > 1e-30f ? float(1u << bits_an_axis) / largest : 0.0f);
   }
-  [[nodiscard]] std::uint64_t code(Vec3f c) const noexcept {
-    const Vec3f d = (c - lower_) * scale_;
-    return spread(cell(d.x)) << 2 | spread(cell(d.y)) << 1 | spread(cell(d.z));
+  /// A NaN, as where coordinates overflow, counts as 0.
+  [[nodiscard]] std::uint64_t code(__m128 c) const noexcept {
+    const __m128 at = _mm_mul_ps(_mm_sub_ps(c, lower_), scale_);
+    alignas(16) std::uint32_t cell[4];
+    _mm_store_si128(reinterpret_cast<__m128i*>(cell), _mm_cvttps_epi32(_mm_min_ps(_mm_max_ps(at, _mm_setzero_ps()), last_)));
+    return spread(cell[0]) << 2 | spread(cell[1]) << 1 | spread(cell[2]);
   }
 
  private:
-  [[nodiscard]] std::uint32_t cell(float x) const noexcept { return std::uint32_t(std::int32_t(x > 0.0f ? (x < last_ ? x : last_) : 0.0f)); }
-  Vec3f lower_;
-  float last_, scale_ = 0.0f;
+  __m128 lower_, last_, scale_;
 };
 
 }  // namespace
@@ -67,19 +62,28 @@ MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits) : keys_(mesh.s
   check_morton_bits(bits);
   const std::size_t n = mesh.size();
   if (n == 0) return;
-  MeteredVector<Vec3f> centroids(n);
-  MeteredVector<Bounds3f> partial((n + kChunk - 1) / kChunk);
+  struct alignas(16) Centroid {
+    float doubled[4];
+  };
+  MeteredVector<Centroid> centroids(n);
+  MeteredVector<Box4> partial((n + kChunk - 1) / kChunk);
+  const TriangleBoxes boxes(mesh);
   for_chunks(n, [&](std::size_t c, std::size_t begin, std::size_t end) {
-    Bounds3f box;
-    for (std::size_t i = begin; i < end; ++i) box.extend(centroids[i] = centroid(mesh, i));
-    partial[c] = box;
+    Box4 all;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Box4 box = boxes.box(i);
+      const __m128 doubled = _mm_add_ps(box.lower, box.upper);
+      _mm_store_ps(centroids[i].doubled, doubled);
+      all.extend(doubled);
+    }
+    partial[c] = all;
   });
-  Bounds3f box;
-  for (const Bounds3f& b : partial) box.extend(b);
+  Box4 box;
+  for (const Box4& b : partial) box.extend(b);
   const Cells cells(box, bits / 3);
   for_chunks(n, [&](std::size_t, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const std::uint64_t code = cells.code(centroids[i]);
+      const std::uint64_t code = cells.code(_mm_load_ps(centroids[i].doubled));
       if (bits == 30) {
         keys_[i] = code << 32 | i;
       } else {
@@ -109,7 +113,11 @@ void MortonOrder::refine() {
         run.resize(last - begin);
         const std::uint64_t high = upper(begin) << 32;
         for (std::size_t i = begin; i < last; ++i) run[i - begin] = std::uint64_t{rest_[id(i)]} << 32 | id(i);
-        radix_sort(run, 32, 32 + kRestBits);
+        if (run.size() < kChunk) {
+          std::sort(run.begin(), run.end());
+        } else {
+          radix_sort(run, 32, 32 + kRestBits);
+        }
         for (std::size_t i = begin; i < last; ++i) keys_[i] = high | std::uint32_t(run[i - begin]);
       }
       begin = last;

@@ -1,39 +1,49 @@
-// NodePool: node indices for builders whose tasks make nodes at the same time.
+// NodePool: nodes of a BinaryTree for builders whose tasks make them at the same time.
 #pragma once
 
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 
+#include "structures/builders/binary_tree.h"
+
 namespace arboretum {
 
-/// Gives out pairs of neighbouring indices from 1 on (0 is the root). Each task owns a Share and takes indices in blocks, so that
-/// its nodes lie together; numbers depend on scheduling, the tree need not.
+/// Gives out pairs of neighbouring nodes from 1 on (0 is the root), with room for the worst case and counted as they go. Each
+/// task owns a Share and takes nodes in blocks, so that its own lie together; numbers depend on scheduling, the tree need not.
 class NodePool {
  public:
-  static constexpr std::uint32_t kBlock = 256;
-
   struct Share {
     std::uint32_t next = 0, end = 0;
   };
 
-  /// Indices that a tree of n references may need, when a task is started only for subtrees of more than `grain` of them.
-  [[nodiscard]] static std::size_t capacity(std::size_t n, std::size_t grain) noexcept { return 2 * n + (n / grain + 2) * kBlock; }
+  /// For a tree of n references, when a task is started only for subtrees of more than `grain` of them.
+  NodePool(BinaryTree& tree, std::size_t n, std::size_t grain) : tree_(tree) {
+    tree.nodes.reserve(2 * n + (n / grain + 2) * kBlock), tree.first.reserve(tree.nodes.size());
+    count(1);
+  }
+  NodePool(const NodePool&) = delete;
+  NodePool& operator=(const NodePool&) = delete;
 
   /// The first of two.
   [[nodiscard]] std::uint32_t take_pair(Share& share) noexcept {
     if (share.next + 2 > share.end) {
       share.next = next_.fetch_add(kBlock, std::memory_order_relaxed);
       share.end = share.next + kBlock;
+      count(kBlock);
     }
     share.next += 2;
     return share.next - 2;
   }
 
-  /// All indices given out are below it.
-  [[nodiscard]] std::uint32_t used() const noexcept { return next_.load(std::memory_order_relaxed); }
+  /// To be called when the tree is done.
+  void finish() noexcept { tree_.node_count = next_.load(std::memory_order_relaxed); }
 
  private:
+  static constexpr std::uint32_t kBlock = 256;
+  void count(std::size_t n) noexcept { tree_.nodes.hand_out(n), tree_.first.hand_out(n); }
+
+  BinaryTree& tree_;
   std::atomic<std::uint32_t> next_{1};
 };
 

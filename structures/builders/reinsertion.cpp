@@ -158,6 +158,7 @@ class Reinsertion {
 
 void reinsert(BinaryTree& tree, unsigned rounds, unsigned leaf_width, BuildReport& report) {
   if (tree.primitives.empty()) return;
+  const bool duplicates = tree.duplicates;
   const double start = wall_seconds();
   // Laid out first: numbers, and with them the order among equal gains, then depend on the tree alone.
   LinkedTree linked = to_linked(std::move(tree));
@@ -167,6 +168,7 @@ void reinsert(BinaryTree& tree, unsigned rounds, unsigned leaf_width, BuildRepor
   for (unsigned i = 0; i < rounds && passes.pass(); ++i) {
   }
   tree = lay_out(linked, leaf_width);
+  tree.duplicates = duplicates;
   report.phases.emplace_back("reinsertion", wall_seconds() - start);
 }
 

@@ -37,12 +37,16 @@ class BvhBase : public Accel {
   [[nodiscard]] const Vec3f* vertices() const noexcept { return vertices_; }
 
  protected:
+  /// Takes note of the mesh that rays will meet and of its bounds.
+  void set_scene(const TriangleMesh& mesh, const Bounds3f& bounds) noexcept;
+
   Arena arena_;
   NodeReference root_ = 0;
   std::size_t stack_entries_ = 1;
   float max_coordinate_ = 0.0f;
   Bounds3f bounds_;
   const Vec3f* vertices_ = nullptr;
+  std::size_t triangles_ = 0;
   std::string leaf_;
 };
 
@@ -50,7 +54,7 @@ class BvhBase : public Accel {
 ///   kName, kSummary; kBranching, the most children; Node, a trivially copyable type;
 ///   write(Node&, boxes, references, count): the node of these children, 0 of them for an empty scene;
 ///   read(const Node&, boxes, references): the count, and the children as a ray's box test sees them.
-/// Its members are defined in wide_bvh.h, which a structure's .cpp file includes to instantiate them.
+/// Its members are defined in wide_bvh.h and wide_refit.h, which a structure's .cpp file includes to instantiate them.
 template <class Format>
 class WideBvh final : public BvhBase {
  public:
@@ -61,6 +65,7 @@ class WideBvh final : public BvhBase {
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
   void archive(Archive& archive) override;
+  void refit(const TriangleMesh& mesh) override;
 };
 
 /// planes[2 * axis + side][child], side 0 lower, 1 upper. 64, 112, 224, 448 bytes of planes and references for N = 2, 4,

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include <tbb/parallel_for.h>
@@ -13,6 +12,7 @@
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
+#include "structures/bvh/wide_refit.h"
 #include "structures/leaves/blocks.h"
 
 namespace arboretum::bvh {
@@ -114,11 +114,12 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
     report.phases.emplace_back("collapse", wall_seconds() - start);
 
     start = wall_seconds();
-    leaf_ = settings.leaf, vertices_ = mesh.vertices.data();
+    leaf_ = settings.leaf;
     if (mesh.size() == 0) {  // a node without children: every ray misses
       arena_ = Arena(round_up(sizeof(typename Format::Node)));
       Format::write(*new (arena_.data()) typename Format::Node, nullptr, nullptr, 0);
-      root_ = 0, stack_entries_ = 2 * kBranching, bounds_ = {}, max_coordinate_ = 0.0f;
+      root_ = 0, stack_entries_ = 2 * kBranching;
+      set_scene(mesh, {});
       return;
     }
     const std::uint64_t bytes = collapse.bytes(0);
@@ -136,11 +137,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
       depth = emitter.subtree(0, 0);
     }
     stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
-    bounds_ = {tree.nodes[0].lower, tree.nodes[0].upper};
-    max_coordinate_ = 0.0f;
-    for (int axis = 0; axis < 3; ++axis) {
-      max_coordinate_ = std::max({max_coordinate_, std::fabs(bounds_.lower[axis]), std::fabs(bounds_.upper[axis])});
-    }
+    set_scene(mesh, {tree.nodes[0].lower, tree.nodes[0].upper});
     report.phases.emplace_back("leaves", wall_seconds() - start);
   });
   if (!known) throw UserError(std::string(kName) + " has no leaf '" + settings.leaf + "'");
@@ -182,7 +179,7 @@ template <class Format>
 void WideBvh<Format>::archive(Archive& archive) {
   archive.expect(sizeof(typename Format::Node));
   archive(leaf_, arena_, root_, stack_entries_, max_coordinate_, bounds_);
-  vertices_ = archive.mesh().vertices.data();
+  vertices_ = archive.mesh().vertices.data(), triangles_ = archive.mesh().size();
 }
 
 }  // namespace arboretum::bvh

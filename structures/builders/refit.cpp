@@ -1,0 +1,31 @@
+#include "structures/builders/refit.h"
+
+#include <tbb/parallel_invoke.h>
+
+namespace arboretum {
+namespace {
+
+constexpr std::uint32_t kParallel = 1u << 12;
+
+Bounds3f refit_subtree(BinaryTree& tree, const TriangleMesh& mesh, std::uint32_t index) {
+  BinaryNode& node = tree.nodes[index];
+  Bounds3f box, other;
+  if (node.is_leaf()) {
+    for (std::uint32_t i = tree.first[index]; i < tree.first[index] + node.count; ++i) box.extend(mesh.bounds(tree.primitives[i]));
+  } else if (node.count > kParallel) {
+    tbb::parallel_invoke([&] { box = refit_subtree(tree, mesh, node.left); }, [&] { other = refit_subtree(tree, mesh, node.left + 1); });
+  } else {
+    box = refit_subtree(tree, mesh, node.left), other = refit_subtree(tree, mesh, node.left + 1);
+  }
+  box.extend(other);
+  node.lower = box.lower, node.upper = box.upper;
+  return box;
+}
+
+}  // namespace
+
+void refit(BinaryTree& tree, const TriangleMesh& mesh) {
+  if (!tree.primitives.empty()) (void)refit_subtree(tree, mesh, 0);
+}
+
+}  // namespace arboretum

@@ -1,0 +1,75 @@
+// Refit of a wide BVH: leaves and boxes for moved vertices, the tree's shape as it was.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "structures/builders/collapse.h"
+#include "structures/bvh/bvh.h"
+#include "structures/leaves/blocks.h"
+
+namespace arboretum::bvh {
+
+template <class Format, class Block>
+class Refitter {
+ public:
+  Refitter(const TriangleMesh& mesh, std::byte* base) : mesh_(mesh), base_(base) {}
+
+  /// The new box of what is below `reference`.
+  Bounds3f subtree(NodeReference reference, unsigned depth) const {
+    std::byte* const at = base_ + offset_of(reference);
+    if (is_leaf(reference)) return leaf(reinterpret_cast<Block*>(at), block_count(reference));
+    auto& node = *reinterpret_cast<typename Format::Node*>(at);
+    Bounds3f boxes[kMaxBranching];
+    NodeReference references[kMaxBranching] = {};
+    const unsigned count = Format::read(node, boxes, references);
+    const auto descend = [&](unsigned i) { boxes[i] = subtree(references[i], depth + 1); };
+    if (depth < kForkLevels) {
+      tbb::parallel_for(0u, count, descend);
+    } else {
+      for (unsigned i = 0; i < count; ++i) descend(i);
+    }
+    Format::write(node, boxes, references, count);
+    Bounds3f box;
+    for (unsigned i = 0; i < count; ++i) box.extend(boxes[i]);
+    return box;
+  }
+
+ private:
+  /// So many levels make some 256 tasks.
+  static constexpr unsigned kForkLevels = 8 / unsigned(std::bit_width(unsigned(Format::kBranching)) - 1);
+
+  Bounds3f leaf(Block* block, unsigned blocks) const {
+    Bounds3f box;
+    for (Block* const end = block + blocks; block != end; ++block) {
+      std::uint32_t ids[std::size_t(Block::kWidth)];
+      const auto count = std::size_t(triangles_in(*block));
+      std::copy_n(block->id, count, ids);
+      for (std::size_t i = 0; i < count; ++i) box.extend(mesh_.bounds(ids[i]));
+      fill_block(*block, mesh_, {ids, count});
+    }
+    return box;
+  }
+
+  const TriangleMesh& mesh_;
+  std::byte* base_;
+};
+
+template <class Format>
+void WideBvh<Format>::refit(const TriangleMesh& mesh) {
+  if (mesh.size() != triangles_) {
+    throw UserError(std::string(kName) + " was built from " + std::to_string(triangles_) + " triangles and cannot be refitted to " +
+                    std::to_string(mesh.size()) + "; build it anew");
+  }
+  require_finite(mesh);
+  with_block(leaf_, [&]<class Block>(std::type_identity<Block>) {
+    set_scene(mesh, Refitter<Format, Block>(mesh, arena_.data()).subtree(root_, 0));
+  });
+}
+
+}  // namespace arboretum::bvh
