@@ -24,6 +24,9 @@ constexpr Summary kBuilders[] = {
     {"low", "Embree's low quality (Morton)"},
     {"medium", "Embree's medium quality (binned SAH)"},
     {"high", "Embree's high quality (spatial splits)"},
+    {"embree_low", "Embree's Morton builder, for our BVHs"},
+    {"embree_medium", "Embree's binned SAH builder, for our BVHs"},
+    {"embree_high", "Embree's builder with spatial splits, for our BVHs"},
     {"auto", "the first that the structure takes"},
 };
 constexpr Summary kIntersectors[] = {

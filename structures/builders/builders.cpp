@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "structures/builders/embree_builders.h"
 #include "structures/builders/fast_builders.h"
 #include "structures/builders/reinsertion.h"
 
@@ -39,6 +40,11 @@ constexpr Entry kBuilders[] = {
     {"binned_sah", binned_sah},
     {"morton", on_any<build_morton>},
     {"ploc", on_any<build_ploc>},
+#ifdef ARBORETUM_HAVE_EMBREE
+    {"embree_low", on_any<build_embree_low>},
+    {"embree_medium", on_any<build_embree_medium>},
+    {"embree_high", on_any<build_embree_high>},
+#endif
 };
 
 /// Every builder has a second key, this behind its own: its tree improved by reinsertion.
