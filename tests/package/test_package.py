@@ -97,6 +97,10 @@ def step_structure():
     build(folder)
     program = folder / "my_arboretum"
 
+    objects = sorted(folder.rglob("*sorted_boxes_SortedBoxes_*.o"))
+    check(objects, "no kernel objects")
+    call(sys.executable, SOURCE / "tests/symbols/check_symbols.py", *objects)
+
     tests = call(folder / "test_my_structures").stdout
     check("All tests passed" in tests, tests)
 

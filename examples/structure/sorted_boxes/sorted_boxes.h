@@ -4,8 +4,12 @@
 // Memory: groups of eight boxes (192 bytes each, the layout that box tests read), then as many blocks as there are boxes.
 #pragma once
 
+// Standard headers that the kernels need stand here: what a kernel header includes is compiled for its instruction set.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "core/arena.h"
 #include "core/type_list.h"

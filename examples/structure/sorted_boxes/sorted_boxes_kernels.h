@@ -3,9 +3,6 @@
 // until anything is hit.
 #pragma once
 
-#include <algorithm>
-#include <vector>
-
 #include "intersectors/leaf_block.h"
 #include "intersectors/moller_trumbore.h"
 #include "intersectors/watertight.h"
@@ -14,12 +11,16 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// A box that the ray meets, and where it enters it.
-struct MetBox {
-  float entry;
-  std::uint32_t block;
-  friend bool operator<(const MetBox& a, const MetBox& b) { return a.entry < b.entry || (a.entry == b.entry && a.block < b.block); }
-};
+/// A box that the ray meets as one number: the bits of where it enters, then the block. Bits of floats from +0 on order as
+/// integers, so these sort from near to far.
+using MetBox = std::uint64_t;
+
+[[nodiscard]] ARBORETUM_INLINE MetBox met_box(float entry, std::size_t block) {
+  return std::uint64_t(__builtin_bit_cast(std::uint32_t, entry + 0.0f)) << 32 | block;  // -0 becomes +0
+}
+[[nodiscard]] ARBORETUM_INLINE float entry_of(MetBox box) {
+  return __builtin_bit_cast(float, std::uint32_t(box >> 32));
+}
 
 // The next three are not inlined, so that kernels which differ in something else share them. The project's own structures inline
 // everything: that compiles three times as long, and traces faster.
@@ -44,7 +45,7 @@ __attribute__((noinline)) void find_boxes(const sorted_boxes::SortedBoxes& accel
     entry.store(entries);
     for (; hit != 0; hit &= hit - 1) {
       const unsigned i = unsigned(__builtin_ctz(hit));
-      met.push_back({entries[i], std::uint32_t(group * W + i)});
+      met.push_back(met_box(entries[i], group * W + i));
     }
   }
   std::sort(met.begin(), met.end());
@@ -73,8 +74,8 @@ class SortedBoxesTrace {
     if (is_valid_in_lanes(ray)) {
       const typename Intersector::RayData data(ray);
       find_boxes<Padded>(accel_, ray, met_, counting_);
-      for (const MetBox& box : met_) {
-        if (box.entry > best.t) break;  // a box at an equal distance may hold the hit of a lower id
+      for (MetBox box : met_) {
+        if (entry_of(box) > best.t) break;  // a box at an equal distance may hold the hit of a lower id
         nearer_hit<Block, Intersector>(data, block(box), accel_.vertices(), ray.tnear, best);
       }
     }
@@ -96,8 +97,8 @@ class SortedBoxesTrace {
 
  private:
   /// The block in that box; counted as a leaf that is tested.
-  const Block& block(const MetBox& box) {
-    const Block& b = accel_.template block_data<Block>()[box.block];
+  const Block& block(MetBox box) {
+    const Block& b = accel_.template block_data<Block>()[std::uint32_t(box)];
     if constexpr (Counting::kCounting) {
       const unsigned triangles = unsigned(triangles_in(b));
       ++counting_.counters.leaves, ++counting_.counters.blocks;
