@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
+#include "structures/builders/box4.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
@@ -28,7 +29,7 @@ class Emitter {
   using Node = typename Format::Node;
 
   Emitter(const TriangleMesh& mesh, const BinaryTree& tree, const Collapse& collapse, std::byte* base)
-      : mesh_(mesh), tree_(tree), collapse_(collapse), base_(base) {}
+      : mesh_(mesh), boxes_(mesh), tree_(tree), collapse_(collapse), base_(base) {}
 
   /// Returns the depth of the deepest leaf below.
   unsigned subtree(std::uint32_t index, std::size_t offset) const {
@@ -67,7 +68,13 @@ class Emitter {
   }
 
   void leaf(std::uint32_t index, std::size_t offset) const {
-    fill_blocks(reinterpret_cast<Block*>(base_ + offset), mesh_, {tree_.primitives.data() + tree_.begin_of(index), tree_.nodes[index].count});
+    const std::uint32_t begin = tree_.begin_of(index), end = begin + tree_.nodes[index].count;
+    const std::size_t last = tree_.primitives.size() - 1;
+    for (std::size_t i = begin; i < end; ++i) {
+      boxes_.prefetch_triangle(tree_.primitives[std::min(i + 2 * kAhead, last)]);
+      boxes_.prefetch_vertices(tree_.primitives[std::min(i + kAhead, last)]);
+    }
+    fill_blocks(reinterpret_cast<Block*>(base_ + offset), mesh_, {tree_.primitives.data() + begin, end - begin});
   }
 
   [[nodiscard]] NodeReference reference(std::uint32_t index, std::size_t offset) const {
@@ -75,7 +82,10 @@ class Emitter {
   }
 
  private:
+  static constexpr std::size_t kAhead = 12;  ///< vertices are asked for so many triangles before their use, triangles twice as many
+
   const TriangleMesh& mesh_;
+  const TriangleBoxes boxes_;
   const BinaryTree& tree_;
   const Collapse& collapse_;
   std::byte* base_;
