@@ -1,11 +1,13 @@
-// TriangleMesh: shared vertices and index triples. What structures build from and the oracle reads.
+// TriangleMesh: shared vertices and index triples, key frames where it moves. What structures build from and the oracle reads.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/bounds.h"
+#include "core/motion.h"
 
 namespace arboretum {
 
@@ -18,27 +20,41 @@ struct Triangle {
   friend bool operator==(const Triangle&, const Triangle&) = default;
 };
 
+struct Instancing;  // core/instances.h
+
 struct TriangleMesh {
-  std::vector<Vec3f> vertices;
+  std::vector<Vec3f> vertices;  ///< of the first key frame, where it moves
   std::vector<Triangle> triangles;
   std::vector<std::uint16_t> materials;  ///< one a triangle, or empty
+  /// The key frames after the first, each with as many vertices; empty: nothing moves. Equally spaced over time [0, 1].
+  std::vector<std::vector<Vec3f>> later_frames{};
+  std::shared_ptr<const Instancing> instancing{};  ///< what the triangles are instances of; null: of nothing
 
   [[nodiscard]] std::size_t size() const noexcept { return triangles.size(); }
+  [[nodiscard]] bool moves() const noexcept { return !later_frames.empty(); }
+  [[nodiscard]] std::size_t frames() const noexcept { return later_frames.size() + 1; }
+  [[nodiscard]] const std::vector<Vec3f>& frame(std::size_t k) const noexcept { return k == 0 ? vertices : later_frames[k - 1]; }
+
+  /// A vertex at a time, as frame_at(time, frames()) gives it.
+  [[nodiscard]] Vec3f position(std::uint32_t vertex, FrameTime at) const noexcept {
+    return moves() ? interpolate(frame(at.frame)[vertex], frame(at.frame + 1)[vertex], at.weight) : vertices[vertex];
+  }
+  /// Corners in the first key frame.
   [[nodiscard]] std::array<Vec3f, 3> corners(std::size_t i) const noexcept {
     const Triangle& t = triangles[i];
     return {vertices[t.a], vertices[t.b], vertices[t.c]};
   }
-  [[nodiscard]] Bounds3f bounds(std::size_t i) const noexcept {
-    Bounds3f b;
-    for (const Vec3f& p : corners(i)) b.extend(p);
-    return b;
+  [[nodiscard]] std::array<Vec3f, 3> corners(std::size_t i, FrameTime at) const noexcept {
+    const Triangle& t = triangles[i];
+    return {position(t.a, at), position(t.b, at), position(t.c, at)};
   }
-  /// Bounds of all triangles (vertices that no triangle uses do not count).
-  [[nodiscard]] Bounds3f bounds() const noexcept {
-    Bounds3f b;
-    for (const Triangle& t : triangles) b.extend(vertices[t.a]), b.extend(vertices[t.b]), b.extend(vertices[t.c]);
-    return b;
-  }
+  /// Bounds of a triangle in all key frames.
+  [[nodiscard]] Bounds3f bounds(std::size_t i) const noexcept;
+  /// Bounds of all triangles in all key frames (vertices that no triangle uses do not count).
+  [[nodiscard]] Bounds3f bounds() const noexcept;
 };
+
+/// The mesh as it stands at a time: still, and without instances.
+[[nodiscard]] TriangleMesh pose(const TriangleMesh& mesh, float time);
 
 }  // namespace arboretum

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "core/vec3.h"
@@ -45,13 +46,21 @@ static_assert(sizeof(Hit) == 16);
 /// What a kernel is handed: rays, and where the scene moves the time of each.
 struct RayBatch {
   std::span<const Ray> rays;
-  std::span<const float> times;  ///< within [0, 1] of the shutter, one a ray; empty: 0 for all
+  std::span<const float> times;  ///< within [0, 1], the time of the key frames; one a ray, or empty: 0 for all
 
   RayBatch() = default;
-  RayBatch(std::span<const Ray> r, std::span<const float> t = {}) noexcept : rays(r), times(t) {}
-  RayBatch(const std::vector<Ray>& r) noexcept : rays(r) {}
+  RayBatch(const Ray* first, std::size_t count) noexcept : rays(first, count) {}
+  RayBatch(std::span<const Ray> r, std::span<const float> t) noexcept : rays(r), times(t) {}
+  /// Of a vector, an array, a span.
+  template <class Rays>
+    requires std::is_convertible_v<const Rays&, std::span<const Ray>>
+  RayBatch(const Rays& r) noexcept : rays(r) {}
   [[nodiscard]] std::size_t size() const noexcept { return rays.size(); }
   [[nodiscard]] const Ray& operator[](std::size_t i) const noexcept { return rays[i]; }
+  /// `count` rays from ray `begin` on.
+  [[nodiscard]] RayBatch part(std::size_t begin, std::size_t count) const noexcept {
+    return {rays.subspan(begin, count), times.empty() ? times : times.subspan(begin, count)};
+  }
   [[nodiscard]] float time(std::size_t i) const noexcept { return times.empty() ? 0.0f : times[i]; }
 };
 

@@ -20,6 +20,10 @@ Json as_json(const std::string& name, const SceneInfo& info) {
   json["non_manifold_edges"] = info.non_manifold_edges;
   json["closed"] = info.closed, json["materials"] = info.materials,
   json["emissive_triangles"] = info.emissive_triangles;
+  json["key_frames"] = info.key_frames, json["moving_triangles"] = info.moving_triangles;
+  json["shutter"] = {info.shutter.open, info.shutter.close};
+  json["instances"] = info.instances, json["prototypes"] = info.prototypes;
+  json["prototype_triangles"] = info.prototype_triangles;
   json["lights"] = info.lights, json["warnings"] = info.report.warnings;
   Json& effects = json["effects"] = Json::array();
   for (const Effect& e : info.effects)
@@ -49,6 +53,16 @@ ExitStatus command_info(const std::string& word, bool json) {
              info.closed ? "closed" : "open", info.edges, info.boundary_edges, info.non_manifold_edges);
   fmt::print("materials     {}\n", info.materials);
   fmt::print("lights        {}, {} emissive triangles\n", info.lights, info.emissive_triangles);
+  if (info.key_frames > 1)
+    fmt::print("motion        {} key frames, {} triangles move; shutter open from {:g} to {:g} of [0, 1]\n",
+               info.key_frames, info.moving_triangles, info.shutter.open, info.shutter.close);
+  else
+    fmt::print("motion        nothing moves\n");
+  if (info.instances > 0)
+    fmt::print("instances     {} of {} meshes with {} triangles\n", info.instances, info.prototypes,
+               info.prototype_triangles);
+  else
+    fmt::print("instances     none\n");
   for (const std::string& warning : info.report.warnings) fmt::print("warning       {}\n", warning);
   fmt::print("effects\n");
   for (const Effect& e : info.effects)

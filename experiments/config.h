@@ -20,6 +20,7 @@ inline constexpr std::array<std::string_view, 4> kMetricNames{"trace", "build", 
 struct SceneChoice {
   SceneSpec spec;
   std::string name;  ///< as in cell names
+  bool moves = false;  ///< it has key frames, and its shutter opens
 };
 
 /// One entry of `include` or `exclude`. An empty list: the axis is not named.

@@ -94,7 +94,8 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
       yaml.fail(entry,
                 fmt::format("scene '{}' is given twice; keep one, or give the files different names", name));
     }
-    scenes.push_back({std::move(spec), std::move(name)});
+    const bool moves = scene_moves(spec);
+    scenes.push_back({std::move(spec), std::move(name), moves});
   }
   return scenes;
 }
@@ -102,7 +103,8 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
 SceneChoice scene_of_word(const std::string& word) {
   SceneSpec spec = parse_scene_word(word);
   std::string name = cell_word(spec.name());
-  return {std::move(spec), std::move(name)};
+  const bool moves = scene_moves(spec);
+  return {std::move(spec), std::move(name), moves};
 }
 
 }  // namespace arboretum

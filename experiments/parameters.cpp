@@ -22,6 +22,16 @@ struct Field {
 constexpr std::string_view kCollapses[] = {"optimal", "greedy"};
 constexpr unsigned kMortonBits[] = {30, 63};
 
+/// What may stand below another structure, and what cannot: the plan says why not.
+std::span<const std::string_view> structure_names() {
+  static const std::vector<std::string_view> names = [] {
+    std::vector<std::string_view> list;
+    for (const StructureEntry& e : all_structures()) list.push_back(e.info.name);
+    return list;
+  }();
+  return names;
+}
+
 const std::vector<Field>& fields() {
   static const std::vector<Field> table{
       {.name = "bins", .low = 4, .high = 64, .integer = &BuilderParameters::bins},
@@ -37,6 +47,7 @@ const std::vector<Field>& fields() {
       {.name = "empty_bonus", .low = 0, .high = 0.95, .real = &BuilderParameters::empty_bonus},
       {.name = "max_depth", .low = 0, .high = 63, .integer = &BuilderParameters::max_depth},
       {.name = "grid_density", .low = 0.01, .high = 64, .real = &BuilderParameters::grid_density},
+      {.name = "below", .low = 0, .high = 0, .word = &BuilderParameters::below, .words = structure_names()},
       {.name = "collapse", .low = 0, .high = 0, .word = &BuilderParameters::collapse, .words = kCollapses},
   };
   return table;

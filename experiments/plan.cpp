@@ -72,23 +72,56 @@ class Planner {
     cell.traversal = resolve_traversal(cell.traversal, cell.isa);
     if (cell.box == kAuto) cell.box = default_box(cell.intersector);
     if (entry && !entry->info.uses_parameters) cell.parameters = {}, cell.parameter_label.clear();
-    if (cell.builder == kAuto)
-      cell.builder = entry && !entry->info.builders.empty() ? entry->info.builders.front() : kNone;
+    // What stands above another structure takes that one's defaults.
+    const bool above = entry && entry->info.takes_below;
+    if (!above) drop_below(cell);
+    const StructureEntry* below = above ? registry_.structure(cell.parameters.below) : nullptr;
+    if (cell.builder == kAuto) {
+      const StructureEntry* of = below ? below : entry;
+      cell.builder = of && !of->info.builders.empty() ? of->info.builders.front() : kNone;
+    }
     if (cell.leaf == kAuto) {
       const std::string_view leaf =
-          entry ? registry_.default_leaf(cell.structure, cell.intersector, cell.isa) : "";
+          entry ? registry_.default_leaf(below ? below->info.name : cell.structure, cell.intersector, cell.isa) : "";
       cell.leaf = leaf.empty() ? kNone : leaf;
     }
+  }
+
+  /// The structure takes none below: the parameter means nothing to it.
+  static void drop_below(Cell& cell) {
+    cell.parameters.below = BuilderParameters{}.below;
+    const std::size_t begin = cell.parameter_label.find(":below=");
+    if (begin == std::string::npos) return;
+    const std::size_t end = cell.parameter_label.find(':', begin + 1);
+    cell.parameter_label.erase(begin, end == std::string::npos ? end : end - begin);
+  }
+
+  /// Why the structure below cannot be, or not so; empty where it can.
+  std::string impossible_below(const Cell& cell) const {
+    const std::string& name = cell.parameters.below;
+    const StructureEntry* below = registry_.structure(name);
+    std::string why = below ? why_not_below(below->info) : "there is no structure of that name";
+    if (why.empty()) why = lacks_builder(*below, cell.builder);
+    if (why.empty() && !registry_.kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa)) {
+      why = registry_.why_no_kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
+      if (why.empty()) why = "no such kernel in this build";
+    }
+    return why.empty() ? why : fmt::format("{} over {}: {}", cell.structure, name, why);
+  }
+
+  static std::string lacks_builder(const StructureEntry& entry, const std::string& builder) {
+    const auto& builders = entry.info.builders;
+    if (builders.empty() || std::ranges::find(builders, builder) != builders.end()) return {};
+    return fmt::format("{} has no builder {} (it takes {})", entry.info.name, builder, fmt::join(builders, ", "));
   }
 
   /// Why the cell cannot be; empty where it can.
   std::string impossible(Cell& cell, const StructureEntry* entry) const {
     if (!entry) return std::string(kEmbreeMissing);
-    const auto& builders = entry->info.builders;
-    if (!builders.empty() && std::ranges::find(builders, cell.builder) == builders.end()) {
-      return fmt::format("{} has no builder {} (it takes {})", cell.structure, cell.builder,
-                         fmt::join(builders, ", "));
-    }
+    const bool moves = experiment_.scenes[cell.scene_index].moves;
+    if (moves && !entry->info.holds_motion) return fmt::format("{} holds one moment, and the scene moves", cell.structure);
+    if (!moves && entry->info.needs_motion) return fmt::format("{} is for moving scenes, and nothing moves", cell.structure);
+    if (const std::string why = lacks_builder(*entry, cell.builder); !why.empty()) return why;
     cell.kernel =
         registry_.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
     if (!cell.kernel) {
@@ -97,6 +130,7 @@ class Planner {
       return why.empty() ? "no such kernel in this build" : why;
     }
     if (!registry_.has(cell.isa)) return fmt::format("no {}", to_string(cell.isa));
+    if (entry->info.takes_below) return impossible_below(cell);
     return {};
   }
 

@@ -38,7 +38,7 @@ const Workload& SceneData::workload(const std::string& name) {
   if (is_secondary(name) && primary_hits_.empty()) {
     for (const ExactHit& exact : closest_truth(primary)) primary_hits_.push_back(exact.hit);
   }
-  return workloads_.emplace(name, make_workload(name, scene_, view_, primary.rays, primary_hits_))
+  return workloads_.emplace(name, make_workload(name, scene_, view_, primary.batch(), primary_hits_))
       .first->second;
 }
 
@@ -47,7 +47,7 @@ const std::vector<ExactHit>& SceneData::closest_truth(const Workload& workload) 
   if (fresh) {
     Oracle& exact = oracle();
     const double begin = wall_seconds();
-    entry->second = exact.closest_hit(workload.rays);
+    entry->second = exact.closest_hit(workload.batch());
     note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name,
                       workload.rays.size(), wall_seconds() - begin));
   }
@@ -59,7 +59,7 @@ const std::vector<std::uint8_t>& SceneData::any_truth(const Workload& workload) 
   if (fresh) {
     Oracle& exact = oracle();
     const double begin = wall_seconds();
-    entry->second = exact.any_hit(workload.rays);
+    entry->second = exact.any_hit(workload.batch());
     note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name,
                       workload.rays.size(), wall_seconds() - begin));
   }
@@ -68,12 +68,12 @@ const std::vector<std::uint8_t>& SceneData::any_truth(const Workload& workload) 
 
 AnswerCheck SceneData::check(const Workload& workload, std::span<const Hit> answers) {
   const auto& truth = closest_truth(workload);
-  return oracle().check_closest_hit(workload.rays, truth, answers);
+  return oracle().check_closest_hit(workload.batch(), truth, answers);
 }
 
 AnswerCheck SceneData::check(const Workload& workload, std::span<const std::uint8_t> answers) {
   const auto& truth = any_truth(workload);
-  return oracle().check_any_hit(workload.rays, truth, answers);
+  return oracle().check_any_hit(workload.batch(), truth, answers);
 }
 
 }  // namespace arboretum

@@ -75,7 +75,11 @@ const Json& StructurePool::facts(const Cell& cell, const Accel& accel) {
     facts["triangles"] = mesh_.size();
     facts["bytes"] = accel.bytes();
     facts["bytes_per_triangle"] = static_cast<double>(accel.bytes()) / static_cast<double>(mesh_.size());
-    if (quality_) add_facts(facts, compute_statistics(accel, mesh_, cell.parameters, true));
+    // A moving structure shows itself as it is half-way through.
+    if (quality_ && mesh_.moves())
+      add_facts(facts, compute_statistics(accel, pose(mesh_, 0.5f), cell.parameters, true));
+    else if (quality_)
+      add_facts(facts, compute_statistics(accel, mesh_, cell.parameters, true));
   }
   return entry->second;
 }

@@ -29,7 +29,7 @@ TraceJob::TraceJob(const Cell& cell, const Accel& accel, const Workload& workloa
 
 void TraceJob::trace(std::size_t rays) const {
   const auto range = [&](std::size_t begin, std::size_t end) {
-    const auto batch = std::span(workload_.rays).subspan(begin, end - begin);
+    const RayBatch batch = workload_.batch().part(begin, end - begin);
     if (workload_.query == Query::closest_hit) {
       cell_.kernel->closest_hit(accel_, batch, std::span(buffers_.hits).subspan(begin, end - begin), nullptr);
     } else {
@@ -45,7 +45,7 @@ void TraceJob::trace(std::size_t rays) const {
 
 Counters TraceJob::count() const {
   Counters counters;
-  const auto rays = std::span(workload_.rays);
+  const RayBatch rays = workload_.batch();
   if (workload_.query == Query::closest_hit && cell_.kernel->count_closest_hit) {
     cell_.kernel->count_closest_hit(accel_, rays, std::span(buffers_.hits).first(rays.size()), &counters);
     counters.rays = rays.size();

@@ -26,15 +26,15 @@ void expect_one_size(std::size_t rays, std::size_t truth, std::size_t answers) {
   }
 }
 
-bool is_at_nearest_t(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth,
+bool is_at_nearest_t(const TriangleMesh& mesh, const Ray& ray, FrameTime at, const ExactHit& truth,
                      std::uint32_t primitive) {
   if (primitive == truth.hit.primitive) return true;
   if (primitive >= mesh.size() || !truth.tie) return false;
-  const Corners given = mesh.corners(primitive);
+  const Corners given = mesh.corners(primitive, at);
   if (!is_finite(given[0]) || !is_finite(given[1]) || !is_finite(given[2])) return false;
   ExactPredicate predicate(ray);
   Enclosure t;
-  return predicate.meets(given, t) && predicate.compare_t(given, mesh.corners(truth.hit.primitive)) == 0;
+  return predicate.meets(given, t) && predicate.compare_t(given, mesh.corners(truth.hit.primitive, at)) == 0;
 }
 
 double ulp_of(float x) {
@@ -42,7 +42,7 @@ double ulp_of(float x) {
   return double(next) - double(x);
 }
 
-void check_one(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth, const Hit& answer,
+void check_one(const TriangleMesh& mesh, const Ray& ray, FrameTime at, const ExactHit& truth, const Hit& answer,
                const std::function<const SurfaceAdjacency&()>& adjacency, Tally& tally) {
   AnswerCheck& check = tally.check;
   if (answer.is_hit()) ++check.hits;
@@ -57,7 +57,7 @@ void check_one(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth, 
   } else {
     const double difference = double(answer.t) - truth.t, tolerance = kSurfaceTolerance * std::fabs(truth.t);
     const bool right_surface = std::fabs(difference) <= tolerance;  // false for a NaN
-    const bool right_primitive = is_at_nearest_t(mesh, ray, truth, answer.primitive);
+    const bool right_primitive = is_at_nearest_t(mesh, ray, at, truth, answer.primitive);
     if (!right_surface) ++check.wrong_surface;
     if (!right_primitive) ++check.wrong_primitive;
     something_behind = difference > tolerance && !right_primitive;
@@ -67,7 +67,7 @@ void check_one(const TriangleMesh& mesh, const Ray& ray, const ExactHit& truth, 
                                                  : static_cast<float>(error));
     }
   }
-  if (something_behind && adjacency().passes_through(ray, truth.hit.primitive, truth.hit.u, truth.hit.v)) {
+  if (something_behind && adjacency().passes_through(ray, at, truth.hit.primitive, truth.hit.u, truth.hit.v)) {
     ++check.cracks;
   }
 }
@@ -82,7 +82,7 @@ double quantile(std::vector<float>& values, double p) {
 
 }  // namespace
 
-AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> rays,
+AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
                                std::span<const ExactHit> truth, std::span<const Hit> answers,
                                const std::function<const SurfaceAdjacency&()>& adjacency) {
   expect_one_size(rays.size(), truth.size(), answers.size());
@@ -90,7 +90,7 @@ AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> ra
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), 4096), [&](const auto& range) {
     Tally& tally = tallies.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      check_one(mesh, rays[i], truth[i], answers[i], adjacency, tally);
+      check_one(mesh, rays[i], frame_at(rays.time(i), mesh.frames()), truth[i], answers[i], adjacency, tally);
     }
   });
   AnswerCheck sum;
@@ -113,7 +113,7 @@ AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> ra
   return sum;
 }
 
-AnswerCheck check_any_hits(std::span<const Ray> rays, std::span<const std::uint8_t> truth,
+AnswerCheck check_any_hits(RayBatch rays, std::span<const std::uint8_t> truth,
                            std::span<const std::uint8_t> answers) {
   expect_one_size(rays.size(), truth.size(), answers.size());
   AnswerCheck sum;

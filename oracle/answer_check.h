@@ -14,10 +14,10 @@ namespace arboretum {
 inline constexpr double kSurfaceTolerance = 0x1p-12;
 
 /// `adjacency` is called, from any thread, only when an answer could be a crack.
-[[nodiscard]] AnswerCheck check_closest_hits(const TriangleMesh& mesh, std::span<const Ray> rays,
+[[nodiscard]] AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
                                              std::span<const ExactHit> truth, std::span<const Hit> answers,
                                              const std::function<const SurfaceAdjacency&()>& adjacency);
-[[nodiscard]] AnswerCheck check_any_hits(std::span<const Ray> rays, std::span<const std::uint8_t> truth,
+[[nodiscard]] AnswerCheck check_any_hits(RayBatch rays, std::span<const std::uint8_t> truth,
                                          std::span<const std::uint8_t> answers);
 
 }  // namespace arboretum

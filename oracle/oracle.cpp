@@ -43,12 +43,26 @@ struct Nearest {
   }
 };
 
-ExactHit closest(const SearchTree& tree, const Ray& ray, DecisionCounts& counts) {
+/// The triangles of a mesh as a ray of a time sees them: the tree's own corners while nothing moves.
+class CornersAt {
+ public:
+  CornersAt(const TriangleMesh& mesh, float time) : mesh_(mesh), at_(frame_at(time, mesh.frames())) {}
+  [[nodiscard]] Corners operator()(std::uint32_t id, const Corners& first) const {
+    return mesh_.moves() ? mesh_.corners(id, at_) : first;
+  }
+
+ private:
+  const TriangleMesh& mesh_;
+  FrameTime at_;
+};
+
+ExactHit closest(const SearchTree& tree, const CornersAt& corners_at, const Ray& ray, DecisionCounts& counts) {
   ExactHit result;
   if (!is_valid(ray)) return result;
   ExactPredicate predicate(ray);
   Nearest nearest;
-  tree.search(ray, [&](std::uint32_t id, const Corners& corners, double& limit) {
+  tree.search(ray, [&](std::uint32_t id, const Corners& first, double& limit) {
+    const Corners corners = corners_at(id, first);
     Enclosure t;
     if (predicate.meets(corners, t)) {
       nearest.offer(id, corners, t, predicate);
@@ -64,25 +78,25 @@ ExactHit closest(const SearchTree& tree, const Ray& ray, DecisionCounts& counts)
   return result;
 }
 
-bool any(const SearchTree& tree, const Ray& ray, DecisionCounts& counts) {
+bool any(const SearchTree& tree, const CornersAt& corners_at, const Ray& ray, DecisionCounts& counts) {
   if (!is_valid(ray)) return false;
   ExactPredicate predicate(ray);
   bool found = false;
-  tree.search(ray, [&](std::uint32_t, const Corners& corners, double&) {
+  tree.search(ray, [&](std::uint32_t id, const Corners& first, double&) {
     Enclosure t;
-    return found = predicate.meets(corners, t);
+    return found = predicate.meets(corners_at(id, first), t);
   });
   counts += predicate.counts();
   return found;
 }
 
 template <class Result, class Trace>
-std::vector<Result> trace_all(std::span<const Ray> rays, DecisionCounts* counts, const Trace& trace) {
+std::vector<Result> trace_all(const TriangleMesh& mesh, RayBatch rays, DecisionCounts* counts, const Trace& trace) {
   std::vector<Result> results(rays.size());
   tbb::enumerable_thread_specific<DecisionCounts> local;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), kGrain), [&](const auto& range) {
     DecisionCounts& mine = local.local();
-    for (std::size_t i = range.begin(); i != range.end(); ++i) results[i] = trace(rays[i], mine);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) results[i] = trace(CornersAt(mesh, rays.time(i)), rays[i], mine);
   });
   if (counts != nullptr) {
     for (const DecisionCounts& c : local) *counts += c;
@@ -111,25 +125,25 @@ Oracle::~Oracle() = default;
 Oracle::Oracle(Oracle&&) noexcept = default;
 Oracle& Oracle::operator=(Oracle&&) noexcept = default;
 
-std::vector<ExactHit> Oracle::closest_hit(std::span<const Ray> rays, DecisionCounts* counts) const {
-  return trace_all<ExactHit>(rays, counts, [this](const Ray& ray, DecisionCounts& c) {
-    return closest(implementation_->tree, ray, c);
+std::vector<ExactHit> Oracle::closest_hit(RayBatch rays, DecisionCounts* counts) const {
+  return trace_all<ExactHit>(implementation_->mesh, rays, counts, [this](const CornersAt& at, const Ray& ray, DecisionCounts& c) {
+    return closest(implementation_->tree, at, ray, c);
   });
 }
 
-std::vector<std::uint8_t> Oracle::any_hit(std::span<const Ray> rays, DecisionCounts* counts) const {
-  return trace_all<std::uint8_t>(rays, counts, [this](const Ray& ray, DecisionCounts& c) {
-    return static_cast<std::uint8_t>(any(implementation_->tree, ray, c));
+std::vector<std::uint8_t> Oracle::any_hit(RayBatch rays, DecisionCounts* counts) const {
+  return trace_all<std::uint8_t>(implementation_->mesh, rays, counts, [this](const CornersAt& at, const Ray& ray, DecisionCounts& c) {
+    return static_cast<std::uint8_t>(any(implementation_->tree, at, ray, c));
   });
 }
 
-AnswerCheck Oracle::check_closest_hit(std::span<const Ray> rays, std::span<const ExactHit> truth,
+AnswerCheck Oracle::check_closest_hit(RayBatch rays, std::span<const ExactHit> truth,
                                       std::span<const Hit> answers) const {
   return check_closest_hits(implementation_->mesh, rays, truth, answers,
                             [this]() -> const SurfaceAdjacency& { return implementation_->surface(); });
 }
 
-AnswerCheck Oracle::check_any_hit(std::span<const Ray> rays, std::span<const std::uint8_t> truth,
+AnswerCheck Oracle::check_any_hit(RayBatch rays, std::span<const std::uint8_t> truth,
                                   std::span<const std::uint8_t> answers) const {
   return check_any_hits(rays, truth, answers);
 }

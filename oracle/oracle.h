@@ -4,6 +4,9 @@
 // which tie) is exact: a floating-point filter first, then exact arithmetic where it cannot decide. The
 // search goes through the oracle's own tree, which shares no code with the structures under test and never
 // leaves out a triangle that the exact ray touches.
+//
+// Where the mesh moves, a ray has a time, and the triangles that it meets have their corners where core/motion.h puts them
+// at that time, as float32 numbers; from there on everything is exact as before.
 #pragma once
 
 #include <cstdint>
@@ -56,17 +59,15 @@ class Oracle {
 
   /// Both use all TBB threads allowed to the caller; the answers do not depend on their number. `counts`,
   /// where given, is added to: how many decisions each level of the predicate took.
-  [[nodiscard]] std::vector<ExactHit> closest_hit(std::span<const Ray> rays,
-                                                  DecisionCounts* counts = nullptr) const;
+  [[nodiscard]] std::vector<ExactHit> closest_hit(RayBatch rays, DecisionCounts* counts = nullptr) const;
   /// 1 where anything lies within the closed interval, else 0.
-  [[nodiscard]] std::vector<std::uint8_t> any_hit(std::span<const Ray> rays,
-                                                  DecisionCounts* counts = nullptr) const;
+  [[nodiscard]] std::vector<std::uint8_t> any_hit(RayBatch rays, DecisionCounts* counts = nullptr) const;
 
   /// `truth` as closest_hit or any_hit gave it for the same rays. Throws std::invalid_argument where the
   /// sizes differ.
-  [[nodiscard]] AnswerCheck check_closest_hit(std::span<const Ray> rays, std::span<const ExactHit> truth,
+  [[nodiscard]] AnswerCheck check_closest_hit(RayBatch rays, std::span<const ExactHit> truth,
                                               std::span<const Hit> answers) const;
-  [[nodiscard]] AnswerCheck check_any_hit(std::span<const Ray> rays, std::span<const std::uint8_t> truth,
+  [[nodiscard]] AnswerCheck check_any_hit(RayBatch rays, std::span<const std::uint8_t> truth,
                                           std::span<const std::uint8_t> answers) const;
 
  private:

@@ -18,6 +18,28 @@ double center(const Bounds3f& b, std::size_t axis) {
   return 0.5 * (double(b.lower[axis]) + double(b.upper[axis]));
 }
 
+/// Holds the triangle at every time, rounded as core/motion.h rounds: between two frames a coordinate leaves the interval of
+/// the two by no more than four roundings of numbers of their size (weights summing to 1 + 2^-24, two products, a sum).
+Bounds3f bounds_at_all_times(const TriangleMesh& mesh, std::size_t i) {
+  Bounds3f box = mesh.bounds(i);
+  if (!mesh.moves()) return box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float size = std::max(std::fabs(box.lower[axis]), std::fabs(box.upper[axis]));
+    const float pad = size * 0x1p-21f + std::numeric_limits<float>::min();
+    box.lower[axis] -= pad, box.upper[axis] += pad;
+  }
+  return box;
+}
+
+bool is_finite_at_all_times(const TriangleMesh& mesh, std::size_t i) {
+  const Triangle& t = mesh.triangles[i];
+  for (std::size_t k = 0; k < mesh.frames(); ++k) {
+    const std::vector<Vec3f>& frame = mesh.frame(k);
+    if (!is_finite(frame[t.a]) || !is_finite(frame[t.b]) || !is_finite(frame[t.c])) return false;
+  }
+  return true;
+}
+
 struct Bins {
   Bounds3f bounds[kBins];
   std::uint32_t count[kBins] = {};
@@ -38,12 +60,11 @@ struct SearchTree::BuildState {
 SearchTree::SearchTree(const TriangleMesh& mesh) {
   BuildState state;
   state.bounds.resize(mesh.size());
-  tbb::parallel_for(std::size_t{0}, mesh.size(), [&](std::size_t i) { state.bounds[i] = mesh.bounds(i); });
+  tbb::parallel_for(std::size_t{0}, mesh.size(), [&](std::size_t i) { state.bounds[i] = bounds_at_all_times(mesh, i); });
   state.order.reserve(mesh.size());
   BuildRange all{0, 0, {}};
   for (std::size_t i = 0; i < mesh.size(); ++i) {
-    const Corners corners = mesh.corners(i);
-    if (!is_finite(corners[0]) || !is_finite(corners[1]) || !is_finite(corners[2])) continue;
+    if (!is_finite_at_all_times(mesh, i)) continue;
     state.order.push_back(static_cast<std::uint32_t>(i));
     all.bounds.extend(state.bounds[i]);
   }

@@ -17,7 +17,8 @@ namespace arboretum {
 
 class SearchTree {
  public:
-  /// Builds over the triangles whose corners are all finite; the others are left out.
+  /// Builds over the triangles whose corners are all finite, in all key frames; the others are left out. Boxes hold a
+  /// triangle at every time; the corners that a search shows are those of the first frame.
   explicit SearchTree(const TriangleMesh& mesh);
 
   /// Calls `triangle(id, corners, limit)` for every triangle that the ray may meet at a t in [tnear, limit],

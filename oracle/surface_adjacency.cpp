@@ -36,13 +36,23 @@ SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     if (is_finite(points[i])) order.push_back(i);
   }
-  const auto key = [&points](std::uint32_t i) { return std::tie(points[i].x, points[i].y, points[i].z); };
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t i, std::uint32_t j) { return key(i) != key(j) ? key(i) < key(j) : i < j; });
+  const auto less = [&mesh](std::uint32_t i, std::uint32_t j) {
+    for (std::size_t k = 0; k < mesh.frames(); ++k) {
+      const Vec3f &p = mesh.frame(k)[i], &q = mesh.frame(k)[j];
+      if (p != q) return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z);
+    }
+    return i < j;
+  };
+  const auto same = [&mesh](std::uint32_t i, std::uint32_t j) {
+    for (std::size_t k = 0; k < mesh.frames(); ++k)
+      if (mesh.frame(k)[i] != mesh.frame(k)[j]) return false;
+    return true;
+  };
+  std::sort(order.begin(), order.end(), less);
   welded_.resize(points.size());
   std::iota(welded_.begin(), welded_.end(), 0u);
   for (std::size_t k = 1; k < order.size(); ++k) {
-    if (points[order[k]] == points[order[k - 1]]) welded_[order[k]] = welded_[order[k - 1]];
+    if (same(order[k], order[k - 1])) welded_[order[k]] = welded_[order[k - 1]];
   }
 
   edges_.reserve(3 * mesh.size());
@@ -64,15 +74,15 @@ SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
   spokes_.erase(std::unique(spokes_.begin(), spokes_.end()), spokes_.end());
 }
 
-bool SurfaceAdjacency::is_crossed(const Ray& ray, std::uint32_t a, std::uint32_t b) const {
+bool SurfaceAdjacency::is_crossed(const Ray& ray, FrameTime at, std::uint32_t a, std::uint32_t b) const {
   const auto [first, last] =
       std::equal_range(edges_.begin(), edges_.end(), Edge{std::min(a, b), std::max(a, b), 0});
   if (last - first != 2) return false;
-  const std::vector<Vec3f>& p = mesh_.vertices;
-  return side(ray, p[a], p[b], p[first->third]) * side(ray, p[a], p[b], p[(first + 1)->third]) < 0;
+  const Vec3f p = mesh_.position(a, at), q = mesh_.position(b, at);
+  return side(ray, p, q, mesh_.position(first->third, at)) * side(ray, p, q, mesh_.position((first + 1)->third, at)) < 0;
 }
 
-bool SurfaceAdjacency::passes_through(const Ray& ray, std::uint32_t triangle, double u, double v) const {
+bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, double u, double v) const {
   const Triangle& t = mesh_.triangles[triangle];
   const std::uint32_t corner[3] = {welded_[t.a], welded_[t.b], welded_[t.c]};
   const double weight[3] = {1.0 - u - v, u, v};
@@ -85,13 +95,13 @@ bool SurfaceAdjacency::passes_through(const Ray& ray, std::uint32_t triangle, do
     }
   }
   if (small == 0) return true;
-  if (small == 1) return is_crossed(ray, corner[(last_small + 1) % 3], corner[(last_small + 2) % 3]);
+  if (small == 1) return is_crossed(ray, at, corner[(last_small + 1) % 3], corner[(last_small + 2) % 3]);
   const std::uint32_t vertex = corner[large];
   const auto first =
       std::lower_bound(spokes_.begin(), spokes_.end(), std::array<std::uint32_t, 2>{vertex, 0});
   bool any = false;
   for (auto spoke = first; spoke != spokes_.end() && (*spoke)[0] == vertex; ++spoke) {
-    if (!is_crossed(ray, vertex, (*spoke)[1])) return false;
+    if (!is_crossed(ray, at, vertex, (*spoke)[1])) return false;
     any = true;
   }
   return any;

@@ -17,7 +17,7 @@ constexpr std::array<std::string_view, 6> kNames{"primary",    "shadow",  "ambie
                                                  "reflection", "diffuse", "random"};
 
 /// Random dimensions: each workload draws its own, so that two of them never share a number.
-enum Dimension : std::uint64_t { kOcclusionDimension = 16, kDiffuseDimension = 32, kRandomDimension = 48 };
+enum Dimension : std::uint64_t { kTimeDimension = 8, kOcclusionDimension = 16, kDiffuseDimension = 32, kRandomDimension = 48 };
 
 /// A secondary ray leaves its surface at least this steeply (sine to the surface): a direction rounded to
 /// float32 must not point back into it.
@@ -56,8 +56,8 @@ void visit_morton(unsigned x, unsigned y, unsigned size, const View& view, const
 /// A point of a surface that a ray has hit: where rays may start from.
 class SurfacePoint {
  public:
-  SurfacePoint(const TriangleMesh& mesh, const Ray& ray, const Hit& hit) {
-    const auto corners = mesh.corners(hit.primitive);
+  SurfacePoint(const TriangleMesh& mesh, const Ray& ray, float time, const Hit& hit) {
+    const auto corners = mesh.corners(hit.primitive, frame_at(time, mesh.frames()));
     const Vec3d a(corners[0]), ab = Vec3d(corners[1]) - a, ac = Vec3d(corners[2]) - a;
     const double u = hit.u, v = hit.v;
     a_ = a;
@@ -128,8 +128,7 @@ Vec3d point_on_sphere(std::uint64_t seed, std::uint64_t index, std::uint64_t dim
 
 /// The scene's first point light, else a point above the camera by a quarter of the median distance to what
 /// it sees: a measure that suits rooms and landscapes alike.
-Vec3d light_position(const Scene& scene, std::span<const Ray> primary_rays,
-                     std::span<const Hit> primary_hits) {
+Vec3d light_position(const Scene& scene, RayBatch primary_rays, std::span<const Hit> primary_hits) {
   for (const Light& light : scene.lights)
     if (light.type == Light::Type::point) return Vec3d(light.position);
   std::vector<double> distances;
@@ -154,6 +153,12 @@ Ray shadow_ray(const SurfacePoint& surface, Vec3d light) {
   const Vec3f origin = surface.origin(side);
   const Vec3d rest = light - Vec3d(origin);
   return Ray{.origin = origin, .direction = leaving(rest, side), .tfar = float(length(rest))};
+}
+
+/// When the ray is under way: uniform over the time that the shutter is open.
+float time_of(const Scene& scene, const View& view, std::uint64_t index) {
+  const double open = scene.shutter.open, close = scene.shutter.close;
+  return float(open + (close - open) * random_double(view.seed, index, kTimeDimension));
 }
 
 std::vector<Ray> random_rays(const Bounds3f& bounds, const View& view) {
@@ -199,11 +204,14 @@ Workload make_primary(const Scene& scene, const View& view) {
   const RayGenerator camera(view_of(scene), view.width, view.height);
   visit_morton(0, 0, std::bit_ceil(std::max(view.width, view.height)), view,
                [&](unsigned x, unsigned y) { workload.rays.push_back(camera.ray(x + 0.5, y + 0.5)); });
+  if (scene.mesh.moves()) {
+    for (std::size_t i = 0; i < workload.rays.size(); ++i) workload.times.push_back(time_of(scene, view, i));
+  }
   return workload;
 }
 
 Workload make_workload(std::string_view name, const Scene& scene, const View& view,
-                       std::span<const Ray> primary_rays, std::span<const Hit> primary_hits) {
+                       RayBatch primary_rays, std::span<const Hit> primary_hits) {
   check_known(name);
   check_resolution(view);
   if (name == "primary") return make_primary(scene, view);
@@ -211,6 +219,8 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
   const Bounds3f bounds = scene.mesh.bounds();
   if (name == "random") {
     workload.rays = random_rays(bounds, view);
+    for (std::size_t i = 0; scene.mesh.moves() && i < workload.rays.size(); ++i)
+      workload.times.push_back(time_of(scene, view, i));
     return workload;
   }
   if (primary_rays.size() != primary_hits.size())
@@ -220,7 +230,9 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
   workload.rays.reserve(primary_rays.size());
   for (std::size_t i = 0; i < primary_rays.size(); ++i) {
     if (!primary_hits[i].is_hit()) continue;
-    const SurfacePoint surface(scene.mesh, primary_rays[i], primary_hits[i]);
+    const float time = primary_rays.time(i);
+    if (scene.mesh.moves()) workload.times.push_back(time);
+    const SurfacePoint surface(scene.mesh, primary_rays[i], time, primary_hits[i]);
     const Vec3d normal = surface.normal();
     if (name == "shadow") {
       workload.rays.push_back(shadow_ray(surface, light));

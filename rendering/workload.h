@@ -18,6 +18,9 @@ struct Workload {
   std::string name;
   Query query = Query::closest_hit;
   std::vector<Ray> rays;  ///< in tile (Morton) order of the pixels they belong to
+  /// Within the scene's shutter, one a ray, where the scene moves; else empty. Secondary rays keep their primary ray's.
+  std::vector<float> times{};
+  [[nodiscard]] RayBatch batch() const noexcept { return {rays, times}; }
 };
 
 struct View {
@@ -36,6 +39,6 @@ struct View {
 /// Any workload. `primary_hits` are the reference hits (the oracle's) of make_primary's rays; secondary workloads have one
 /// ray for each of them that hit, offset so that it does not meet its own surface. `primary` and `random` ignore them.
 [[nodiscard]] Workload make_workload(std::string_view name, const Scene& scene, const View& view,
-                                     std::span<const Ray> primary_rays, std::span<const Hit> primary_hits);
+                                     RayBatch primary_rays, std::span<const Hit> primary_hits);
 
 }  // namespace arboretum

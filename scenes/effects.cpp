@@ -119,8 +119,11 @@ class Effects {
         lens ? fmt::format("the camera's aperture has radius {:g}", scene_.camera->aperture_radius)
              : std::string("a pinhole camera"));
     const bool open = scene_.shutter.close > scene_.shutter.open;
-    set("motion_blur", open && scene_.key_frames > 1,
-        scene_.key_frames < 2 ? std::string("one key frame: nothing moves")
+    const TriangleMesh& mesh = scene_.mesh;
+    const bool stays = mesh.moves() && std::ranges::all_of(mesh.later_frames, [&](const auto& f) { return f == mesh.vertices; });
+    set("motion_blur", open && scene_.key_frames > 1 && !stays,
+        stays                 ? std::string("all key frames are equal: nothing moves")
+        : scene_.key_frames < 2 ? std::string("one key frame: nothing moves")
         : !open               ? fmt::format("{} key frames, but the shutter is never open", scene_.key_frames)
                 : fmt::format("{} key frames, shutter open from {:g} to {:g}", scene_.key_frames,
                               scene_.shutter.open, scene_.shutter.close));

@@ -6,6 +6,7 @@
 
 #include <tbb/parallel_sort.h>
 
+#include "core/instances.h"
 #include "scenes/vec3d.h"
 
 namespace arboretum {
@@ -80,6 +81,17 @@ SceneInfo inspect_scene(const Scene& scene) {
     info.emissive_triangles += emission.x > 0 || emission.y > 0 || emission.z > 0;
   }
   info.materials = std::size_t(std::count(used.begin(), used.end(), true));
+  info.key_frames = mesh.frames(), info.shutter = scene.shutter;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const Triangle& t = mesh.triangles[i];
+    info.moving_triangles += std::ranges::any_of(mesh.later_frames, [&](const std::vector<Vec3f>& frame) {
+      return frame[t.a] != mesh.vertices[t.a] || frame[t.b] != mesh.vertices[t.b] || frame[t.c] != mesh.vertices[t.c];
+    });
+  }
+  if (mesh.instancing) {
+    info.instances = mesh.instancing->instances.size(), info.prototypes = mesh.instancing->prototypes.size();
+    for (const TriangleMesh& prototype : mesh.instancing->prototypes) info.prototype_triangles += prototype.size();
+  }
   info.effects = effects_of(scene);
   return info;
 }

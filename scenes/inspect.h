@@ -24,6 +24,10 @@ struct SceneInfo {
   std::size_t materials = 0;           ///< used by a triangle
   std::size_t emissive_triangles = 0;
   std::size_t lights = 0;
+  std::size_t key_frames = 1;
+  std::size_t moving_triangles = 0;  ///< with a corner that moves
+  Shutter shutter;
+  std::size_t instances = 0, prototypes = 0, prototype_triangles = 0;  ///< 0 where the scene has none
   std::vector<Effect> effects;
 };
 

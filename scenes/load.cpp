@@ -92,6 +92,12 @@ Scene load_scene(const SceneSpec& spec) {
   return scene;
 }
 
+bool scene_moves(const SceneSpec& spec) {
+  if (!spec.scene.empty() && is_yaml(spec.scene)) return scene_file_moves(spec.scene);
+  const std::string& name = spec.generator.empty() ? spec.catalogue : spec.generator;
+  return std::ranges::any_of(generators(), [&](const GeneratorInfo& g) { return g.moves && g.name == name; });
+}
+
 SceneSpec parse_scene_word(const std::string& word) {
   SceneSpec spec;
   if (word.empty()) throw UserError("a scene's name is empty; see: ./arboretum list scenes");

@@ -1,4 +1,4 @@
-// Scene files: YAML -> one Scene, instances baked.
+// Scene files: YAML -> one Scene, instances laid out in one mesh and kept beside it, key frames kept.
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "scenes/images.h"
+#include "scenes/layout.h"
 #include "scenes/readers.h"
 #include "scenes/yaml_node.h"
 
@@ -17,27 +18,11 @@ namespace {
 
 using Transform = Eigen::Affine3d;
 
-/// Appends `part`, moved by `transform`, to `scene`. Materials are appended once for each part
-/// (`first_material`).
-void append_mesh(TriangleMesh& mesh, const TriangleMesh& part, const Transform& transform,
-                 std::size_t first_material) {
-  const auto first = std::uint32_t(mesh.vertices.size());
-  if (mesh.vertices.size() + part.vertices.size() >= 0xffffffffu || mesh.size() + part.size() >= 0xffffffffu)
-    throw UserError("more than 2^32 - 2 triangles or vertices once the instances are laid out");
-  const bool moved = !transform.matrix().isIdentity(0.0);
-  mesh.vertices.reserve(mesh.vertices.size() + part.vertices.size());
-  for (const Vec3f& v : part.vertices) {
-    if (!moved) {
-      mesh.vertices.push_back(v);
-      continue;
-    }
-    const Eigen::Vector3d p = transform * Eigen::Vector3d(v.x, v.y, v.z);
-    mesh.vertices.push_back({float(p.x()), float(p.y()), float(p.z())});
-  }
-  for (const Triangle& t : part.triangles) mesh.triangles.push_back({t.a + first, t.b + first, t.c + first});
-  for (std::size_t i = 0; i < part.size(); ++i)
-    mesh.materials.push_back(
-        std::uint16_t(first_material + (part.materials.empty() ? 0 : part.materials[i])));
+AffineMap as_map(const Transform& t) {
+  AffineMap map;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) map.m[row][column] = t.matrix()(row, column);
+  return map;
 }
 
 class SceneFile {
@@ -59,6 +44,7 @@ class SceneFile {
     }
     read_meshes(file_.need(root, "meshes", "the scene"));
     lay_out(root["instances"]);
+    settle_motion(root["shutter"]);
     return std::move(scene_);
   }
 
@@ -149,24 +135,34 @@ class SceneFile {
                 .model = read_model(file_.beside(frames.front())),
                 .first_material = 0,
                 .instanced = false};
-      check_key_frames(entry, frames, part.model);
+      read_key_frames(entry, frames, part.model);
       parts_.push_back(std::move(part));
     }
   }
 
-  /// The later frames must have the first one's triangles, corner by corner; their positions are not used
-  /// yet.
-  void check_key_frames(const YAML::Node& node, const std::vector<std::string>& frames, const Scene& first) {
-    if (frames.size() < 2) return;
+  /// The later frames must have the first one's triangles, corner by corner.
+  void read_key_frames(const YAML::Node& node, const std::vector<std::string>& frames, Scene& first) {
     for (std::size_t i = 1; i < frames.size(); ++i) {
-      const Scene frame = read_model(file_.beside(frames[i]));
+      Scene frame = read_model(file_.beside(frames[i]));
       if (frame.mesh.triangles != first.mesh.triangles ||
           frame.mesh.vertices.size() != first.mesh.vertices.size())
         file_.fail(node, fmt::format("key frame '{}' has other triangles than '{}'", frames[i], frames[0]));
+      first.mesh.later_frames.push_back(std::move(frame.mesh.vertices));
     }
     scene_.key_frames = std::max(scene_.key_frames, unsigned(frames.size()));
-    scene_.report.warnings.push_back(fmt::format("{}: {} key frames; the first stands still for all",
-                                                 file_.path().string(), frames.size()));
+  }
+
+  /// Rays need times within the key frames'. A shutter that never opens shows one moment: the scene stands still.
+  void settle_motion(const YAML::Node& shutter) {
+    if (!scene_.mesh.moves()) return;
+    const auto [open, close] = scene_.shutter;
+    if (!(open >= 0.0f && close <= 1.0f))
+      file_.fail(shutter, fmt::format("the shutter [{:g}, {:g}] must lie within [0, 1], the time from the first key frame to the last", open, close));
+    if (open < close) return;
+    scene_.mesh = pose(scene_.mesh, open);
+    scene_.report.warnings.push_back(
+        fmt::format("{}: {} key frames, but {}: all stand as at time {:g}", file_.path().string(), scene_.key_frames,
+                    shutter ? "the shutter never opens" : "no shutter: [open, close]", open));
   }
 
   /// Meshes that an instance names appear where their instances say, the others once where they are.
@@ -197,12 +193,10 @@ class SceneFile {
     }
     for (std::size_t i = 0; i < parts_.size(); ++i)
       if (!parts_[i].instanced) placed.emplace_back(i, Transform::Identity());
-    std::size_t triangles = 0;
-    for (const auto& [part, t] : placed) triangles += parts_[part].model.mesh.size();
-    scene_.mesh.triangles.reserve(triangles);
-    scene_.mesh.materials.reserve(triangles);
-    for (const auto& [part, t] : placed)
-      append_mesh(scene_.mesh, parts_[part].model.mesh, t, parts_[part].first_material);
+    Layout layout;
+    for (Part& part : parts_) layout.add_part(std::move(part.model.mesh));
+    for (const auto& [part, t] : placed) layout.place(std::uint32_t(part), as_map(t), parts_[part].first_material);
+    scene_.mesh = layout.take(scene_.instances > 0);
   }
 
   std::size_t find_part(const YAML::Node& node) {
@@ -267,6 +261,16 @@ class SceneFile {
 
 Scene read_scene_yaml(const std::filesystem::path& path) {
   return SceneFile(path).read();
+}
+
+bool scene_file_moves(const std::filesystem::path& path) {
+  const YamlFile file(path);
+  const YAML::Node shutter = file.root()["shutter"], meshes = file.root()["meshes"];
+  if (!shutter || !shutter.IsSequence() || shutter.size() != 2 || !meshes || !meshes.IsSequence()) return false;
+  if (!(file.number(shutter[0], "shutter open") < file.number(shutter[1], "shutter close"))) return false;
+  return std::any_of(meshes.begin(), meshes.end(), [](const YAML::Node& mesh) {
+    return mesh.IsMap() && mesh["keyframes"] && mesh["keyframes"].size() > 1;
+  });
 }
 
 }  // namespace arboretum

@@ -23,6 +23,8 @@ namespace arboretum {
                                              std::vector<std::string>& warnings);
 /// A scene file of the project. Throws UserError.
 [[nodiscard]] Scene read_scene_yaml(const std::filesystem::path& path);
+/// Whether a mesh of the scene file has key frames and its shutter opens; models are not read.
+[[nodiscard]] bool scene_file_moves(const std::filesystem::path& path);
 
 /// Any model by its extension, not sanitised.
 [[nodiscard]] Scene read_model(const std::filesystem::path& path);

@@ -1,10 +1,12 @@
 #include "scenes/sanitise.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "scenes/layout.h"
 
 namespace arboretum {
 namespace {
@@ -43,6 +45,29 @@ bool is_in_range(Vec3f v) noexcept {
          std::abs(v.z) <= kMaxCoordinate;
 }
 
+/// Why a triangle cannot be traced. Zero area: in every key frame; the others: in any.
+struct Faults {
+  bool non_finite = false, out_of_range = false, zero_area = true;
+  [[nodiscard]] bool any() const noexcept { return non_finite || out_of_range || zero_area; }
+};
+
+Faults faults_of(const TriangleMesh& mesh, std::size_t i) {
+  const Triangle& t = mesh.triangles[i];
+  Faults faults;
+  for (std::size_t k = 0; k < mesh.frames(); ++k) {
+    const std::vector<Vec3f>& frame = mesh.frame(k);
+    const Vec3f a = frame[t.a], b = frame[t.b], c = frame[t.c];
+    if (!is_finite(a) || !is_finite(b) || !is_finite(c)) {
+      faults.non_finite = true;
+    } else if (!is_in_range(a) || !is_in_range(b) || !is_in_range(c)) {
+      faults.out_of_range = true;
+    } else if (faults.zero_area && !has_zero_area(a, b, c)) {
+      faults.zero_area = false;
+    }
+  }
+  return faults;
+}
+
 }  // namespace
 
 bool has_zero_area(Vec3f a, Vec3f b, Vec3f c) noexcept {
@@ -56,25 +81,34 @@ void sanitise(Scene& scene, const std::string& source) {
   report.triangles_read += mesh.triangles.size();
   const bool has_materials = mesh.materials.size() == mesh.triangles.size();
   if (!has_materials) mesh.materials.clear();
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const auto [a, b, c] = mesh.corners(i);
-    if (!is_finite(a) || !is_finite(b) || !is_finite(c)) {
+  std::vector<bool> stays(mesh.size());
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const Faults faults = faults_of(mesh, i);
+    stays[i] = !faults.any();
+    if (faults.non_finite) {
       ++report.non_finite;
-    } else if (!is_in_range(a) || !is_in_range(b) || !is_in_range(c)) {
+    } else if (faults.out_of_range) {
       ++report.out_of_range;
-    } else if (has_zero_area(a, b, c)) {
+    } else if (faults.zero_area) {
       ++report.degenerate;
-    } else {
-      mesh.triangles[kept] = mesh.triangles[i];
-      if (has_materials) mesh.materials[kept] = mesh.materials[i];
-      ++kept;
     }
+  }
+  if (mesh.instancing && std::ranges::find(stays, false) != stays.end()) mesh.instancing = kept_instances(mesh, stays);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    if (!stays[i]) continue;
+    mesh.triangles[kept] = mesh.triangles[i];
+    if (has_materials) mesh.materials[kept] = mesh.materials[i];
+    ++kept;
   }
   mesh.triangles.resize(kept);
   if (has_materials) mesh.materials.resize(kept);
-  for (Vec3f& v : mesh.vertices)
-    if (!is_finite(v) || !is_in_range(v)) v = Vec3f{};
+  const auto mend = [](std::vector<Vec3f>& vertices) {
+    for (Vec3f& v : vertices)
+      if (!is_finite(v) || !is_in_range(v)) v = Vec3f{};
+  };
+  mend(mesh.vertices);
+  for (std::vector<Vec3f>& frame : mesh.later_frames) mend(frame);
   if (kept == 0) {
     throw UserError(fmt::format(
         "{}: no triangle left: of {} read, {} are not finite, {} out of range, {} of zero area", source,

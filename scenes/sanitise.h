@@ -10,7 +10,7 @@ namespace arboretum {
 [[nodiscard]] bool has_zero_area(Vec3f a, Vec3f b, Vec3f c) noexcept;
 
 /// Drops triangles with a corner that is not finite or beyond kMaxCoordinate and those of exactly zero area,
-/// keeps the order of the others, and counts into `scene.report`. A scene without materials gets one grey.
+/// in any key frame (zero area: in all), keeps the order of the others and the instances in step, and counts into `scene.report`. A scene without materials gets one grey.
 /// Vertices stay, since indices refer to them; unusable ones are set to the origin. Throws UserError, led by
 /// `source`, when no triangle is left.
 void sanitise(Scene& scene, const std::string& source);

@@ -56,7 +56,7 @@ struct LoadReport {
   std::vector<std::string> warnings;  ///< one line each
 };
 
-/// When the shutter is open; equal times: no motion blur.
+/// When the shutter is open, in the time of the key frames ([0, 1]); equal times: no motion blur.
 struct Shutter {
   float open = 0.0f, close = 0.0f;
 };
@@ -69,8 +69,8 @@ struct Scene {
   Vec3f environment{0, 0, 0};
   std::optional<Camera> camera;
   Shutter shutter;
-  unsigned key_frames = 1;    ///< most key frames of one mesh in the scene file; `mesh` holds the first
-  std::size_t instances = 0;  ///< transforms that the scene file names; they are baked into `mesh`
+  unsigned key_frames = 1;    ///< most key frames of one mesh in the scene file
+  std::size_t instances = 0;  ///< transforms that the scene file names; laid out in `mesh`, kept in its `instancing`
   LoadReport report;
 };
 
@@ -90,6 +90,9 @@ struct SceneSpec {
 /// Loads or generates. Throws UserError with one clear line for a missing, empty or broken file, an unknown
 /// name, or a scene with no triangle left.
 [[nodiscard]] Scene load_scene(const SceneSpec& spec);
+/// Whether the scene moves, without loading models: it has key frames, and its shutter opens. Throws UserError for a scene
+/// file that cannot be read as YAML.
+[[nodiscard]] bool scene_moves(const SceneSpec& spec);
 /// A command-line word: a catalogue name, a path to a model or scene YAML, or `generator:triangles[:seed]`.
 [[nodiscard]] SceneSpec parse_scene_word(const std::string& word);
 

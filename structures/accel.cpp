@@ -19,9 +19,26 @@ std::span<const StructureEntry> all_structures() {
       if (std::ranges::count(list, e.info.name, [](const StructureEntry& o) { return o.info.name; }) > 1)
         throw UserError("two structures are called " + std::string(e.info.name) + "; give one another kName");
     }
+    // What stands above others takes the builders of all that can stand below it.
+    for (StructureEntry& above : list) {
+      if (!above.info.takes_below) continue;
+      for (const StructureEntry& below : list) {
+        if (!why_not_below(below.info).empty()) continue;
+        for (std::string_view builder : below.info.builders) {
+          if (std::ranges::find(above.info.builders, builder) == above.info.builders.end()) above.info.builders.push_back(builder);
+        }
+      }
+    }
     return list;
   }();
   return entries;
+}
+
+std::string why_not_below(const StructureInfo& below) {
+  if (below.takes_below) return std::string(below.name) + " stands above other structures, not below one";
+  if (below.build_depends_on_isa) return std::string(below.name) + " is a library with a scene of its own, and cannot stand below";
+  if (below.needs_motion) return std::string(below.name) + " is for moving scenes, and instances are held at one moment";
+  return {};
 }
 
 const StructureEntry* find_structure(std::string_view name) {
@@ -32,8 +49,11 @@ const StructureEntry* find_structure(std::string_view name) {
 
 void require_finite(const TriangleMesh& mesh) {
   for (std::size_t i = 0; i < mesh.size(); ++i) {
-    for (const Vec3f& p : mesh.corners(i)) {
-      if (!is_finite(p)) throw UserError("triangle " + std::to_string(i) + " has a vertex that is not finite; drop such triangles first, as load_scene() does");
+    const Triangle& t = mesh.triangles[i];
+    for (std::size_t k = 0; k < mesh.frames(); ++k) {
+      const std::vector<Vec3f>& frame = mesh.frame(k);
+      if (is_finite(frame[t.a]) && is_finite(frame[t.b]) && is_finite(frame[t.c])) continue;
+      throw UserError("triangle " + std::to_string(i) + " has a vertex that is not finite; drop such triangles first, as load_scene() does");
     }
   }
 }
@@ -55,6 +75,10 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   check("builder", settings.builder, entry->info.builders);
   check("leaf", settings.leaf, entry->info.leaves);
 
+  if (mesh.moves() && !entry->info.holds_motion) {
+    throw UserError(std::string(name) + " holds one moment, and the mesh has " + std::to_string(mesh.frames()) +
+                    " key frames: take bvh4_motion, or pose(mesh, time)");
+  }
   require_finite(mesh);
 
   std::unique_ptr<Accel> accel = entry->create();

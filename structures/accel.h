@@ -36,6 +36,7 @@ struct BuilderParameters {
   float empty_bonus = 0.2f;       ///< kdtree: share of the cost taken off a split that cuts away empty space, 0 .. 0.95
   unsigned max_depth = 0;         ///< kdtree, octree: deepest leaf; 0: 8 + 1.3 log2 n for the kdtree, 21 for the octree
   float grid_density = 4.0f;      ///< grid: cells a triangle, 0.01 .. 64
+  std::string below = "bvh8";     ///< two_level: the structure of each prototype
   std::string collapse = "optimal"; ///< binary to N-wide: `greedy` (largest area first) or `optimal` (dynamic programming)
   friend bool operator==(const BuilderParameters&, const BuilderParameters&) = default;
 };
@@ -89,6 +90,9 @@ struct StructureInfo {
   std::vector<std::string_view> leaves;
   bool build_depends_on_isa = false;        ///< built anew for each ISA (embree: the device is set to it)
   bool build_depends_on_threads = false;    ///< built anew for each thread count
+  bool holds_motion = false;                ///< takes a mesh with key frames and rays with times; the others hold one moment
+  bool needs_motion = false;                ///< measured only where the scene moves
+  bool takes_below = false;                 ///< stands above structures of another kind: BuilderParameters::below
   bool uses_parameters = true;              ///< false where the builders read none of BuilderParameters: sweeping them makes no new cells
 };
 
@@ -97,7 +101,8 @@ class Accel {
   virtual ~Accel() = default;
   [[nodiscard]] virtual const StructureInfo& info() const noexcept = 0;
   /// Builds from `mesh`, replacing what was there. The mesh must outlive the structure.
-  /// Throws UserError when a setting is not one that info() names, or when the mesh is too large for the structure.
+  /// Throws UserError when a setting is not one that info() names, or when the mesh is too large for the structure. Only a
+  /// structure with info().holds_motion looks at key frames; build_structure() hands a moving mesh to no other.
   virtual void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) = 0;
   /// Fits the structure, as it was built, to the same triangles with moved vertices, for a moving mesh: quicker than a build, and
   /// the further they moved the worse to trace. The mesh, which takes the place of the one built from, must outlive the structure.
@@ -120,12 +125,15 @@ struct StructureEntry {
   std::unique_ptr<Accel> (*create)();
 };
 
+/// Why a structure cannot stand below another one (BuilderParameters::below); empty where it can.
+[[nodiscard]] std::string why_not_below(const StructureInfo& below);
 /// Every structure of this executable: those of structures/all.h in their order, then its own.
 [[nodiscard]] std::span<const StructureEntry> all_structures();
 /// nullptr where there is none of that name.
 [[nodiscard]] const StructureEntry* find_structure(std::string_view name);
 /// Creates and builds, filling in the report's seconds and peak. Throws UserError for a name or setting that is not one of
-/// the structure's, and for a triangle with a vertex that is not finite (looked for before the clock starts).
+/// the structure's, for a triangle with a vertex that is not finite (looked for before the clock starts), and for a mesh
+/// that moves where the structure holds one moment.
 [[nodiscard]] std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh,
                                                      const BuildSettings& settings, BuildReport& report);
 

@@ -7,5 +7,7 @@
 
 #include "structures/brute_force/brute_force.h"
 #include "structures/bvh/bvh.h"
+#include "structures/bvh4_motion/bvh4_motion.h"
 #include "structures/embree/embree.h"
 #include "structures/kdtree/kdtree.h"
+#include "structures/two_level/two_level.h"

@@ -22,13 +22,21 @@ namespace arboretum {
 class Archive {
  public:
   /// Saves to `out`, whose errors the caller looks at.
-  Archive(std::ostream& out, const TriangleMesh& mesh) : out_(&out), mesh_(mesh) {}
+  Archive(std::ostream& out, const TriangleMesh& mesh) : out_(&out), mesh_(&mesh) {}
   /// Loads from `bytes`, which were checked to be as they were saved.
-  Archive(std::span<const std::byte> bytes, const TriangleMesh& mesh) : rest_(bytes), mesh_(mesh) {}
+  Archive(std::span<const std::byte> bytes, const TriangleMesh& mesh) : rest_(bytes), mesh_(&mesh) {}
 
   [[nodiscard]] bool is_loading() const noexcept { return out_ == nullptr; }
   /// The mesh that the structure is of, for what points into it: `vertices_ = archive.mesh().vertices.data()`.
-  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return mesh_; }
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
+  /// Calls part(*this) while mesh() is another one: for what is built over a part of the mesh.
+  template <class Part>
+  void of_mesh(const TriangleMesh& mesh, Part&& part) {
+    const TriangleMesh* whole = mesh_;
+    mesh_ = &mesh;
+    part(*this);
+    mesh_ = whole;
+  }
 
   template <class... Values>
   void operator()(Values&... values) {
@@ -63,7 +71,7 @@ class Archive {
 
   std::ostream* out_ = nullptr;
   std::span<const std::byte> rest_;
-  const TriangleMesh& mesh_;
+  const TriangleMesh* mesh_;
 };
 
 }  // namespace arboretum

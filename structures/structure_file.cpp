@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/instances.h"
 #include "structures/archive.h"
 
 namespace arboretum {
@@ -83,11 +84,11 @@ StructureFileHeader header_of(const TriangleMesh& mesh) {
 template <class F>
 void for_each_parameter(const BuilderParameters& parameters, F&& f) {
   const auto& [bins, traversal_cost, intersection_cost, max_leaf_blocks, morton_bits, ploc_radius, duplication_budget, spatial_overlap,
-               spatial_gain, reinsertion_rounds, empty_bonus, max_depth, grid_density, collapse] = parameters;
+               spatial_gain, reinsertion_rounds, empty_bonus, max_depth, grid_density, below, collapse] = parameters;
   f("bins", bins), f("traversal_cost", traversal_cost), f("intersection_cost", intersection_cost), f("max_leaf_blocks", max_leaf_blocks);
   f("morton_bits", morton_bits), f("ploc_radius", ploc_radius), f("duplication_budget", duplication_budget);
   f("spatial_overlap", spatial_overlap), f("spatial_gain", spatial_gain), f("reinsertion_rounds", reinsertion_rounds);
-  f("empty_bonus", empty_bonus), f("max_depth", max_depth), f("grid_density", grid_density), f("collapse", collapse);
+  f("empty_bonus", empty_bonus), f("max_depth", max_depth), f("grid_density", grid_density), f("below", below), f("collapse", collapse);
 }
 
 /// What of the settings' parameters the structure depends on.
@@ -157,8 +158,13 @@ std::string text_of(const BuilderParameters& parameters) {
 }
 
 std::uint64_t hash_of(const TriangleMesh& mesh) {
-  const std::uint64_t parts[] = {mesh.vertices.size(), mesh.triangles.size(), crc_of_pieces(std::as_bytes(std::span(mesh.vertices))),
-                                 crc_of_pieces(std::as_bytes(std::span(mesh.triangles)))};
+  std::vector<std::uint64_t> parts{mesh.vertices.size(), mesh.triangles.size(), crc_of_pieces(std::as_bytes(std::span(mesh.vertices))),
+                                   crc_of_pieces(std::as_bytes(std::span(mesh.triangles)))};
+  for (const std::vector<Vec3f>& frame : mesh.later_frames) parts.push_back(crc_of_pieces(std::as_bytes(std::span(frame))));
+  if (mesh.instancing) {
+    parts.push_back(crc_of_pieces(std::as_bytes(std::span(mesh.instancing->instances))));
+    for (const TriangleMesh& prototype : mesh.instancing->prototypes) parts.push_back(hash_of(prototype));
+  }
   return crc_of_pieces(std::as_bytes(std::span(parts)));
 }
 

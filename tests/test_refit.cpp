@@ -29,7 +29,7 @@ TriangleMesh deformed(TriangleMesh mesh) {
   return mesh;
 }
 
-bool can_refit(std::string_view structure) { return structure.starts_with("bvh") && structure != "bvh4_aos"; }
+bool can_refit(std::string_view structure) { return structure.starts_with("bvh") && structure != "bvh4_aos" && structure != "bvh4_motion"; }
 
 }  // namespace
 

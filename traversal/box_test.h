@@ -95,7 +95,12 @@ struct BoxLanes {
 
   /// Entry distances (at least tnear) and, as bits, the children whose interval within [tnear, tfar] is not empty.
   ARBORETUM_INLINE unsigned test(const std::byte* node, F tnear, F tfar, F& entry) const {
-    const auto planes = [node](unsigned offset) { return F::load(node + offset); };
+    return test_planes([node](unsigned offset) { return F::load(node + offset); }, tnear, tfar, entry);
+  }
+
+  /// The same for planes that are made from the node: `planes(offset)` gives those that lie `offset` bytes behind its begin.
+  template <class Planes>
+  ARBORETUM_INLINE unsigned test_planes(const Planes& planes, F tnear, F tfar, F& entry) const {
     F nx, ny, nz, lx, ly, lz;
     if constexpr (kHasFma) {
       nx = msub(planes(near_x), rx, fx), ny = msub(planes(near_y), ry, fy), nz = msub(planes(near_z), rz, fz);

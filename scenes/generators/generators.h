@@ -17,6 +17,7 @@ struct GeneratorInfo {
   std::string_view summary;  ///< one line for `list`
   std::string_view rule;     ///< which triangle counts it can make
   bool takes_seed = false;   ///< whether the seed changes anything
+  bool moves = false;        ///< whether it has key frames
 };
 
 [[nodiscard]] std::span<const GeneratorInfo> generators();
@@ -38,5 +39,7 @@ inline constexpr std::size_t kMaxGeneratedTriangles = 500'000'000;
 [[nodiscard]] Scene generate_city(std::size_t triangles, std::uint64_t seed);
 [[nodiscard]] Scene generate_teapot_in_stadium(std::size_t triangles, std::uint64_t seed);
 [[nodiscard]] Scene generate_cornell_box(std::size_t triangles, std::uint64_t seed);
+[[nodiscard]] Scene generate_forest(std::size_t triangles, std::uint64_t seed);
+[[nodiscard]] Scene generate_waving_cloth(std::size_t triangles, std::uint64_t seed);
 
 }  // namespace arboretum

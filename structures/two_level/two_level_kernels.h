@@ -1,0 +1,219 @@
+// One ray through two levels: the top's boxes in world space, then for each instance the ray in object space, by the kernel of
+// the structure below: one indirect call an instance. The direction is mapped without being normalised, so t keeps its meaning.
+//
+// Object space rounds: the mapped ray is off by 2^-24 of its own numbers. Three things come of it.
+// - The top's boxes are padded for it. A hit's point p lies on the object-space triangle; in world space it is off the exact
+//   ray by |L| |eta + t zeta|, where eta and zeta are the roundings of origin and direction: at most u (2|o'| + |p'|) for u = 2^-24, and
+//   so u k (2|o| + |p| + 3|T|) with k = || |L||L^-1| || and T the translation. The pad of box_test.h for a largest coordinate of
+//   reach + k (|o| + reach), reach = M + 2|T|, is more than its own need and this together (8 u of it against 4 u of M + |o|, and
+//   3 u at most of k (...)).
+// - t, u and v of the winner are computed again from the flat mesh's vertices with the same test, so that they are those of a
+//   structure over the flat mesh, bit for bit, wherever both find the same triangle. Where the test misses the flat triangle
+//   (the ray meets its edge) t is that of its plane, in double.
+// - A t close to an end of the interval may lie on the other side of it in world space, as on the surface that a secondary ray starts
+//   from. There the t in world space decides, and the search goes on behind a hit that is refused.
+#pragma once
+
+#include "intersectors/moller_trumbore.h"
+#include "intersectors/pluecker.h"
+#include "intersectors/watertight.h"
+#include "structures/bvh/walk_single.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// The kernels of the structure below that a row stands for.
+[[nodiscard]] inline const KernelRow& row_below(const two_level::TwoLevel& accel, std::string_view intersector, bool padded) {
+  const KernelRow* row = find_kernel(accel.below(), accel.leaf(), intersector, padded ? "padded" : "fast", "single", kIsa);
+  if (!row) {
+    throw UserError("two_level over " + accel.below() + ": " +
+                    why_no_kernel(accel.below(), accel.leaf(), intersector, padded ? "padded" : "fast", "single", kIsa));
+  }
+  return *row;
+}
+
+template <class Intersector, class Counting>
+class InstanceTracer {
+ public:
+  InstanceTracer(const two_level::TwoLevel& accel, const KernelRow& row, Counters* counters)
+      : accel_(accel), row_(row), counters_(counters), stack_(accel.top().stack_entries()) {}
+
+  template <bool AnyHit>
+  Hit trace(const Ray& ray) {
+    Hit best;
+    if (!is_valid_in_lanes(ray)) return best;
+    float nearest = ray.tfar;
+    const float origin = largest(ray.origin), k = accel_.magnification();
+    const BoxLanes<4, true> box(BoxRay<4, true>(ray, accel_.reach() + k * (origin + accel_.reach())));
+    const bvh::Bvh4& top = accel_.top();
+    const auto count = [&](const std::byte* node, unsigned hit) {
+      if constexpr (Counting::kCounting) count_top(node, hit);
+    };
+    const auto leaf = [&](bvh::NodeReference reference) {
+      const auto& block = *reinterpret_cast<const IndexBlock<1>*>(top.base() + bvh::offset_of(reference));
+      return visit<AnyHit>(ray, accel_.placed()[block.id[0]], nearest, best);
+    };
+    walk_bvh<4, 6 * 4 * sizeof(float)>(top.base(), top.root(), box, ray.tnear, nearest, stack_.data(), leaf, count);
+    return best;
+  }
+
+ private:
+  /// Returns true when the search is over. `nearest` may stay above best.t, so that an equal hit of a lower id is not lost.
+  template <bool AnyHit>
+  bool visit(const Ray& ray, const two_level::Placed& instance, float& nearest, Hit& best) {
+    if (instance.identity) {
+      Ray clipped = ray;
+      clipped.tfar = nearest;
+      if constexpr (AnyHit) {
+        if (any_below(instance, clipped)) best.primitive = instance.first_primitive;
+        return best.is_hit();
+      }
+      Hit hit = closest_below(instance, clipped);
+      if (hit.is_hit()) {
+        hit.primitive += instance.first_primitive;
+        offer(hit, hit.t, nearest, best);
+      }
+      return false;
+    }
+    Ray mapped;
+    mapped.origin = transform_point(instance.to_object, ray.origin);
+    mapped.direction = transform_direction(instance.to_object, ray.direction);
+    const float slack = 0x1p-20f * (largest(mapped.origin) + instance.max_coordinate) / largest(mapped.direction);
+    const float doubt = 0x1p10f * slack;  // within it of an end of the interval, world space decides
+    const float last = best.is_hit() ? nearest : ray.tfar + slack;
+    mapped.tnear = ray.tnear > slack ? ray.tnear - slack : 0.0f;
+    if constexpr (AnyHit) {
+      mapped.tnear = ray.tnear + doubt, mapped.tfar = ray.tfar - doubt;
+      if (mapped.tnear <= mapped.tfar && any_below(instance, mapped)) {
+        best.primitive = instance.first_primitive;
+        return true;
+      }
+      mapped.tnear = ray.tnear > slack ? ray.tnear - slack : 0.0f;
+      mapped.tfar = ray.tnear + doubt < last ? ray.tnear + doubt : last;
+      if (first_accepted(ray, instance, mapped, doubt, nearest, best)) return true;
+      if (!(ray.tfar < std::numeric_limits<float>::infinity())) return false;
+      mapped.tnear = mapped.tfar > ray.tfar - doubt ? mapped.tfar : ray.tfar - doubt, mapped.tfar = last;
+      return first_accepted(ray, instance, mapped, doubt, nearest, best);
+    }
+    mapped.tfar = last;
+    first_accepted(ray, instance, mapped, doubt, nearest, best);
+    return false;
+  }
+
+  /// The first hit of the mapped ray that holds in world space.
+  bool first_accepted(const Ray& ray, const two_level::Placed& instance, Ray& mapped, float doubt, float& nearest, Hit& best) {
+    while (mapped.tnear <= mapped.tfar) {
+      const Hit object = closest_below(instance, mapped);
+      if (!object.is_hit()) return false;
+      Hit world = in_world(ray, object, object.primitive + instance.first_primitive);
+      const bool holds = world.t >= ray.tnear && world.t <= ray.tfar;
+      if (holds || (object.t >= ray.tnear + doubt && object.t <= ray.tfar - doubt)) {
+        if (!holds) world.t = object.t;
+        offer(world, object.t, nearest, best);
+        return true;
+      }
+      mapped.tnear = std::nextafter(object.t, std::numeric_limits<float>::infinity());
+    }
+    return false;
+  }
+
+  static void offer(const Hit& hit, float object_t, float& nearest, Hit& best) {
+    if (!(hit.t < best.t || (hit.t == best.t && hit.primitive < best.primitive))) return;
+    best = hit;
+    nearest = object_t > hit.t ? object_t : hit.t;
+  }
+
+  /// The hit as the flat mesh's triangle has it.
+  Hit in_world(const Ray& ray, const Hit& object, std::uint32_t primitive) const {
+    VertexBlock<1> block;
+    const std::array<Vec3f, 3> corner = accel_.mesh().corners(primitive);
+    block.set(0, corner, primitive);
+    const typename Intersector::RayData data(ray);
+    TriangleHits<1> hits;
+    if (any(Intersector::intersect(data, block, hits)))
+      return {hits.t.v, hits.u_numerator.v / hits.denominator.v, hits.v_numerator.v / hits.denominator.v, primitive};
+    double a[3], e1[3], e2[3], d[3];
+    for (unsigned i = 0; i < 3; ++i) {
+      const double v0 = corner[0][i];
+      a[i] = v0 - ray.origin[i], e1[i] = corner[1][i] - v0, e2[i] = corner[2][i] - v0, d[i] = ray.direction[i];
+    }
+    const double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
+    const double along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
+    const auto t = float((n[0] * a[0] + n[1] * a[1] + n[2] * a[2]) / along);
+    return {__builtin_isfinite(t) ? t : object.t, object.u, object.v, primitive};
+  }
+
+  Hit closest_below(const two_level::Placed& instance, const Ray& ray) {
+    Hit hit;
+    (Counting::kCounting ? row_.count_closest_hit : row_.closest_hit)(*instance.below, RayBatch(&ray, 1), {&hit, 1}, counters_);
+    return hit;
+  }
+  bool any_below(const two_level::Placed& instance, const Ray& ray) {
+    std::uint8_t occluded = 0;
+    (Counting::kCounting ? row_.count_any_hit : row_.any_hit)(*instance.below, RayBatch(&ray, 1), {&occluded, 1}, counters_);
+    return occluded != 0;
+  }
+
+  static float largest(Vec3f v) {
+    const float x = __builtin_fabsf(v.x), y = __builtin_fabsf(v.y), z = __builtin_fabsf(v.z);
+    const float xy = x > y ? x : y;
+    return xy > z ? xy : z;
+  }
+
+  void count_top(const std::byte* node, unsigned hit) {
+    const auto* lower = reinterpret_cast<const float*>(node);
+    unsigned children = 0;
+    for (int i = 0; i < 4; ++i) children += lower[i] <= lower[4 + i];
+    ++counters_->nodes;
+    counters_->boxes += children, counters_->lanes_active += children;
+    counters_->boxes_hit += unsigned(__builtin_popcount(hit));
+    counters_->lanes += 4;
+  }
+
+  const two_level::TwoLevel& accel_;
+  const KernelRow& row_;
+  Counters* counters_;
+  TraversalStack stack_;
+};
+
+template <class Intersector, class Counting>
+void two_level_closest_hit(const Accel& structure, bool padded, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+  const auto& accel = static_cast<const two_level::TwoLevel&>(structure);
+  const std::uint64_t traced = counters ? counters->rays : 0;
+  InstanceTracer<Intersector, Counting> tracer(accel, row_below(accel, Intersector::kName, padded), counters);
+  for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = tracer.template trace<false>(rays[i]);
+  if constexpr (Counting::kCounting) counters->rays = traced + rays.size();
+}
+
+template <class Intersector, class Counting>
+void two_level_any_hit(const Accel& structure, bool padded, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+  const auto& accel = static_cast<const two_level::TwoLevel&>(structure);
+  const std::uint64_t traced = counters ? counters->rays : 0;
+  InstanceTracer<Intersector, Counting> tracer(accel, row_below(accel, Intersector::kName, padded), counters);
+  for (std::size_t i = 0; i < rays.size(); ++i) occluded[i] = tracer.template trace<true>(rays[i]).is_hit();
+  if constexpr (Counting::kCounting) counters->rays = traced + rays.size();
+}
+
+/// One set of functions for all leaves: the structure below knows its own.
+template <class Intersector, bool Padded>
+struct TwoLevelRow {
+  static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { two_level_closest_hit<Intersector, NoCounters>(a, Padded, r, h, c); }
+  static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { two_level_any_hit<Intersector, NoCounters>(a, Padded, r, h, c); }
+  static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { two_level_closest_hit<Intersector, WithCounters>(a, Padded, r, h, c); }
+  static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { two_level_any_hit<Intersector, WithCounters>(a, Padded, r, h, c); }
+};
+template <class Block, class Intersector, bool Padded>
+struct TwoLevelMaker : TwoLevelRow<Intersector, Padded> {};
+
+/// The rows that some structure has; which of them the chosen one below has is asked when a cell is planned.
+inline void add_kernels(std::type_identity<two_level::TwoLevel>, KernelRows& rows) {
+  constexpr std::string_view name = two_level::TwoLevel::kName;
+  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, BlocksOfWidth<EdgeBlock, kRegisterWidth>{}, TypeList<MollerTrumbore>{});
+  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, BlocksOfWidth<VertexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
+  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
+  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, BlocksOfWidth<IndexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
+  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, TypeList<IndexBlock<4>>{}, TypeList<MollerTrumbore>{});
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,212 @@
+// two_level: what stands below answers bit for bit while nothing is transformed; with transforms the answers are those of the flat
+// mesh; prototypes are held once; what cannot stand below is refused in one line.
+#include <cmath>
+
+#include "core/instances.h"
+#include "oracle/oracle.h"
+#include "rendering/workload.h"
+#include "scenes/layout.h"
+#include "structures/statistics.h"
+#include "tests/catch.h"
+#include "tests/kernel_runner.h"
+#include "tests/kernel_scenes.h"
+#include "tests/scene_files.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+namespace {
+
+std::unique_ptr<Accel> built(std::string_view name, const TriangleMesh& mesh, std::string_view leaf, const std::string& below = "bvh8",
+                             std::string builder = {}) {
+  BuildSettings settings;
+  settings.leaf = leaf, settings.isa = best_isa(), settings.parameters.below = below;
+  settings.builder = builder.empty() ? std::string(find_structure(name)->info.builders.front()) : builder;
+  BuildReport report;
+  return build_structure(name, mesh, settings, report);
+}
+
+/// Rows of two_level whose structure below has the same kernel.
+std::vector<KernelRow> rows_over(std::string_view below) {
+  std::vector<KernelRow> rows;
+  for (const KernelRow& row : runnable_rows())
+    if (row.structure == "two_level" && find_kernel(below, row.leaf, row.intersector, row.box, row.traversal, row.isa)) rows.push_back(row);
+  return rows;
+}
+
+AffineMap map_of(double angle, double scale, Vec3f move) {
+  const double c = scale * std::cos(angle), s = scale * std::sin(angle);
+  return {{{c, -s, 0, move.x}, {s, c, 0, move.y}, {0, 0, scale, move.z}}};
+}
+
+/// Spheres and soups at many places, some touching, all turned, one mirrored and squashed.
+TriangleMesh placed_meshes() {
+  Layout layout;
+  const std::uint32_t ball = layout.add_part(sphere(8)), soup = layout.add_part(random_triangles(60, 0.4f, 3));
+  for (int i = 0; i < 12; ++i) {
+    layout.place(i % 3 ? ball : soup, map_of(0.7 * i, 0.3 + 0.1 * i, {float(i % 4) * 1.7f, float(i / 4) * 1.9f, 0.2f * float(i)}), 0);
+  }
+  AffineMap squashed = map_of(0.3, 1.0, {-2, 1, 0.5f});
+  for (double& x : squashed.m[1]) x *= -0.25;
+  layout.place(ball, squashed, 0);
+  layout.place(soup, AffineMap{}, 0);
+  return layout.take(true);
+}
+
+}  // namespace
+
+TEST_CASE("a scene without instances is answered by the structure below, bit for bit") {
+  const TriangleMesh mesh = random_triangles(700, 0.2f, 11);
+  std::vector<Ray> rays = generic_rays(mesh, 300, 5);
+  for (const Ray& ray : invalid_rays()) rays.push_back(ray);
+  for (const StructureEntry& entry : all_structures()) {
+    if (!why_not_below(entry.info).empty()) continue;
+    const std::string below(entry.info.name);
+    for (const KernelRow& row : rows_over(below)) {
+      INFO(name_of(row) << " over " << below);
+      const std::string builder(entry.info.builders.front());
+      const auto two = built("two_level", mesh, row.leaf, below, builder), one = built(below, mesh, row.leaf, below, builder);
+      const KernelRow& direct = *find_kernel(below, row.leaf, row.intersector, row.box, row.traversal, row.isa);
+      CHECK(same_bits(closest_hit(row, *two, rays), closest_hit(direct, *one, rays)));
+      CHECK(any_hit(row, *two, rays) == any_hit(direct, *one, rays));
+    }
+  }
+}
+
+TEST_CASE("with transforms the answers are those of the flat mesh") {
+  const TriangleMesh mesh = placed_meshes();
+  REQUIRE(mesh.instancing);
+  CHECK(mesh.instancing->prototypes.size() == 2);
+  CHECK(mesh.instancing->instances.size() == 14);
+  const std::vector<Ray> rays = generic_rays(mesh, 4000, 6);
+  const Oracle oracle(mesh);
+  const auto truth = oracle.closest_hit(rays);
+  const auto any_truth = oracle.any_hit(rays);
+  for (const KernelRow& row : rows_over("bvh8")) {
+    INFO(name_of(row));
+    const auto two = built("two_level", mesh, row.leaf), flat = built("bvh8", mesh, row.leaf);
+    const std::vector<Hit> hits = closest_hit(row, *two, rays);
+    const std::vector<std::uint8_t> occluded = any_hit(row, *two, rays);
+    const AnswerCheck check = oracle.check_closest_hit(rays, truth, hits);
+    CAPTURE(check.missed_hits, check.false_hits, check.wrong_surface);
+    CHECK(check.wrong_answers() == 0);
+    CHECK(oracle.check_any_hit(rays, any_truth, occluded).wrong_answers() == 0);
+    // Where both find the same triangle t, u and v are the same bits.
+    const std::vector<Hit> want = closest_hit(*find_kernel("bvh8", row.leaf, row.intersector, row.box, "single", row.isa), *flat, rays);
+    std::size_t same = 0, hit = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      REQUIRE(occluded[i] == std::uint8_t(hits[i].is_hit()));
+      hit += want[i].is_hit();
+      if (!want[i].is_hit() || hits[i].primitive != want[i].primitive) continue;
+      ++same;
+      REQUIRE(same_bits({&hits[i], 1}, {&want[i], 1}));
+    }
+    CHECK(hit > 500);
+    CHECK(same >= hit - 4);
+  }
+}
+
+TEST_CASE("a forest: no wrong answer in any workload, and prototypes held once") {
+  const Scene scene = load_scene(parse_scene_word("forest:60000"));
+  REQUIRE(scene.mesh.instancing);
+  CHECK(scene.mesh.instancing->instances.size() > 900);
+  const Oracle oracle(scene.mesh);
+  const View view{64, 64, 1};
+  const Workload primary = make_primary(scene, view);
+  std::vector<Hit> primary_hits;
+  for (const ExactHit& h : oracle.closest_hit(primary.batch())) primary_hits.push_back(h.hit);
+  for (std::string_view name : workload_names()) {
+    const Workload workload = make_workload(name, scene, view, primary.batch(), primary_hits);
+    const bool any = workload.query == Query::any_hit;
+    const auto any_truth = any ? oracle.any_hit(workload.rays) : std::vector<std::uint8_t>{};
+    const auto truth = any ? std::vector<ExactHit>{} : oracle.closest_hit(workload.rays);
+    for (const KernelRow& row : rows_over("bvh8")) {
+      if (row.intersector != "watertight" || row.box != "padded" || row.leaf != "triangle4v") continue;
+      const auto two = built("two_level", scene.mesh, row.leaf);
+      const AnswerCheck check = any ? oracle.check_any_hit(workload.rays, any_truth, any_hit(row, *two, workload.rays))
+                                    : oracle.check_closest_hit(workload.rays, truth, closest_hit(row, *two, workload.rays));
+      INFO(name << ": " << name_of(row));
+      CAPTURE(check.missed_hits, check.false_hits, check.wrong_surface, check.rays);
+      CHECK(check.wrong_answers() == 0);
+    }
+  }
+  const auto two = built("two_level", scene.mesh, "triangle4v"), flat = built("bvh8", scene.mesh, "triangle4v");
+  CHECK(two->bytes() * 10 < flat->bytes());
+  const StructureStatistics statistics = compute_statistics(*two, scene.mesh, {}, false);
+  CHECK(statistics.available);
+  CHECK(statistics.references == scene.mesh.size());
+}
+
+TEST_CASE("instances in one place: the lowest id wins, in whatever order they are visited") {
+  Layout layout;
+  const std::uint32_t ball = layout.add_part(sphere(6));
+  for (int i = 0; i < 5; ++i) layout.place(ball, map_of(0.4, 1.3, {1, 2, 3}), 0);
+  const TriangleMesh mesh = layout.take(true);
+  const std::vector<Ray> rays = generic_rays(mesh, 500, 9);
+  for (const KernelRow& row : rows_over("bvh8")) {
+    INFO(name_of(row));
+    const auto two = built("two_level", mesh, row.leaf);
+    for (const Hit& hit : closest_hit(row, *two, rays))
+      if (hit.is_hit()) REQUIRE(hit.primitive < mesh.size() / 5);
+  }
+}
+
+TEST_CASE("closed meshes stay closed under transforms") {
+  Layout layout;
+  const std::uint32_t ball = layout.add_part(sphere(24));
+  layout.place(ball, map_of(0.9, 3.0, {50, -20, 10}), 0);
+  const TriangleMesh mesh = layout.take(true);
+  const std::vector<Ray> rays = aimed_rays(mesh, {50.3f, -20.2f, 10.1f}, 4000, 5);
+  for (const KernelRow& row : rows_over("bvh8")) {
+    if (row.intersector != "watertight" || row.box != "padded") continue;
+    INFO(name_of(row));
+    const auto two = built("two_level", mesh, row.leaf);
+    std::size_t cracks = 0;
+    for (const Hit& hit : closest_hit(row, *two, rays)) cracks += !hit.is_hit();
+    for (const std::uint8_t occluded : any_hit(row, *two, rays)) cracks += !occluded;
+    CHECK(cracks == 0);
+  }
+}
+
+TEST_CASE("primitive ids agree with the flat mesh when layout flattens triangles of an instance") {
+  const Folder folder;
+  // The second triangle is so thin that it has no area left 1e6 away, where it is dropped; near the origin it stays.
+  folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 1e-3 0\nv 1 0 1e-3\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 6\n");
+  const Scene scene = load_file(folder.write("s.yaml",
+                                             "meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{translate: [0, 1e6, 0]}, {translate: [5, 0, 0]}, "
+                                             "{translate: [9, 1e6, 0]}, {scale: [1, 1, 1e-5]}]}]\n"));
+  REQUIRE(scene.mesh.instancing);
+  const Instancing& instancing = *scene.mesh.instancing;
+  CHECK(scene.report.degenerate == 2);
+  CHECK(scene.mesh.size() == 10);
+  REQUIRE(instancing.instances.size() == 4);
+  CHECK(instancing.instances[0].prototype == instancing.instances[2].prototype);
+  CHECK(instancing.instances[0].prototype != instancing.instances[1].prototype);
+  std::uint32_t next = 0;
+  for (const Instance& instance : instancing.instances) {
+    CHECK(instance.first_primitive == next);
+    const TriangleMesh& prototype = instancing.prototypes[instance.prototype];
+    for (std::size_t i = 0; i < prototype.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k)
+        CHECK(transform_point(instance.to_world, prototype.corners(i)[k]) == scene.mesh.corners(next + i)[k]);
+    }
+    next += std::uint32_t(prototype.size());
+  }
+  CHECK(next == scene.mesh.size());
+}
+
+TEST_CASE("what cannot stand below is refused in one line") {
+  const TriangleMesh mesh = random_triangles(20, 0.3f, 1);
+  const struct {
+    std::string below, builder, leaf, message;
+  } cases[] = {
+      {"two_level", "binned_sah", "triangle4", "two_level over two_level: two_level stands above other structures, not below one"},
+      {"bvh4_motion", "binned_sah", "triangle4i", "two_level over bvh4_motion: bvh4_motion is for moving scenes"},
+      {"bvh88", "binned_sah", "triangle4", "two_level: below: there is no structure 'bvh88'"},
+      {"brute_force", "binned_sah", "triangle4", "two_level over brute_force: brute_force has no builder binned_sah"},
+  };
+  for (const auto& c : cases) {
+    INFO(c.below);
+    CHECK_THAT(error_of([&] { (void)built("two_level", mesh, c.leaf, c.below, c.builder); }), Catch::Contains(c.message));
+  }
+}
