@@ -35,7 +35,7 @@ struct BuilderParameters {
   unsigned reinsertion_rounds = 4;  ///< builders that end in _reinsertion: passes over the tree, 1 .. 64
   float empty_bonus = 0.2f;       ///< kdtree: share of the cost taken off a split that cuts away empty space, 0 .. 0.95
   unsigned max_depth = 0;         ///< kdtree, octree: deepest leaf; 0: 8 + 1.3 log2 n for the kdtree, 21 for the octree
-  float grid_density = 4.0f;      ///< grid: cells a triangle, 0.01 .. 64
+  float grid_density = 0.25f;     ///< grid: cells a triangle, 0.01 .. 64
   std::string below = "bvh8";     ///< two_level: the structure of each prototype
   std::string collapse = "optimal"; ///< binary to N-wide: `greedy` (largest area first) or `optimal` (dynamic programming)
   friend bool operator==(const BuilderParameters&, const BuilderParameters&) = default;
@@ -63,6 +63,9 @@ struct NodeView {
   std::span<const Bounds3f> child_bounds;
   unsigned depth = 0;  ///< the root's is 0
   std::size_t bytes = 0;
+  /// Above 0: a grid of cells, of which a random ray through `bounds` crosses so many on average. Each costs a traversal step; the child boxes then
+  /// cost nothing of their own.
+  double steps = 0.0;
 };
 
 /// A leaf as a visitor sees it: `primitives` may name a primitive that other leaves name too.

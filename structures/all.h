@@ -5,9 +5,12 @@
 // (cmake/Structures.cmake): the structure is then built, listed, swept, tested and plotted (docs/add-a-structure.md).
 #pragma once
 
+#include "structures/bih/bih.h"
 #include "structures/brute_force/brute_force.h"
 #include "structures/bvh/bvh.h"
 #include "structures/bvh4_motion/bvh4_motion.h"
 #include "structures/embree/embree.h"
+#include "structures/grid/grid.h"
 #include "structures/kdtree/kdtree.h"
+#include "structures/octree/octree.h"
 #include "structures/two_level/two_level.h"

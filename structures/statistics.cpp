@@ -16,11 +16,13 @@ class Recorder final : public StructureVisitor {
   explicit Recorder(const BuilderParameters& costs) : costs_(costs) {}
 
   void node(const NodeView& node) override {
-    add(node.bounds, node.depth, costs_.traversal_cost, false);
+    const double visits = node.steps > 0 ? node.steps : 1.0;
+    add(node.bounds, node.depth, costs_.traversal_cost * visits, false);
     ++statistics.nodes;
     statistics.node_bytes += node.bytes;
     children_ += node.child_bounds.size();
-    child_cost_ += share(node.bounds) * costs_.traversal_cost * static_cast<double>(node.child_bounds.size());
+    const double looked_at = node.steps > 0 ? node.steps : static_cast<double>(node.child_bounds.size());
+    child_cost_ += share(node.bounds) * costs_.traversal_cost * looked_at;
   }
 
   void leaf(const LeafView& leaf) override {

@@ -1,0 +1,228 @@
+#include "structures/bih/bih.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/error.h"
+#include "core/timer.h"
+#include "structures/archive.h"
+#include "structures/builders/builders.h"
+#include "structures/builders/collapse.h"
+
+namespace arboretum::bih {
+namespace {
+
+/// Turns a binary tree with boxes into nodes with planes.
+class Converter {
+ public:
+  Converter(const BinaryTree& tree, const Collapse& collapse, const BuilderParameters& costs,
+            MeteredVector<Node>& nodes, LeafLists& lists)
+      : tree_(tree),
+        collapse_(collapse),
+        costs_(costs),
+        nodes_(nodes),
+        lists_(lists),
+        cost_(tree.node_count) {
+    price(0);
+    nodes_.resize(1);
+    place(0, 0, box_of(0), 0);
+    lists_.begin.push_back(std::uint32_t(lists_.ids.size()));
+  }
+  [[nodiscard]] std::size_t pairs_deep() const noexcept { return deepest_; }
+
+ private:
+  [[nodiscard]] Bounds3f box_of(std::uint32_t node) const {
+    return {tree_.nodes[node].lower, tree_.nodes[node].upper};
+  }
+
+  /// Expected cost below a node for a ray that meets its box.
+  float price(std::uint32_t node) {
+    if (collapse_.is_leaf(node))
+      return cost_[node] = costs_.intersection_cost * float(collapse_.blocks(node));
+    const std::uint32_t left = tree_.nodes[node].left;
+    const float whole = tree_.nodes[node].half_area();
+    float below = 0;
+    for (std::uint32_t child : {left, left + 1}) {
+      const float cost = price(child);
+      below += whole > 0 ? cost * tree_.nodes[child].half_area() / whole : cost;
+    }
+    return cost_[node] = costs_.traversal_cost + below;
+  }
+
+  /// Writes the subtree at `node` into `slot`. A ray comes there that has passed the planes above, which
+  /// leave `region`.
+  void place(std::uint32_t node, std::uint32_t slot, Bounds3f region, std::size_t pairs) {
+    const Bounds3f box = box_of(node);
+    for (unsigned clipped = 0;;) {  // bit k: axis k is done
+      int best = -1;
+      double best_cost = 0.999 * cost_[node];
+      for (int axis = 0; axis < 3; ++axis) {
+        const double area = region.area();
+        if ((clipped >> axis & 1) != 0 || !(area > 0)) continue;
+        const double cost = costs_.traversal_cost + clip(region, box, axis).area() / area * cost_[node];
+        if (cost < best_cost) best = axis, best_cost = cost;
+      }
+      if (best < 0) break;
+      clipped |= 1u << best;
+      region = clip(region, box, best);
+      const std::uint32_t child = take(1);
+      nodes_[slot] = {{box.lower[std::size_t(best)], box.upper[std::size_t(best)]},
+                      child << 3 | (Node::kClip + std::uint32_t(best))};
+      slot = child;
+    }
+    if (collapse_.is_leaf(node)) {
+      nodes_[slot] = {{std::bit_cast<float>(std::uint32_t(lists_.begin.size())), 0.0f},
+                      Node::kLeaf};  // the code comes later
+      lists_.begin.push_back(std::uint32_t(lists_.ids.size()));
+      const auto begin = tree_.primitives.begin() + tree_.begin_of(node);
+      lists_.ids.insert(lists_.ids.end(), begin, begin + tree_.nodes[node].count);
+      return;
+    }
+    std::uint32_t left = tree_.nodes[node].left, right = left + 1;
+    std::size_t axis = 0;
+    bool swapped = false;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (const bool swap : {false, true}) {
+        const Bounds3f l = below(region, box_of(swap ? right : left).upper[a], a),
+                       r = above(region, box_of(swap ? left : right).lower[a], a);
+        const double cost = l.area() * cost_[swap ? right : left] + r.area() * cost_[swap ? left : right];
+        if (cost < least) least = cost, axis = a, swapped = swap;
+      }
+    }
+    if (swapped) std::swap(left, right);
+    const float left_end = box_of(left).upper[axis], right_begin = box_of(right).lower[axis];
+    const std::uint32_t first = take(2);
+    nodes_[slot] = {{left_end, right_begin}, first << 3 | (Node::kPair + std::uint32_t(axis))};
+    deepest_ = std::max(deepest_, pairs + 1);
+    place(left, first, below(region, left_end, axis), pairs + 1);
+    place(right, first + 1, above(region, right_begin, axis), pairs + 1);
+  }
+
+  static Bounds3f below(Bounds3f region, float end, std::size_t axis) {
+    return region.upper[axis] = std::min(region.upper[axis], end), region;
+  }
+  static Bounds3f above(Bounds3f region, float begin, std::size_t axis) {
+    return region.lower[axis] = std::max(region.lower[axis], begin), region;
+  }
+  static Bounds3f clip(const Bounds3f& region, const Bounds3f& box, int axis) {
+    const auto a = std::size_t(axis);
+    return below(above(region, box.lower[a], a), box.upper[a], a);
+  }
+
+  std::uint32_t take(std::uint32_t count) {
+    const std::size_t first = nodes_.size();
+    if (first + count >= (std::size_t(1) << 29))
+      throw UserError("bih: more than 2^29 nodes: use wider leaf blocks or a smaller mesh");
+    nodes_.resize(first + count);
+    return std::uint32_t(first);
+  }
+
+  const BinaryTree& tree_;
+  const Collapse& collapse_;
+  const BuilderParameters& costs_;
+  MeteredVector<Node>& nodes_;
+  LeafLists& lists_;
+  MeteredVector<float> cost_;
+  std::size_t deepest_ = 0;
+};
+
+}  // namespace
+
+const StructureInfo& Bih::static_info() {
+  static const StructureInfo info = [] {
+    StructureInfo i;
+    i.name = kName;
+    i.summary = "bounding interval hierarchy: two planes a node, between kd-tree and BVH";
+    i.builders = binary_builder_names();
+    for_each_type(AllBlocks{},
+                  [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    return i;
+  }();
+  return info;
+}
+
+void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
+  const BuilderParameters& p = settings.parameters;
+  if (p.max_leaf_blocks < 1 || p.max_leaf_blocks > 8) {
+    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. 8");
+  }
+  if (p.bins < 4 || p.bins > 64)
+    throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
+  if (mesh.size() >= (1u << 30)) throw UserError("bih takes at most 2^30 - 1 triangles");
+  LeafLists lists;
+  nodes_.clear(), bounds_ = mesh.bounds(), stack_entries_ = 1, max_coordinate_ = 0.0f;
+  if (mesh.size() == 0) {  // an empty leaf, behind an empty box
+    nodes_.push_back({{0.0f, 0.0f}, Node::kLeaf});
+    lists.begin.assign(2, 0);
+  } else {
+    with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
+      BinaryTree tree;
+      build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
+      const double start = wall_seconds();
+      const Collapse collapse(tree, {2, unsigned(Block::kWidth), p.max_leaf_blocks, p.traversal_cost,
+                                     p.intersection_cost, true, 2 * sizeof(Node), sizeof(Block)});
+      stack_entries_ = Converter(tree, collapse, p, nodes_, lists).pairs_deep() + 1;
+      nodes_.shrink_to_fit();
+      report.phases.emplace_back("planes", wall_seconds() - start);
+    });
+    for (std::size_t a = 0; a < 3; ++a)
+      max_coordinate_ = std::max({max_coordinate_, std::fabs(bounds_.lower[a]), std::fabs(bounds_.upper[a])});
+  }
+  const double start = wall_seconds();
+  MeteredVector<LeafCode> codes(lists.size());
+  for (LeafCode& c : codes) c = kEmptyLeaf;
+  leaves_.fill(mesh, lists, settings.leaf, kName, false, codes.data());
+  for (Node& n : nodes_)
+    if (n.kind() == Node::kLeaf) n.clip[0] = std::bit_cast<float>(codes[n.code()]);
+  report.phases.emplace_back("leaves", wall_seconds() - start);
+}
+
+void Bih::archive(Archive& archive) {
+  archive.expect(sizeof(Node));
+  archive(nodes_, bounds_, max_coordinate_, stack_entries_);
+  leaves_.archive(archive);
+}
+
+bool Bih::visit(StructureVisitor& visitor) const {
+  if (bounds_.empty()) return true;
+  struct Entry {
+    std::uint32_t node;
+    Bounds3f region;
+    unsigned depth;
+  };
+  with_block(leaves_.leaf(), [&]<class Block>(std::type_identity<Block>) {
+    const auto* blocks = reinterpret_cast<const Block*>(leaves_.blocks());
+    std::vector<Entry> stack{{0, bounds_, 0}};
+    std::vector<std::uint32_t> primitives;
+    while (!stack.empty()) {
+      const Entry e = stack.back();
+      stack.pop_back();
+      const Node& node = nodes_[e.node];
+      if (node.kind() == Node::kLeaf) {
+        const LongLeaf range = leaves_.range(node.code());
+        primitives.clear();
+        append_primitives(blocks + range.first, range.blocks, primitives);
+        visitor.leaf({e.region, primitives, e.depth, range.blocks, unsigned(Block::kWidth),
+                      sizeof(Node) + range.blocks * sizeof(Block)});
+        continue;
+      }
+      const std::size_t axis = node.kind() & 3u;
+      const bool pair = node.kind() < Node::kClip;
+      Bounds3f regions[2] = {e.region, e.region};
+      if (pair) {
+        regions[0].upper[axis] = std::min(regions[0].upper[axis], node.clip[0]);
+        regions[1].lower[axis] = std::max(regions[1].lower[axis], node.clip[1]);
+      } else {
+        regions[0].lower[axis] = std::max(regions[0].lower[axis], node.clip[0]);
+        regions[0].upper[axis] = std::min(regions[0].upper[axis], node.clip[1]);
+      }
+      visitor.node({e.region, {regions, pair ? 2u : 1u}, e.depth, sizeof(Node)});
+      for (unsigned i = pair ? 2 : 1; i-- > 0;) stack.push_back({node.first() + i, regions[i], e.depth + 1});
+    }
+  });
+  return true;
+}
+
+}  // namespace arboretum::bih

@@ -1,0 +1,351 @@
+#include "structures/grid/grid_builder.h"
+
+#include <atomic>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "core/timer.h"
+#include "structures/grid/cell_ranges.h"
+
+namespace arboretum::grid {
+namespace {
+
+using Extent = std::array<double, 3>;
+
+/// Cells on each axis so that there are about `wanted` nearly cubic cells, none narrower than `least`.
+Index3 choose_counts(const Extent& extent, double wanted, double least) {
+  double low = 1e-60, high = 1e60;  // the cell's side: more cells than wanted, fewer
+  for (int i = 0; i < 96; ++i) {
+    const double side = std::sqrt(low * high);
+    double cells = 1;
+    for (double e : extent) cells *= std::max(1.0, e / side);
+    (cells > wanted ? low : high) = side;
+  }
+  Index3 counts;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double most = std::clamp(std::floor(extent[a] / least), 1.0, 65536.0);
+    counts[a] = std::uint32_t(std::clamp(std::round(extent[a] / high), 1.0, most));
+  }
+  return counts;
+}
+
+/// A level of `counts` cells whose box holds [lower, lower + extent].
+Level make_level(const Vec3f& lower, const Extent& extent, const Index3& counts) {
+  Level level{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    level.lower[a] = lower[a];
+    float cell = float(extent[a] / counts[a]);
+    while (double(cell) * counts[a] < extent[a])
+      cell = std::nextafter(cell, std::numeric_limits<float>::infinity());
+    level.cell[a] = cell, level.inverse[a] = 1.0f / cell, level.last[a] = float(counts[a] - 1);
+  }
+  return level;
+}
+
+/// Sums from which the expected number of cells that triangles touch follows for any cell size: of a convex
+/// body put down at random on a lattice that number is the volume of the body and the cell added (Minkowski),
+/// for a triangle 1 + width / cell on each axis + projected area / cell face on each plane.
+struct Sizes {
+  Extent width{}, area{};  ///< area[a]: projected along axis a
+  double triangles = 0;
+
+  void add(const std::array<Vec3f, 3>& c, const Extent& most) {
+    double e[2][3];
+    for (std::size_t a = 0; a < 3; ++a) {
+      e[0][a] = double(c[1][a]) - c[0][a], e[1][a] = double(c[2][a]) - c[0][a];
+      const double w = double(std::max({c[0][a], c[1][a], c[2][a]})) - std::min({c[0][a], c[1][a], c[2][a]});
+      width[a] += std::min(w, most[a]);
+    }
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::size_t p = (a + 1) % 3, q = (a + 2) % 3;
+      area[a] += std::min(0.5 * std::abs(e[0][p] * e[1][q] - e[0][q] * e[1][p]), most[p] * most[q]);
+    }
+    ++triangles;
+  }
+  void add(const Sizes& s) {
+    for (std::size_t a = 0; a < 3; ++a) width[a] += s.width[a], area[a] += s.area[a];
+    triangles += s.triangles;
+  }
+  [[nodiscard]] double references(const Extent& extent, const Index3& counts) const {
+    Extent cell;
+    for (std::size_t a = 0; a < 3; ++a) cell[a] = extent[a] / counts[a];
+    double sum = triangles;
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (counts[a] > 1) sum += width[a] / cell[a];
+      const std::size_t p = (a + 1) % 3, q = (a + 2) % 3;
+      if (counts[p] > 1 && counts[q] > 1) sum += area[a] / (cell[p] * cell[q]);
+    }
+    return sum;
+  }
+};
+
+/// The most cells up to `wanted` with which no more than `limit` references are expected.
+Index3 counts_within(const Sizes& sizes, const Extent& extent, double wanted, double least, double limit) {
+  for (;; wanted *= 0.7) {
+    const Index3 counts = choose_counts(extent, wanted, least);
+    if (wanted <= 1.0 || sizes.references(extent, counts) <= limit) return counts;
+  }
+}
+
+constexpr std::size_t kChunk = 4096;
+
+/// f(chunk number, begin, end) for chunks of fixed size: what each gives does not depend on the number of
+/// threads.
+template <class F>
+void for_each_chunk(std::size_t size, std::size_t chunk, F&& f) {
+  tbb::parallel_for(std::size_t(0), (size + chunk - 1) / chunk,
+                    [&](std::size_t k) { f(k, k * chunk, std::min(size, (k + 1) * chunk)); });
+}
+
+Sizes sum_sizes(const TriangleMesh& mesh, const Extent& extent) {
+  std::vector<Sizes> parts((mesh.size() + kChunk - 1) / kChunk);
+  for_each_chunk(mesh.size(), kChunk, [&](std::size_t k, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) parts[k].add(mesh.corners(i), extent);
+  });
+  Sizes sum;
+  for (const Sizes& s : parts) sum.add(s);
+  return sum;
+}
+
+/// Counts, then places each triangle in its cells; each cell's list ends up in rising order. False where
+/// there would be more than `limit` references.
+bool fill_lists(const TriangleMesh& mesh, const Level& level, double pad, std::uint64_t limit,
+                LeafLists& lists) {
+  const CellGeometry geometry(level, pad);
+  const std::size_t cells = level.size();
+  MeteredVector<std::uint32_t> cursor(cells);
+  tbb::parallel_for(std::size_t(0), (cells + kChunk - 1) / kChunk, [&](std::size_t k) {
+    std::fill(cursor.begin() + std::ptrdiff_t(k * kChunk),
+              cursor.begin() + std::ptrdiff_t(std::min(cells, (k + 1) * kChunk)), 0u);
+  });
+  std::atomic<std::uint64_t> total{0};
+  for_each_chunk(mesh.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    std::uint64_t count = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (total.load(std::memory_order_relaxed) > limit) return;
+      geometry.for_each_touched(mesh.corners(i), [&](std::uint32_t cell) {
+        std::atomic_ref(cursor[cell]).fetch_add(1, std::memory_order_relaxed), ++count;
+      });
+    }
+    total.fetch_add(count, std::memory_order_relaxed);
+  });
+  if (total > limit) return false;
+  lists.begin.resize(cells + 1);
+  std::uint32_t sum = 0;
+  for (std::size_t c = 0; c < cells; ++c) {
+    lists.begin[c] = sum, sum += cursor[c], cursor[c] = lists.begin[c];
+  }
+  lists.begin[cells] = sum;
+  lists.ids.resize(sum);
+  for_each_chunk(mesh.size(), kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      geometry.for_each_touched(mesh.corners(i), [&](std::uint32_t cell) {
+        lists.ids[std::atomic_ref(cursor[cell]).fetch_add(1, std::memory_order_relaxed)] = std::uint32_t(i);
+      });
+    }
+  });
+  for_each_chunk(cells, kChunk, [&](std::size_t, std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c)
+      std::sort(lists.ids.begin() + lists.begin[c], lists.ids.begin() + lists.begin[c + 1]);
+  });
+  return true;
+}
+
+/// The inner grids of a run of outer cells.
+struct InnerGrids {
+  struct Owner {
+    std::uint32_t cell;  ///< of the outer grid
+    Level level;
+  };
+  std::vector<Owner> owners;
+  MeteredVector<std::uint32_t> counts;  ///< a cell's references
+  MeteredVector<std::uint32_t> ids;
+};
+
+class InnerBuilder {
+ public:
+  InnerBuilder(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, double pad,
+               const Level& outer)
+      : mesh_(mesh), parameters_(parameters), width_(leaf_width), pad_(pad), outer_(outer) {}
+
+  /// Gives the cell a grid of its own where that is expected to cost less than its blocks.
+  void consider(std::uint32_t cell, std::span<const std::uint32_t> ids, InnerGrids& out) {
+    const double leaf_cost = double((ids.size() + width_ - 1) / width_) * parameters_.intersection_cost;
+    if (leaf_cost <= 2.0 * parameters_.traversal_cost) return;
+    Extent extent;
+    Vec3f lower;
+    std::uint32_t at = cell;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::uint32_t i = at % outer_.cells_on(int(a));
+      at /= outer_.cells_on(int(a));
+      lower[a] = float(double(outer_.lower[a]) + double(outer_.cell[a]) * i), extent[a] = outer_.cell[a];
+    }
+    Sizes sizes;
+    for (std::uint32_t id : ids) sizes.add(mesh_.corners(id), extent);
+    const std::uint64_t limit = std::uint64_t(kInnerReferences) * ids.size();
+    double wanted = double(parameters_.grid_density) * double(ids.size());
+    for (;; wanted *= 0.5) {
+      const Index3 counts = counts_within(sizes, extent, wanted, 2 * pad_, double(limit));
+      const std::uint32_t cells = counts[0] * counts[1] * counts[2];
+      if (cells < 4) return;
+      const Level level = make_level(lower, extent, counts);
+      if (!place(level, ids, limit)) continue;
+      double blocks = 0;
+      for (std::uint32_t c = 0; c < cells; ++c) blocks += double((counts_[c] + width_ - 1) / width_);
+      const double cost = parameters_.traversal_cost * (1.0 + expected_steps(level)) +
+                          parameters_.intersection_cost * blocks * expected_steps(level) / cells;
+      if (cost >= leaf_cost) return;
+      return keep(cell, level, out);
+    }
+  }
+
+ private:
+  bool place(const Level& level, std::span<const std::uint32_t> ids, std::uint64_t limit) {
+    const CellGeometry geometry(level, pad_);
+    counts_.assign(level.size(), 0);
+    pairs_.clear();
+    for (std::uint32_t id : ids) {
+      geometry.for_each_touched(mesh_.corners(id), [&](std::uint32_t cell) {
+        pairs_.push_back({cell, id}), ++counts_[cell];
+      });
+      if (pairs_.size() > limit) return false;
+    }
+    return true;
+  }
+
+  void keep(std::uint32_t cell, const Level& level, InnerGrids& out) {
+    out.owners.push_back({cell, level});
+    const std::size_t base = out.ids.size();
+    out.ids.resize(base + pairs_.size());
+    out.counts.insert(out.counts.end(), counts_.begin(), counts_.end());
+    std::size_t sum = base;
+    for (std::uint32_t& c : counts_) {
+      const std::uint32_t count = c;
+      c = std::uint32_t(sum - base), sum += count;
+    }
+    for (const auto& [c, id] : pairs_) out.ids[base + counts_[c]++] = id;
+  }
+
+  const TriangleMesh& mesh_;
+  const BuilderParameters& parameters_;
+  unsigned width_;
+  double pad_;
+  const Level& outer_;
+  std::vector<std::uint32_t> counts_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+};
+
+/// Replaces the lists of crowded cells by inner grids.
+void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+                     Cells& cells) {
+  constexpr std::size_t kCells = 256;
+  const std::size_t outer = cells.lists.size();
+  std::vector<InnerGrids> parts((outer + kCells - 1) / kCells);
+  for_each_chunk(outer, kCells, [&](std::size_t k, std::size_t begin, std::size_t end) {
+    InnerBuilder builder(mesh, parameters, leaf_width, cells.pad, cells.levels[0]);
+    for (std::size_t c = begin; c < end; ++c) builder.consider(std::uint32_t(c), cells.lists[c], parts[k]);
+  });
+  struct Place {
+    std::uint64_t level, cell, id;  ///< where the part's first goes
+  };
+  std::vector<Place> places(parts.size() + 1);
+  std::uint64_t kept = 0;  // references of outer cells that stay leaves
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    places[k + 1] = {places[k].level + parts[k].owners.size(), places[k].cell + parts[k].counts.size(),
+                     places[k].id + parts[k].ids.size()};
+    for (const auto& owner : parts[k].owners) {
+      cells.codes[owner.cell] = LeafCode(places[k].level + 1 + std::uint64_t(&owner - parts[k].owners.data()))
+                                    << kLeafShift |
+                                kNoLeaf;
+    }
+  }
+  for (std::size_t c = 0; c < outer; ++c) kept += cells.codes[c] == kEmptyLeaf ? cells.lists[c].size() : 0;
+  const std::uint64_t all_cells = outer + places.back().cell, all_ids = kept + places.back().id;
+  if (all_cells > 0xfffffff0u || all_ids > 0xfffffff0u || places.back().level >= (1u << 28)) {
+    throw UserError("grid: " + std::to_string(all_cells) + " cells and " + std::to_string(all_ids) +
+                    " references pass 2^32: use a smaller grid_density");
+  }
+  LeafLists lists;
+  lists.begin.resize(all_cells + 1), lists.ids.resize(all_ids);
+  std::uint32_t next = 0;
+  for (std::size_t c = 0; c < outer; ++c) {
+    lists.begin[c] = next;
+    if (cells.codes[c] != kEmptyLeaf) continue;
+    const auto from = cells.lists[c];
+    std::copy(from.begin(), from.end(), lists.ids.begin() + next);
+    next += std::uint32_t(from.size());
+  }
+  lists.begin[all_cells] = std::uint32_t(all_ids);
+  cells.levels.resize(1 + places.back().level);
+  cells.codes.resize(all_cells, kEmptyLeaf);
+  tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t k) {
+    std::uint64_t cell = outer + places[k].cell;
+    for (std::size_t g = 0; g < parts[k].owners.size(); ++g) {
+      Level level = parts[k].owners[g].level;
+      level.first = std::uint32_t(cell), cell += level.size();
+      cells.levels[1 + places[k].level + g] = level;
+    }
+    std::uint64_t id = kept + places[k].id;
+    std::copy(parts[k].ids.begin(), parts[k].ids.end(), lists.ids.begin() + std::ptrdiff_t(id));
+    for (std::size_t c = 0; c < parts[k].counts.size(); ++c) {
+      lists.begin[outer + places[k].cell + c] = std::uint32_t(id), id += parts[k].counts[c];
+    }
+    parts[k] = {};
+  });
+  cells.lists = std::move(lists);
+}
+
+}  // namespace
+
+double expected_steps(const Level& level) {
+  const double x = level.cell[0], y = level.cell[1], z = level.cell[2];
+  const double nx = level.cells_on(0), ny = level.cells_on(1), nz = level.cells_on(2);
+  const double whole = nx * x * ny * y + ny * y * nz * z + nz * z * nx * x;
+  return whole > 0 ? double(level.size()) * (x * y + y * z + z * x) / whole : 1.0;
+}
+
+void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, bool two_level,
+                 unsigned leaf_width, Cells& cells, BuildReport& report) {
+  double start = wall_seconds();
+  const auto phase = [&](const char* name) {
+    const double now = wall_seconds();
+    report.phases.emplace_back(name, now - start), start = now;
+  };
+  const Bounds3f bounds = mesh.bounds();
+  double largest = 0, reach = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    largest = std::max({largest, std::abs(double(bounds.lower[a])), std::abs(double(bounds.upper[a]))});
+    reach = std::max(reach, double(bounds.upper[a]) - bounds.lower[a]);
+  }
+  reach = std::max(reach, largest / 64);
+  cells.max_coordinate = float(largest), cells.reach = float(reach);
+  cells.pad = std::max(float(0x1p-20 * largest + 0x1p-16 * reach), 0x1p-100f);
+  const double pad = cells.pad;
+  Extent extent;
+  Vec3f lower;
+  for (std::size_t a = 0; a < 3; ++a) {
+    lower[a] = float(bounds.lower[a] - pad), extent[a] = bounds.upper[a] + pad - lower[a];
+  }
+  const Sizes sizes = sum_sizes(mesh, extent);
+  const double n = double(mesh.size());
+  const std::uint64_t limit = std::min<std::uint64_t>(
+      std::uint64_t(two_level ? kOuterReferences : kMostReferences) * mesh.size(), 0xfffffff0u);
+  // The outer grid of two has cells for inner ones to refine; alone it has all of them.
+  double wanted = std::max(1.0, double(parameters.grid_density) * n * (two_level ? kOuterShare : 1.0));
+  wanted = std::min(wanted, 1e9);
+  for (;; wanted *= 0.5) {
+    const Index3 counts = counts_within(sizes, extent, wanted, 2 * pad, double(limit));
+    cells.levels.assign(1, make_level(lower, extent, counts));
+    if (fill_lists(mesh, cells.levels[0], pad, limit, cells.lists)) break;
+  }
+  cells.codes.assign(cells.levels[0].size(), kEmptyLeaf);
+  phase("outer grid");
+  if (two_level) {
+    add_inner_grids(mesh, parameters, leaf_width, cells);
+    phase("inner grids");
+  }
+}
+
+}  // namespace arboretum::grid

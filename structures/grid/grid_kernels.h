@@ -1,0 +1,90 @@
+// The kernels of the grid: one ray, closest hit and any hit, through one level of cells or two.
+#pragma once
+
+#include "structures/bvh/bvh.h"
+#include "structures/grid/grid_far_single.h"
+#include "structures/grid/grid_walk.h"
+#include "structures/leaves/leaf_kernels.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+template <class Block, class Intersector, bool Padded, class Counting>
+struct GridSingle {
+  using Scratch = NoScratch;
+  /// True where any hit is found.
+  template <bool AnyHit>
+  static ARBORETUM_INLINE bool trace(const grid::Grid& grid, const Ray& ray, NearestHit& best,
+                                     Counting counting, Scratch&) {
+    LeafTests<Block, Intersector, AnyHit> tests(grid.leaves(), ray, best);
+    if constexpr (Padded) {
+      if (__builtin_expect(!within_walk_bounds(grid, ray), 0)) return far(grid, ray, best, tests, counting);
+    }
+    const grid::Level& outer = grid.levels()[0];
+    const GridRay lanes(ray);
+    float t = ray.tnear, end = best.t;
+    GridWalk::clip(outer, lanes, t, end);
+    if (!(t <= end)) return false;
+    const LeafCode* const codes = grid.codes();
+    LeafCode last = kEmptyLeaf;
+    GridWalk walk(outer, lanes, t);
+    count_grid(counting);
+    for (;;) {
+      const LeafCode code = codes[walk.cell];
+      vm<4> axes;
+      const float leave = walk.exit(axes);
+      count_cell(counting, code);
+      if (code != kEmptyLeaf) {
+        if ((code & kLeafCountMask) == kNoLeaf) {
+          count_grid(counting);
+          GridWalk inner(grid.levels()[code >> kLeafShift], lanes, t);
+          for (;;) {
+            const LeafCode inside = codes[inner.cell];
+            vm<4> inner_axes;
+            const float inner_leave = inner.exit(inner_axes);
+            count_cell(counting, inside);
+            if (inside != kEmptyLeaf && inside != last) {
+              last = inside;
+              if (tests(inside, counting)) return true;
+            }
+            if (best.t < inner_leave) return false;
+            if (!inner.step(inner_axes)) break;
+          }
+        } else if (code != last) {
+          last = code;
+          if (tests(code, counting)) return true;
+        }
+      }
+      if (best.t < leave) return false;
+      if (!walk.step(axes)) return false;
+      t = leave;
+    }
+  }
+
+ private:
+  template <class T>
+  static __attribute__((noinline)) bool far(const grid::Grid& grid, const Ray& ray, const NearestHit& best,
+                                            T& tests, Counting& counting) {
+    auto leaf = [&](LeafCode code) { return tests(code, counting); };
+    return FarWalk(grid, ray, best.t, leaf).search(grid.levels()[0]);
+  }
+  static ARBORETUM_INLINE void count_grid(Counting& counting) {
+    if constexpr (Counting::kCounting) ++counting.counters.nodes;
+  }
+  static ARBORETUM_INLINE void count_cell(Counting& counting, LeafCode code) {
+    if constexpr (Counting::kCounting) {
+      ++counting.counters.boxes, ++counting.counters.lanes, ++counting.counters.lanes_active;
+      counting.counters.boxes_hit += code != kEmptyLeaf;
+    }
+  }
+};
+
+template <class Block, class Intersector, bool Padded>
+struct GridMaker : SingleRayMaker<grid::Grid, GridSingle, Block, Intersector, Padded> {};
+
+inline void add_kernels(std::type_identity<grid::Grid>, KernelRows& rows) {
+  add_single_rows<GridMaker>(rows, grid::Grid::kName);
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
