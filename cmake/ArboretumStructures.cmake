@@ -79,7 +79,7 @@ void ${function}(KernelRows& rows) { add_kernels(std::type_identity<${s_folder}:
         if(isa MATCHES "^avx")
           list(APPEND options "-mtune=haswell")
         elseif(isa STREQUAL "scalar")
-          list(APPEND options "$<$<CONFIG:Release>:-O2>")
+          list(APPEND options "$<$<CONFIG:Release>:-O1>")
         endif()
         set_source_files_properties(${unit} PROPERTIES GENERATED ON COMPILE_OPTIONS "${options}")
         list(APPEND units ${unit})

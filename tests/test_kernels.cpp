@@ -165,6 +165,33 @@ TEST_CASE("with padded boxes every structure gives the brute force's answers, bi
   }
 }
 
+TEST_CASE("every way of traversal gives the single ray's answers, bit for bit") {
+  std::set<std::string_view> traversals;
+  for (const KernelScene& scene : kernel_scenes()) {
+    std::vector<Ray> rays = generic_rays(scene.mesh, 150, 31);
+    const std::vector<Ray> aimed = aimed_rays(scene.mesh, scene.mesh.bounds().center(), 100, 32);
+    rays.insert(rays.end(), aimed.begin(), aimed.end());
+    std::size_t place = 0;
+    for (const Ray& ray : invalid_rays()) rays.insert(rays.begin() + std::ptrdiff_t(place), ray), place += 7;
+    Structures structures(scene.mesh);
+    for (const KernelRow& row : runnable_rows()) {
+      if (row.traversal == "single" || row.structure == "embree") continue;
+      traversals.insert(row.traversal);
+      INFO(scene.name << ": " << name_of(row));
+      const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+      REQUIRE(single);
+      const Accel& accel = structures.get(row);
+      for (std::size_t size : {std::size_t(0), std::size_t(1), std::size_t(5), std::size_t(33), rays.size()}) {
+        INFO("batch of " << size);
+        const std::vector<Ray> batch(rays.begin(), rays.begin() + std::ptrdiff_t(size));
+        REQUIRE(same_bits(closest_hit(row, accel, batch), closest_hit(*single, accel, batch)));
+        REQUIRE(any_hit(row, accel, batch) == any_hit(*single, accel, batch));
+      }
+    }
+  }
+  CHECK(traversals.count("queued") == 1);
+}
+
 TEST_CASE("watertight with padded boxes has no crack in a closed mesh") {
   for (std::uint32_t rings : {3u, 12u, 40u}) {
     for (float offset : {0.0f, 100.0f, 1e4f}) {

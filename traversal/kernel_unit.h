@@ -2,6 +2,7 @@
 // nothing of them is compiled for the ISA. Units are generated (cmake/ArboretumStructures.cmake).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -11,6 +12,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <immintrin.h>

@@ -4,6 +4,7 @@
 #include "intersectors/moller_trumbore.h"
 #include "intersectors/pluecker.h"
 #include "intersectors/watertight.h"
+#include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
 
 namespace arboretum {
@@ -23,6 +24,7 @@ struct BvhSingle {
 template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   constexpr std::string_view name = bvh::Bvh<N>::kName;
+  constexpr int kDefaultWidth = kRegisterWidth < 8 ? 4 : 8;
   using Edges = BlocksOfWidth<EdgeBlock, kRegisterWidth>;
   using Vertices = BlocksOfWidth<VertexBlock, kRegisterWidth>;
   // The full leaf axis for the fastest and the crack-free intersector; else the default leaf (compile time).
@@ -31,6 +33,9 @@ void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
   add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, BlocksOfWidth<IndexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
   add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, TypeList<IndexBlock<4>>{}, TypeList<MollerTrumbore>{});
+  add_queued_rows<N>(rows, name, TypeList<EdgeBlock<kDefaultWidth>>{}, TypeList<MollerTrumbore>{});
+  add_queued_rows<N>(rows, name, TypeList<VertexBlock<kDefaultWidth>>{}, TypeList<Watertight>{});
+  add_queued_rows<N>(rows, name, TypeList<VertexBlock<4>>{}, TypeList<Pluecker>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

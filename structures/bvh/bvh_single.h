@@ -121,7 +121,6 @@ struct SingleRay {
     }
   }
 
- private:
   static void count_node(Counting& counting, const std::byte* node, unsigned hit) {
     ++counting.counters.nodes;
     const auto* lower = reinterpret_cast<const float*>(node);

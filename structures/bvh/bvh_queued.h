@@ -1,0 +1,297 @@
+// Queued traversal: K rays of a batch in flight, their next steps in two queues, one of nodes, one of leaves.
+//
+// A step of one ray waits some fifty cycles for memory and mispredicted branches. Here a step only says what the ray needs next:
+// the target's cache lines are asked for and {ray, target} is put on the queue of its kind, so that by the time it is its turn the
+// lines are there, and the steps of a queue are independent of each other and all of one kind. Every ray keeps its own stack and
+// visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however
+// many rays are in flight.
+#pragma once
+
+#include "structures/bvh/bvh_single.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// Marks the end of a ray's stack: neither a node nor a leaf.
+inline constexpr bvh::NodeReference kDone = 16;
+
+/// The kinds of step, as the reference's own bits tell them: node 0, leaf 1, done 2.
+[[nodiscard]] ARBORETUM_INLINE unsigned kind_of(bvh::NodeReference r) { return r >> 3 & 3u; }
+
+/// The children of `hit` onto the stack, the nearest on top: the order of push_children().
+template <int N>
+ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std::uint32_t* key, unsigned hit, StackEntry*& top) {
+  for (StackEntry* const bottom = top; hit; hit &= hit - 1) {
+    const int i = __builtin_ctz(hit);
+    const StackEntry e = stack_entry(key[i], child[i]);
+    StackEntry* p = top++;
+    for (; p != bottom && p[-1] < e; --p) *p = p[-1];
+    *p = e;
+  }
+}
+
+#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
+/// Which lane comes to each place when the lanes of a mask are moved together.
+struct CompressTable {
+  std::uint64_t lanes[256] = {};
+  constexpr CompressTable() {
+    for (unsigned m = 0; m < 256; ++m) {
+      unsigned n = 0;
+      for (unsigned i = 0; i < 8; ++i)
+        if (m >> i & 1) lanes[m] |= std::uint64_t(i) << (8 * n++);
+    }
+  }
+};
+inline constexpr CompressTable kCompress;
+
+/// Four entries, the largest first. Positive doubles order as their bits do, and no distance of a float is a double's NaN.
+ARBORETUM_INLINE __m256d sort_down(__m256d e) {
+  __m256d p = _mm256_permute4x64_pd(e, 0x4e);  // 2 3 0 1
+  e = _mm256_blend_pd(_mm256_max_pd(e, p), _mm256_min_pd(e, p), 0b1100);
+  p = _mm256_permute_pd(e, 0b0101);  // 1 0 3 2
+  e = _mm256_blend_pd(_mm256_max_pd(e, p), _mm256_min_pd(e, p), 0b1010);
+  p = _mm256_permute4x64_pd(e, 0xd8);  // 0 2 1 3
+  return _mm256_blend_pd(_mm256_max_pd(e, p), _mm256_min_pd(e, p), 0b0100);
+}
+#endif
+
+/// The same for all: up to four children, the usual case, without a branch where the registers can do it. Writes up to four
+/// entries whatever their number.
+template <int N>
+ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> entry, unsigned hit, StackEntry*& top) {
+  constexpr int W = N < 4 ? 4 : N;
+  const unsigned count = unsigned(__builtin_popcount(hit));
+  [[maybe_unused]] __m128i keys, references;
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+  if constexpr (N == 16) {
+    keys = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(__mmask16(hit), _mm512_castps_si512(entry.v)));
+    references = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(__mmask16(hit), _mm512_loadu_si512(child)));
+  } else if constexpr (N == 8) {
+    keys = _mm256_castsi256_si128(_mm256_maskz_compress_epi32(__mmask8(hit), _mm256_castps_si256(entry.v)));
+    references = _mm256_castsi256_si128(_mm256_maskz_compress_epi32(__mmask8(hit), _mm256_loadu_si256(reinterpret_cast<const __m256i*>(child))));
+  } else if constexpr (N == 4) {
+    keys = _mm_maskz_compress_epi32(__mmask8(hit), _mm_castps_si128(entry.v));
+    references = _mm_maskz_compress_epi32(__mmask8(hit), _mm_loadu_si128(reinterpret_cast<const __m128i*>(child)));
+  }
+  constexpr bool kVectors = N >= 4;
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
+  constexpr bool kVectors = N == 8;
+  if constexpr (N == 8) {
+    const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(std::int64_t(kCompress.lanes[hit])));
+    const __m128i present = _mm_cmpgt_epi32(_mm_set1_epi32(int(count)), _mm_setr_epi32(0, 1, 2, 3));
+    keys = _mm_and_si128(_mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castps_si256(entry.v), lanes)), present);
+    references = _mm_and_si128(_mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(child)), lanes)), present);
+  }
+#else
+  constexpr bool kVectors = false;
+#endif
+  if constexpr (kVectors) {
+#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
+    if (__builtin_expect(count <= 4, 1)) {
+      const __m256i e = _mm256_set_m128i(_mm_unpackhi_epi32(references, keys), _mm_unpacklo_epi32(references, keys));
+      _mm256_storeu_pd(reinterpret_cast<double*>(top), sort_down(_mm256_castsi256_pd(e)));
+      top += count;
+      return;
+    }
+#endif
+  }
+  alignas(64) std::uint32_t key[W];
+  entry.store(key);
+  push_in_scalars<N>(child, key, hit, top);
+}
+
+/// Rays in flight at most.
+inline constexpr unsigned kMostInFlight = 64;
+
+template <int N, class Block, class Intersector, bool Padded, class Counting, bool AnyHit>
+class Queued {
+ public:
+  /// `in_flight`: 1 to kMostInFlight.
+  Queued(const bvh::BvhBase& tree, RayBatch rays, unsigned in_flight, Counting counting)
+      : in_flight_(in_flight), base_(tree.base()), vertices_(tree.vertices()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), rays_(rays),
+        counting_(counting),
+        stride_(((tree.stack_entries() + 6 + 7) / 8 | 1) * 8), stacks_(stride_ * in_flight) {}
+
+  /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
+  template <class Report>
+  void run(Report&& report) {
+    for (unsigned slot = 0; slot < in_flight_; ++slot) start(slot, report);
+    while (counts_[0] | counts_[1]) {
+      step_nodes();
+      step_leaves();
+      const unsigned done = std::exchange(counts_[2], 0u);
+      for (unsigned i = 0; i < done; ++i) {
+        const unsigned slot = queues_[2][i].slot;
+        report(state(slot).index, state(slot).best);
+        start(slot, report);
+      }
+    }
+  }
+
+ private:
+  static constexpr int W = N < 4 ? 4 : N;
+  using F = vf<W>;
+  using Box = BoxRay<N, Padded>;
+
+  struct alignas(64) State {
+    Box box;
+    float tnear;
+    StackEntry* top;
+    NearestHit best;
+    std::size_t index;
+    typename Intersector::RayData data;
+  };
+  struct Step {
+    std::uint32_t slot;
+    bvh::NodeReference target;
+  };
+
+  State& state(unsigned slot) { return *reinterpret_cast<State*>(states_ + slot * sizeof(State)); }
+
+  /// The ends of the queues while a loop appends to them: in registers.
+  struct Tails {
+    Queued& q;
+    unsigned node, leaf, done;
+    ARBORETUM_INLINE explicit Tails(Queued& queued) : q(queued), node(queued.counts_[0]), leaf(queued.counts_[1]), done(queued.counts_[2]) {}
+    ARBORETUM_INLINE ~Tails() { q.counts_[0] = node, q.counts_[1] = leaf, q.counts_[2] = done; }
+
+    /// Asks for the lines of the target and puts the step on the queue of its kind.
+    ARBORETUM_INLINE void route(unsigned slot, bvh::NodeReference target) {
+      constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), sizeof(Block)) + 63 + 32) / 64);
+      const auto* at = reinterpret_cast<const char*>(q.base_ + bvh::offset_of(target));
+      for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+      const Step step{slot, target};
+      const unsigned kind = kind_of(target);
+      q.queues_[0][node] = step, q.queues_[1][leaf] = step, q.queues_[2][done] = step;
+      node += kind == 0, leaf += kind == 1, done += kind == 2;
+    }
+  };
+
+  template <class Report>
+  void start(unsigned slot, Report&& report) {
+    for (; next_ < rays_.size(); ++next_) {
+      const Ray& ray = rays_[next_];
+      if (!is_valid_in_lanes(ray)) {
+        report(next_, NearestHit{ray.tfar});
+        continue;
+      }
+      StackEntry* const stack = stacks_.data() + slot * stride_;
+      stack[0] = kDone;
+      new (&state(slot)) State{Box(ray, max_coordinate_), ray.tnear, stack + 1, NearestHit{ray.tfar}, next_, typename Intersector::RayData(ray)};
+      ++next_;
+      Tails(*this).route(slot, root_);
+      return;
+    }
+  }
+
+  static ARBORETUM_INLINE bvh::NodeReference pop(State& s) { return bvh::NodeReference(*--s.top); }
+
+  /// Drops what starts beyond the nearest hit, so that pop() need not look.
+  ARBORETUM_INLINE void drop_far(State& s, unsigned slot) {
+    StackEntry* const bottom = stacks_.data() + slot * stride_;
+    StackEntry* out = bottom;
+    for (const StackEntry* e = bottom; e != s.top; ++e) {
+      *out = *e;
+      out += __builtin_bit_cast(float, std::uint32_t(*e >> 32)) <= s.best.t;
+    }
+    s.top = out;
+  }
+
+  void step_nodes() {
+    const unsigned count = std::exchange(counts_[0], 0u);
+    Step steps[kMostInFlight];
+    std::memcpy(steps, queues_[0], count * sizeof(Step));
+    Tails tails(*this);
+    for (unsigned i = 0; i < count; ++i) {
+      State& s = state(steps[i].slot);
+      const std::byte* node = base_ + bvh::offset_of(steps[i].target);
+      F entry;
+      const unsigned hit = BoxLanes<N, Padded>(s.box).test(node, F(s.tnear), F(s.best.t), entry);
+      if constexpr (Counting::kCounting) SingleRay<N, Block, Intersector, Padded, Counting>::count_node(counting_, node, hit);
+      push<N>(reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float)), entry, hit, s.top);
+      tails.route(steps[i].slot, pop(s));
+    }
+  }
+
+  void step_leaves() {
+    const unsigned count = std::exchange(counts_[1], 0u);
+    for (unsigned i = 0; i < count; ++i) {
+      const Step step = queues_[1][i];
+      State& s = state(step.slot);
+      const auto* block = reinterpret_cast<const Block*>(base_ + bvh::offset_of(step.target));
+      const Block* const end = block + bvh::block_count(step.target);
+      if constexpr (Counting::kCounting) SingleRay<N, Block, Intersector, Padded, Counting>::count_leaf(counting_, block, end);
+      bool changed = false;
+      do {
+        if constexpr (AnyHit) {
+          if (any_hit_block<Intersector>(s.data, readable(*block, vertices_), s.tnear, s.best.t)) {
+            s.best.primitive = 0;
+            s.top = stacks_.data() + step.slot * stride_ + 1;
+            break;
+          }
+        } else {
+          changed |= closest_hit_block<Intersector>(s.data, readable(*block, vertices_), s.tnear, s.best);
+        }
+      } while (++block != end);
+      if (changed) drop_far(s, step.slot);
+      // Only nodes and ends come back to this queue's place: the steps before i are spent.
+      pending_[i] = {step.slot, pop(s)};
+    }
+    Tails tails(*this);
+    for (unsigned i = 0; i < count; ++i) tails.route(pending_[i].slot, pending_[i].target);
+  }
+
+  const unsigned in_flight_;
+  const std::byte* base_;
+  const Vec3f* vertices_;
+  const bvh::NodeReference root_;
+  const float max_coordinate_;
+  const RayBatch rays_;
+  Counting counting_;
+  std::size_t next_ = 0;
+  const std::size_t stride_;
+  std::vector<StackEntry> stacks_;
+  unsigned counts_[3] = {0, 0, 0};
+  Step queues_[3][kMostInFlight + 1];  ///< one place more: a step is written to the end of all three
+  Step pending_[kMostInFlight];
+  alignas(64) std::byte states_[kMostInFlight * sizeof(State)];
+};
+
+template <int N, class Block, class Intersector, bool Padded, class Counting>
+void queued_closest_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<Hit> hits, Counters* c) {
+  Queued<N, Block, Intersector, Padded, Counting, false> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight, Counting(c));
+  queued.run([&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+  if constexpr (Counting::kCounting) c->rays += rays.size();
+}
+
+template <int N, class Block, class Intersector, bool Padded, class Counting>
+void queued_any_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded, Counters* c) {
+  Queued<N, Block, Intersector, Padded, Counting, true> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight, Counting(c));
+  queued.run([&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
+  if constexpr (Counting::kCounting) c->rays += rays.size();
+}
+
+/// `Closest` and `Any` rays in flight for the two kinds of query: one function serves all.
+template <int N, unsigned Closest, unsigned Any = Closest>
+struct BvhQueued {
+  template <class Block, class Intersector, bool Padded>
+  struct Maker {
+    static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { queued_closest_hit<N, Block, Intersector, Padded, NoCounters>(a, r, Closest, h, c); }
+    static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { queued_any_hit<N, Block, Intersector, Padded, NoCounters>(a, r, Any, h, c); }
+    static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { queued_closest_hit<N, Block, Intersector, Padded, WithCounters>(a, r, Closest, h, c); }
+    static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { queued_any_hit<N, Block, Intersector, Padded, WithCounters>(a, r, Any, h, c); }
+  };
+};
+
+/// The rows of queued traversal: `queued` with the numbers that paid most (docs/performance.md), and fixed ones.
+template <int N, class Blocks, class Intersectors>
+void add_queued_rows(KernelRows& rows, std::string_view name, Blocks blocks, Intersectors intersectors) {
+  add_rows<BvhQueued<N, 32, 64>::template Maker>(rows, name, "queued", kIsa, blocks, intersectors);
+  add_rows<BvhQueued<N, 8>::template Maker>(rows, name, "queued8", kIsa, blocks, intersectors);
+  add_rows<BvhQueued<N, 16>::template Maker>(rows, name, "queued16", kIsa, blocks, intersectors);
+  add_rows<BvhQueued<N, 32>::template Maker>(rows, name, "queued32", kIsa, blocks, intersectors);
+  add_rows<BvhQueued<N, 64>::template Maker>(rows, name, "queued64", kIsa, blocks, intersectors);
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
