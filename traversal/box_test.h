@@ -25,6 +25,9 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// Where a ray enters boxes at the earliest: tnear, and 0 for -0, since distances are ordered by their bits.
+[[nodiscard]] ARBORETUM_INLINE float first_distance(const Ray& ray) { return ray.tnear > 0.0f ? ray.tnear : 0.0f; }
+
 /// One ray's constants for boxes: near[axis] is the byte offset of the near planes within a node of N children.
 template <int N, bool Padded>
 struct BoxRay {

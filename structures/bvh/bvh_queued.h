@@ -3,8 +3,7 @@
 // A step of one ray waits some fifty cycles for memory and mispredicted branches. Here a step only says what the ray needs next:
 // the target's cache lines are asked for and {ray, target} is put on the queue of its kind, so that by the time it is its turn the
 // lines are there, and the steps of a queue are independent of each other and all of one kind. Every ray keeps its own stack and
-// visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however
-// many rays are in flight.
+// visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however many rays are in flight.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
@@ -60,7 +59,7 @@ ARBORETUM_INLINE __m256d sort_down(__m256d e) {
 template <int N>
 ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> entry, unsigned hit, StackEntry*& top) {
   constexpr int W = N < 4 ? 4 : N;
-  const unsigned count = unsigned(__builtin_popcount(hit));
+  [[maybe_unused]] const unsigned count = unsigned(__builtin_popcount(hit));
   [[maybe_unused]] __m128i keys, references;
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
   if constexpr (N == 16) {
@@ -135,6 +134,7 @@ class Queued {
 
   struct alignas(64) State {
     Box box;
+    float first;  ///< distance from which boxes count
     float tnear;
     StackEntry* top;
     NearestHit best;
@@ -177,7 +177,7 @@ class Queued {
       }
       StackEntry* const stack = stacks_.data() + slot * stride_;
       stack[0] = kDone;
-      new (&state(slot)) State{Box(ray, max_coordinate_), ray.tnear, stack + 1, NearestHit{ray.tfar}, next_, typename Intersector::RayData(ray)};
+      new (&state(slot)) State{Box(ray, max_coordinate_), first_distance(ray), ray.tnear, stack + 1, NearestHit{ray.tfar}, next_, typename Intersector::RayData(ray)};
       ++next_;
       Tails(*this).route(slot, root_);
       return;
@@ -206,7 +206,7 @@ class Queued {
       State& s = state(steps[i].slot);
       const std::byte* node = base_ + bvh::offset_of(steps[i].target);
       F entry;
-      const unsigned hit = BoxLanes<N, Padded>(s.box).test(node, F(s.tnear), F(s.best.t), entry);
+      const unsigned hit = BoxLanes<N, Padded>(s.box).test(node, F(s.first), F(s.best.t), entry);
       if constexpr (Counting::kCounting) SingleRay<N, Block, Intersector, Padded, Counting>::count_node(counting_, node, hit);
       push<N>(reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float)), entry, hit, s.top);
       tails.route(steps[i].slot, pop(s));

@@ -73,7 +73,7 @@ struct SingleRay {
                                      StackEntry* stack, const Ray& ray, NearestHit& best, Counting counting) {
     const BoxLanes<N, Padded> box(BoxRay<N, Padded>(ray, max_coordinate));
     const typename Intersector::RayData data(ray);
-    const F tnear(ray.tnear);
+    const F tnear(first_distance(ray));
     F tfar(best.t);
     StackEntry* top = stack;
     bvh::NodeReference reference = root;
