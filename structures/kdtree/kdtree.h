@@ -26,7 +26,7 @@ struct Node {
     return {plane, std::uint32_t(offset / kUnit) << 2 | std::uint32_t(axis)};
   }
   [[nodiscard]] static Node leaf(std::uint32_t blocks, std::size_t offset) noexcept {
-    return {std::bit_cast<float>(blocks), std::uint32_t(offset / kUnit) << 2 | 3u};
+    return {std::bit_cast<float>(blocks), std::uint32_t((blocks ? offset : 0) / kUnit) << 2 | 3u};
   }
   [[nodiscard]] bool is_leaf() const noexcept { return (link & 3) == 3; }
   [[nodiscard]] int axis() const noexcept { return int(link & 3); }
@@ -38,6 +38,9 @@ struct Node {
   static constexpr std::size_t kMostBytes = kUnit << 30;
 };
 static_assert(sizeof(Node) == 8);
+
+/// The bits of a leaf without blocks, whichever.
+inline constexpr std::uint64_t kEmptyCell = std::uint64_t{3} << 32;
 
 class KdTree final : public Accel {
  public:

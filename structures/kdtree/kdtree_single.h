@@ -95,13 +95,17 @@ struct KdSingleRay {
         std::uint64_t near, far;
         std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
         const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
-        const bool skip_near = leave < begin, skip_far = enter > end;
+        const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell), skip_far = (enter > end) | (far == kdtree::kEmptyCell);
         if constexpr (Counting::kCounting) count_node(counting, 2u - skip_near - skip_far);
-        top->node = far, top->begin = enter > begin ? enter : begin, top->end = end;
-        top += !(skip_near | skip_far);
-        node = __builtin_expect_with_probability(skip_near, 1, 0.5) ? far : near;
-        const float bound = skip_near ? end : leave;
-        end = bound < end ? bound : end;
+        const float far_begin = enter > begin ? enter : begin;
+        if (skip_near) {
+          if (skip_far) goto pop;
+          node = far, begin = far_begin;
+        } else {
+          top->node = far, top->begin = far_begin, top->end = end;
+          top += !skip_far;
+          node = near, end = leave < end ? leave : end;
+        }
       }
       {
         const auto* block = reinterpret_cast<const Block*>(tree.base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4);
@@ -115,6 +119,7 @@ struct KdSingleRay {
           }
         }
       }
+    pop:
       do {
         if (top == stack) return false;
         --top;

@@ -61,11 +61,8 @@ struct CostModel {
   unsigned width, max_leaf;  ///< triangles in a block; references above which planes are tried even where they seem not to pay
 
   CostModel(const BuilderParameters& p, unsigned leaf_width) noexcept
-      : step(kStepShare * p.traversal_cost), block(p.intersection_cost), keep(1.0 - p.empty_bonus), per_block(1.0 / leaf_width),
+      : step(p.traversal_cost), block(p.intersection_cost), keep(1.0 - p.empty_bonus), per_block(1.0 / leaf_width),
         width(leaf_width), max_leaf(p.max_leaf_blocks * leaf_width) {}
-
-  /// A step's time as a part of what traversal_cost stands for, a node of boxes (docs/performance.md).
-  static constexpr double kStepShare = 0.3;
 
   [[nodiscard]] double leaf(std::size_t n) const noexcept { return block * double((n + width - 1) / width); }
   [[nodiscard]] double blocks(std::size_t n) const noexcept {
