@@ -246,6 +246,22 @@ TEST_CASE("clipping keeps what is in the box, to the last bit outward") {
     box.extend(dice.point() * scale), box.extend(dice.point() * scale);
     const Bounds3f got = clipped_bounds(c, box);
     if (!got.empty()) REQUIRE(box.contains(got));
+    const int axis = dice.integer(3);
+    const auto a = std::size_t(axis);
+    const float plane = box.lower[a] + (box.upper[a] - box.lower[a]) * dice.uniform(0, 1);
+    Bounds3f halves[2] = {box, box}, parts[2];
+    halves[0].upper[a] = halves[1].lower[a] = plane;
+    clipped_bounds(c, box, axis, plane, parts[0], parts[1]);
+    for (int side = 0; side < 2; ++side) {  // as clipped one by one, but for the rounding of a corner that is cut twice
+      const Bounds3f alone = clipped_bounds(c, halves[side]);
+      REQUIRE(parts[side].empty() == alone.empty());
+      if (alone.empty()) continue;
+      REQUIRE(halves[side].contains(parts[side]));
+      for (std::size_t k = 0; k < 3; ++k) {
+        REQUIRE(std::abs(parts[side].lower[k] - alone.lower[k]) <= 0x1p-20f * std::abs(scale));
+        REQUIRE(std::abs(parts[side].upper[k] - alone.upper[k]) <= 0x1p-20f * std::abs(scale));
+      }
+    }
     for (int k = 0; k < 40; ++k) {  // no point of the triangle in the box is outside the result, but for double rounding
       double w[3] = {dice.uniform(0, 1), dice.uniform(0, 1), 0};
       if (w[0] + w[1] > 1) w[0] = 1 - w[0], w[1] = 1 - w[1];
@@ -276,7 +292,7 @@ TEST_CASE("a reference that a plane cuts is never lost") {
       split.plane = i % 2 ? std::nextafter(box.lower[k], 2.0f) : box.lower[k] + (box.upper[k] - box.lower[k]) * dice.uniform(0, 1);
       if (side_of(box, split) != kdtree::Side::both) continue;
       Bounds3f left, right;
-      divide_reference(mesh, {box, 0}, split, left_of(cell, split), right_of(cell, split), left, right);
+      divide_reference(mesh, {box, 0}, split, cell, left, right);
       REQUIRE_FALSE((left.empty() && right.empty()));
       if (!left.empty()) REQUIRE(left_of(cell, split).contains(left));
       if (!right.empty()) REQUIRE(right_of(cell, split).contains(right));
@@ -415,7 +431,8 @@ TEST_CASE("a node's link and a leaf's blocks come back as they went in") {
     }
     for (std::uint32_t blocks : {0u, 1u, 0x7fc00001u}) {
       const Node n = Node::leaf(blocks, offset);
-      CHECK((n.is_leaf() && n.blocks() == blocks && n.offset() == offset));
+      CHECK((n.is_leaf() && n.blocks() == blocks && n.offset() == (blocks ? offset : 0)));
+      CHECK((std::bit_cast<std::uint64_t>(n) == kdtree::kEmptyCell) == (blocks == 0));
     }
   }
 }

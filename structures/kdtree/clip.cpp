@@ -1,7 +1,8 @@
 #include "structures/kdtree/clip.h"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
+#include <cstdint>
 #include <limits>
 
 namespace arboretum::kdtree {
@@ -35,19 +36,38 @@ void clip(const Polygon& in, int axis, double plane, double sign, Polygon& out) 
   }
 }
 
-[[nodiscard]] float round_down(double x) noexcept {
-  const float f = float(x);
-  return double(f) <= x ? f : std::nextafter(f, -std::numeric_limits<float>::infinity());
+/// The next float below or above a finite one. (std::nextafter is a call.)
+[[nodiscard]] inline float next_below(float f) noexcept {
+  const auto bits = std::bit_cast<std::uint32_t>(f);
+  return f == 0.0f ? -std::numeric_limits<float>::denorm_min() : std::bit_cast<float>(f > 0 ? bits - 1 : bits + 1);
 }
-[[nodiscard]] float round_up(double x) noexcept {
+[[nodiscard]] inline float round_down(double x) noexcept {
   const float f = float(x);
-  return double(f) >= x ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
+  return double(f) <= x ? f : next_below(f);
 }
 
-}  // namespace
+/// Bounds that grow by points, in double; -upper in the place of upper, so that both are minima.
+struct Extent {
+  Point lower{kNone, kNone, kNone}, neg_upper{kNone, kNone, kNone};
 
-Bounds3f clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box) noexcept {
-  Polygon polygon[2];
+  void add(const Point& p) noexcept {
+    for (std::size_t k = 0; k < 3; ++k) lower[k] = std::min(lower[k], p[k]), neg_upper[k] = std::min(neg_upper[k], -p[k]);
+  }
+  /// Rounded outward, cut to the box.
+  [[nodiscard]] Bounds3f within(const Bounds3f& box) const noexcept {
+    if (lower[0] == kNone) return {};
+    Bounds3f bounds;
+    for (std::size_t k = 0; k < 3; ++k) {
+      bounds.lower[k] = std::max(box.lower[k], round_down(lower[k]));
+      bounds.upper[k] = std::min(box.upper[k], -round_down(neg_upper[k]));
+    }
+    return bounds;
+  }
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+};
+
+/// The part of the triangle in the closed box; a polygon without points where there is none. Uses both polygons.
+const Polygon& clip_to(const std::array<Vec3f, 3>& corners, const Bounds3f& box, Polygon (&polygon)[2]) noexcept {
   int now = 0;
   polygon[0].size = 3;
   for (std::size_t i = 0; i < 3; ++i) polygon[0].point[i] = {corners[i].x, corners[i].y, corners[i].z};
@@ -55,23 +75,47 @@ Bounds3f clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box
     const std::size_t k = std::size_t(axis);
     const float low = std::min({corners[0][k], corners[1][k], corners[2][k]}), high = std::max({corners[0][k], corners[1][k], corners[2][k]});
     if (low < box.lower[k]) clip(polygon[now], axis, box.lower[k], 1.0, polygon[1 - now]), now = 1 - now;
-    if (polygon[now].size == 0) return {};
+    if (polygon[now].size == 0) break;
     if (high > box.upper[k]) clip(polygon[now], axis, box.upper[k], -1.0, polygon[1 - now]), now = 1 - now;
-    if (polygon[now].size == 0) return {};
+    if (polygon[now].size == 0) break;
   }
-  const Polygon& rest = polygon[now];
-  Point lower = rest.point[0], upper = rest.point[0];
-  for (int i = 1; i < rest.size; ++i) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      lower[k] = std::min(lower[k], rest.point[std::size_t(i)][k]), upper[k] = std::max(upper[k], rest.point[std::size_t(i)][k]);
+  return polygon[now];
+}
+
+}  // namespace
+
+Bounds3f clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box) noexcept {
+  Polygon polygon[2];
+  const Polygon& part = clip_to(corners, box, polygon);
+  Extent extent;
+  for (int i = 0; i < part.size; ++i) extent.add(part.point[std::size_t(i)]);
+  return extent.within(box);
+}
+
+void clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box, int axis, float plane, Bounds3f& left, Bounds3f& right) noexcept {
+  Polygon polygon[2];
+  const Polygon& part = clip_to(corners, box, polygon);
+  const auto k = std::size_t(axis);
+  Extent below, above;
+  const Point* a = part.size == 0 ? nullptr : &part.point[std::size_t(part.size - 1)];
+  double da = a ? (*a)[k] - plane : 0.0;
+  for (int i = 0; i < part.size; ++i) {
+    const Point* b = &part.point[std::size_t(i)];
+    const double db = (*b)[k] - plane;
+    if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
+      const double s = da / (da - db);
+      Point p;
+      for (std::size_t j = 0; j < 3; ++j) p[j] = (*a)[j] + s * ((*b)[j] - (*a)[j]);
+      p[k] = plane;
+      below.add(p), above.add(p);
     }
+    if (db <= 0) below.add(*b);
+    if (db >= 0) above.add(*b);
+    a = b, da = db;
   }
-  Bounds3f bounds;
-  for (std::size_t k = 0; k < 3; ++k) {
-    bounds.lower[k] = std::max(box.lower[k], round_down(lower[k]));
-    bounds.upper[k] = std::min(box.upper[k], round_up(upper[k]));
-  }
-  return bounds;
+  Bounds3f low = box, high = box;
+  low.upper[k] = high.lower[k] = plane;
+  left = below.within(low), right = above.within(high);
 }
 
 }  // namespace arboretum::kdtree

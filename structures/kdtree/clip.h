@@ -12,4 +12,7 @@ namespace arboretum::kdtree {
 /// empty result means that the triangle does not come nearer to the box than double rounding can tell.
 [[nodiscard]] Bounds3f clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box) noexcept;
 
+/// The same for the two halves of the box at `plane`, which lies within it: clipped once, then parted.
+void clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box, int axis, float plane, Bounds3f& left, Bounds3f& right) noexcept;
+
 }  // namespace arboretum::kdtree

@@ -18,13 +18,12 @@ namespace {
 
 }  // namespace
 
-void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& left_cell,
-                      const Bounds3f& right_cell, Bounds3f& left, Bounds3f& right) noexcept {
-  const auto corners = mesh.corners(reference.id);
+void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell, Bounds3f& left,
+                      Bounds3f& right) noexcept {
   const std::size_t axis = std::size_t(split.axis);
   Bounds3f left_half = reference.box, right_half = reference.box;
   left_half.upper[axis] = right_half.lower[axis] = split.plane;
-  left = clipped_bounds(corners, left_cell), right = clipped_bounds(corners, right_cell);
+  clipped_bounds(mesh.corners(reference.id), cell, split.axis, split.plane, left, right);
   const bool in_left = cut_to(left, left_half), in_right = cut_to(right, right_half);
   if (!in_left && !in_right) left = left_half, right = right_half;
 }

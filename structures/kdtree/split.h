@@ -16,6 +16,7 @@ struct Reference {
   Bounds3f box;
   std::uint32_t id;
 };
+static_assert(sizeof(Reference) == 28);  // four floats can be read from lower and from upper
 using References = MeteredVector<Reference>;
 
 /// A plane, what it costs relative to testing nothing, and where references that lie flat in it go.
@@ -46,10 +47,10 @@ enum class Side : std::uint8_t { left, right, both };
   return split.flat_left ? Side::left : Side::right;
 }
 
-/// Parts a reference that the plane cuts. A side that the triangle does not reach gets an empty box, but never both of them:
+/// Parts a reference of a cell that the plane cuts. A side that the triangle does not reach gets an empty box, but never both of them:
 /// where rounding says so, both keep the reference's own box, cut at the plane.
-void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& left_cell,
-                      const Bounds3f& right_cell, Bounds3f& left, Bounds3f& right) noexcept;
+void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell, Bounds3f& left,
+                      Bounds3f& right) noexcept;
 
 inline constexpr std::size_t kChunk = 1u << 13;  ///< references that a task takes at a time, within one cell
 
@@ -86,11 +87,14 @@ class AxisCost {
   /// No plane lies within the cell, or the cell has no area: there is nothing to gain.
   [[nodiscard]] bool flat() const noexcept { return flat_; }
 
+  /// Chances of a ray in the cell to come to the plane's sides.
+  [[nodiscard]] double share_left(double plane) const noexcept { return (face_ + rim_ * (plane - low_)) * inverse_; }
+  [[nodiscard]] double share_right(double plane) const noexcept { return (face_ + rim_ * (high_ - plane)) * inverse_; }
+
   /// Takes the plane into `best` if it lies inside the cell and costs less, `left` and `right` references being on its sides.
   void consider(float plane, std::size_t left, std::size_t right, bool flat_left, Split& best) const noexcept {
     if (!(plane > low_ && plane < high_)) return;
-    const double share_left = (face_ + rim_ * (plane - low_)) * inverse_, share_right = (face_ + rim_ * (high_ - plane)) * inverse_;
-    double cost = share_left * model_.blocks(left) + share_right * model_.blocks(right);
+    double cost = share_left(plane) * model_.blocks(left) + share_right(plane) * model_.blocks(right);
     cost = model_.step + model_.block * cost * (left == 0 || right == 0 ? model_.keep : 1.0);
     if (cost < best.cost) best = {cost, plane, axis_, flat_left};
   }

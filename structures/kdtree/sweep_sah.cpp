@@ -74,7 +74,7 @@ class Sweep {
     return split;
   }
 
-  void divide(State& state, const Split& split, const Bounds3f& left_cell, const Bounds3f& right_cell, State& left, State& right,
+  void divide(State& state, const Split& split, const Bounds3f& cell, State& left, State& right,
               bool parallel) const {
     const References& in = state.references;
     const std::size_t n = in.size();
@@ -89,7 +89,7 @@ class Sweep {
         state.sides[i] = std::uint8_t(side);
         if (side != Side::both) continue;
         auto& [l, r] = cut[c].emplace_back();
-        divide_reference(mesh_, in[i], split, left_cell, right_cell, l, r);
+        divide_reference(mesh_, in[i], split, cell, l, r);
       }
     };
     if (parallel) {

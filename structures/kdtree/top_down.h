@@ -2,13 +2,14 @@
 //
 // A Method has a State (the references of one cell), and
 //   find(state, cell, parallel)                        the cheapest Split, or none;
-//   divide(state, split, cells, left, right, parallel) the references of its two sides.
+//   divide(state, split, cell, left, right, parallel)  the references of its two sides.
 // Large cells are split one after the other with all threads at work inside, and their two sides become tasks; below
 // kOneTask references a task builds a whole subtree. What is decided depends on the references alone, so the tree is the same for
 // any number of threads.
 //
-// Where a finished subtree costs more than one leaf in its place, it becomes that leaf: planes may be tried that do not pay at
-// first sight (Wald and Havran 2006 stop there; we look below, then decide).
+// Where a finished subtree costs more than one leaf in its place, it becomes that leaf. A cell with more references than a leaf should
+// hold is split by planes that do not pay at first sight, up to kDoubtful of them in a row (Wald and Havran 2006 stop at
+// once); for smaller cells that gave no better tree on any scene tried.
 #pragma once
 
 #include <algorithm>
@@ -70,12 +71,12 @@ class TopDown {
     if (!split.exists()) return split;
     if (split.cost < model_.leaf(n)) {
       place.doubtful = 0;
-    } else if (++place.doubtful > (n > model_.max_leaf ? kDoubtfulLarge : n > model_.width ? kDoubtful : 0u)) {
+    } else if (n <= model_.max_leaf || ++place.doubtful > kDoubtful) {
       return {};
     }
     return split;
   }
-  static constexpr unsigned kDoubtful = 2, kDoubtfulLarge = 4;
+  static constexpr unsigned kDoubtful = 2;
 
   /// The places of both sides. What the parent may have beyond its sides' references is shared out by their sizes.
   static void share(const Place& place, const Split& split, std::size_t left, std::size_t right, Place& l, Place& r) {
@@ -89,7 +90,7 @@ class TopDown {
     if (state.size() <= kOneTask) return Task(*this, out).run(std::move(state), place);
     const Split split = choose(state, place, true);
     State left, right;
-    if (split.exists()) method_.divide(state, split, left_of(place.cell, split), right_of(place.cell, split), left, right, true);
+    if (split.exists()) method_.divide(state, split, place.cell, left, right, true);
     if (!split.exists() || left.size() + right.size() > place.references) {
       place.depth = limits_.depth;
       return Task(*this, out).run(std::move(state), place);
@@ -125,7 +126,7 @@ class TopDown {
       if (!sides_[level]) sides_[level] = std::make_unique<Sides>();
       State &left = sides_[level]->left, &right = sides_[level]->right;
       Place l, r;
-      tree_.method_.divide(state, split, left_of(place.cell, split), right_of(place.cell, split), left, right, false);
+      tree_.method_.divide(state, split, place.cell, left, right, false);
       if (left.size() + right.size() > place.references) return leaf(state, index), as_leaf;
       share(place, split, left.size(), right.size(), l, r);
       const std::size_t ids = out_.ids.size();
