@@ -129,7 +129,7 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
 }
 
 std::uint64_t Collapse::measure(std::uint32_t index) {
-  const auto round_up = [](std::uint64_t bytes) { return (bytes + 31) / 32 * 32; };
+  const auto round_up = [granule = settings_.granule](std::uint64_t bytes) { return (bytes + granule - 1) / granule * granule; };
   std::uint64_t total;
   if (is_leaf(index)) {
     total = round_up(blocks(index) * settings_.block_bytes);

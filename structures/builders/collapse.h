@@ -20,6 +20,7 @@ struct CollapseSettings {
   float intersection_cost = 1.0f;
   bool optimal = true;
   std::size_t node_bytes = 0, block_bytes = 0;  ///< what a wide node and a leaf block take
+  std::size_t granule = 32;  ///< nodes and leaves take multiples of so many bytes
 };
 
 /// The wide children of a binary node, at most kMaxBranching.
@@ -37,7 +38,7 @@ class Collapse {
   [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept { return plan_[node].leaf; }
   /// The children of the wide node made from `node`, which is not a leaf.
   [[nodiscard]] Slots children(std::uint32_t node) const noexcept;
-  /// Bytes of the subtree at a node that is_leaf() or is some children()'s: its own, 32-byte multiples, and all below.
+  /// Bytes of the subtree at a node that is_leaf() or is some children()'s: its own, in granules, and all below.
   [[nodiscard]] std::uint64_t bytes(std::uint32_t node) const noexcept { return plan_[node].bytes; }
   [[nodiscard]] unsigned blocks(std::uint32_t node) const noexcept {
     return (tree_.nodes[node].count + settings_.block_width - 1) / settings_.block_width;

@@ -51,7 +51,8 @@ class BvhBase : public Accel {
 };
 
 /// A wide BVH whose nodes are written in `Format`, which has
-///   kName, kSummary; kBranching, the most children; Node, a trivially copyable type;
+///   kName, kSummary; kBranching, the most children; Node, a trivially copyable type; kGranule, a multiple of 32: nodes and leaves
+///   lie on addresses that are multiples of it;
 ///   write(Node&, boxes, references, count): the node of these children, 0 of them for an empty scene;
 ///   read(const Node&, boxes, references): the count, and the children as a ray's box test sees them.
 /// Its members are defined in wide_bvh.h and wide_refit.h, which a structure's .cpp file includes to instantiate them.
@@ -72,7 +73,7 @@ class WideBvh final : public BvhBase {
 /// 8, 16. A slot without a child has lower = +inf, upper = -inf, so that no ray enters it; children come first.
 /// With a stride of 224 bytes on 32-byte addresses a node of N = 8 always lies on four cache lines.
 template <int N>
-struct alignas(N <= 4 ? 64 : 32) Node {
+struct alignas(32) Node {
   float planes[6][N];
   NodeReference child[N];
 };
@@ -87,6 +88,7 @@ struct SoaNodes {
                                                : N == 4 ? "4-wide bounding volume hierarchy, child boxes as structure of arrays"
                                                : N == 8 ? "8-wide bounding volume hierarchy, child boxes as structure of arrays"
                                                         : "16-wide bounding volume hierarchy, child boxes as structure of arrays";
+  static constexpr std::size_t kGranule = 32;
   using Node = bvh::Node<N>;
 
   static void write(Node& node, const Bounds3f* boxes, const NodeReference* references, unsigned count) noexcept {

@@ -11,28 +11,24 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 template <int N>
-struct BvhSingle {
-  template <class Block, class Intersector, bool Padded>
-  struct Maker {
-    static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
-    static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, NoCounters>(a, r, h, c); }
-    static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
-    static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<N, Block, Intersector, Padded, WithCounters>(a, r, h, c); }
-  };
+struct SoaTests {
+  template <bool Padded>
+  using Nodes = SoaNodeTest<N, Padded>;
 };
 
 template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   constexpr std::string_view name = bvh::Bvh<N>::kName;
   constexpr int kDefaultWidth = kRegisterWidth < 8 ? 4 : 8;
+  using Single = SingleRayKernels<SoaTests<N>::template Nodes>;
   using Edges = BlocksOfWidth<EdgeBlock, kRegisterWidth>;
   using Vertices = BlocksOfWidth<VertexBlock, kRegisterWidth>;
   // The full leaf axis for the fastest and the crack-free intersector; else the default leaf (compile time).
-  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Edges{}, TypeList<MollerTrumbore>{});
-  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, Vertices{}, TypeList<Watertight>{});
-  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
-  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, BlocksOfWidth<IndexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
-  add_rows<BvhSingle<N>::template Maker>(rows, name, "single", kIsa, TypeList<IndexBlock<4>>{}, TypeList<MollerTrumbore>{});
+  add_rows<Single::template Maker>(rows, name, "single", kIsa, Edges{}, TypeList<MollerTrumbore>{});
+  add_rows<Single::template Maker>(rows, name, "single", kIsa, Vertices{}, TypeList<Watertight>{});
+  add_rows<Single::template Maker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
+  add_rows<Single::template Maker>(rows, name, "single", kIsa, BlocksOfWidth<IndexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
+  add_rows<Single::template Maker>(rows, name, "single", kIsa, TypeList<IndexBlock<4>>{}, TypeList<MollerTrumbore>{});
   add_queued_rows<N>(rows, name, TypeList<EdgeBlock<kDefaultWidth>>{}, TypeList<MollerTrumbore>{});
   add_queued_rows<N>(rows, name, TypeList<VertexBlock<kDefaultWidth>>{}, TypeList<Watertight>{});
   add_queued_rows<N>(rows, name, TypeList<VertexBlock<4>>{}, TypeList<Pluecker>{});

@@ -207,7 +207,7 @@ class Queued {
       const std::byte* node = base_ + bvh::offset_of(steps[i].target);
       F entry;
       const unsigned hit = BoxLanes<N, Padded>(s.box).test(node, F(s.first), F(s.best.t), entry);
-      if constexpr (Counting::kCounting) SingleRay<N, Block, Intersector, Padded, Counting>::count_node(counting_, node, hit);
+      if constexpr (Counting::kCounting) SingleRay<SoaNodeTest<N, Padded>, Block, Intersector, Counting>::count_node(counting_, node, hit);
       push<N>(reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float)), entry, hit, s.top);
       tails.route(steps[i].slot, pop(s));
     }
@@ -220,7 +220,7 @@ class Queued {
       State& s = state(step.slot);
       const auto* block = reinterpret_cast<const Block*>(base_ + bvh::offset_of(step.target));
       const Block* const end = block + bvh::block_count(step.target);
-      if constexpr (Counting::kCounting) SingleRay<N, Block, Intersector, Padded, Counting>::count_leaf(counting_, block, end);
+      if constexpr (Counting::kCounting) SingleRay<SoaNodeTest<N, Padded>, Block, Intersector, Counting>::count_leaf(counting_, block, end);
       bool changed = false;
       do {
         if constexpr (AnyHit) {

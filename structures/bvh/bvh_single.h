@@ -1,98 +1,68 @@
-// One ray through a wide BVH, depth first, children near to far; closest hit and any hit.
+// One ray through a wide BVH, depth first, children near to far; closest hit and any hit, whatever the format of its nodes.
 //
-// A stack entry is 64 bits: the entry distance's bits above, the child reference below, so that one comparison orders
-// two entries (bits of t >= 0 order as integers). A popped entry that starts beyond the nearest hit is dropped.
+// `Nodes` is one ray and how it meets the nodes of a format:
+//   Nodes(ray, max_coordinate): the ray's constants, its interval [tnear, tfar] among them;
+//   kSlots: children that a node has room for; W: lanes of a test; test(node, entry): the children whose box the ray meets within its interval, as bits, and in those lanes of
+//     `entry` the distances at which it enters them, at least tnear;
+//   children(node): an array in which bit i's child has its reference at [i * kStride];
+//   shorten(tfar): the interval ends earlier; boxes(node): how many children there are.
 #pragma once
 
 #include "intersectors/leaf_block.h"
+#include "structures/bvh/traversal_stack.h"
 #include "traversal/box_test.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-using StackEntry = std::uint64_t;
-
-[[nodiscard]] ARBORETUM_INLINE StackEntry stack_entry(std::uint32_t distance_bits, bvh::NodeReference child) {
-  return std::uint64_t(distance_bits) << 32 | child;
-}
-
-/// Orders two entries so that the nearer stands in `b`, on top.
-ARBORETUM_INLINE void sort_pair(StackEntry& a, StackEntry& b) {
-  const StackEntry far = a < b ? b : a, near = a < b ? a : b;
-  a = far, b = near;
-}
-
-/// Of every child that waits on the stack, so many cache lines are asked for at once (docs/performance.md).
-inline constexpr int kPrefetchLines = 5;
-
-/// Puts the children that `hit` names on the stack, far to near, and takes the nearest off again as the result.
-template <int N>
-ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const bvh::NodeReference* child, const std::uint32_t* key,
-                                                  unsigned hit, StackEntry*& top) {
-  const auto next = [&] {
-    const int i = __builtin_ctz(hit);
-    hit &= hit - 1;
-    const auto* target = reinterpret_cast<const char*>(base + bvh::offset_of(child[i]));
-    for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
-    return stack_entry(key[i], child[i]);
-  };
-  StackEntry a = next(), b = next();
-  sort_pair(a, b);
-  if (__builtin_expect(hit == 0, 1)) {
-    *top++ = a;
-    return bvh::NodeReference(b);
-  }
-  StackEntry c = next();
-  sort_pair(b, c), sort_pair(a, b);
-  if (hit == 0) {
-    top[0] = a, top[1] = b;
-    top += 2;
-    return bvh::NodeReference(c);
-  }
-  StackEntry d = next();
-  sort_pair(c, d), sort_pair(b, c), sort_pair(a, b);  // d is put in its place among a >= b >= c
-  StackEntry* const bottom = top;
-  top[0] = a, top[1] = b, top[2] = c, top[3] = d;
-  top += 4;
-  while (hit) {  // five or more: insertion
-    const StackEntry e = next();
-    StackEntry* p = top++;
-    for (; p != bottom && p[-1] < e; --p) *p = p[-1];
-    *p = e;
-  }
-  return bvh::NodeReference(*--top);
-}
-
-template <int N, class Block, class Intersector, bool Padded, class Counting>
-struct SingleRay {
-  static constexpr int W = N < 4 ? 4 : N;
+/// Nodes of bvh::SoaNodes<N>.
+template <int N, bool Padded>
+struct SoaNodeTest {
+  static constexpr int W = N < 4 ? 4 : N, kSlots = W, kStride = 1;
   using F = vf<W>;
+  BoxLanes<N, Padded> box;
+  F tnear, tfar;
 
+  ARBORETUM_INLINE SoaNodeTest(const Ray& ray, float max_coordinate)
+      : box(BoxRay<N, Padded>(ray, max_coordinate)), tnear(first_distance(ray)), tfar(ray.tfar) {}
+  ARBORETUM_INLINE unsigned test(const std::byte* node, F& entry) const { return box.test(node, tnear, tfar, entry); }
+  ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float));
+  }
+  static unsigned boxes(const std::byte* node) {
+    const auto* lower = reinterpret_cast<const float*>(node);
+    unsigned count = 0;
+    for (int i = 0; i < N; ++i) count += lower[i] <= lower[N + i];
+    return count;
+  }
+};
+
+template <class Nodes, class Block, class Intersector, class Counting>
+struct SingleRay {
   template <bool AnyHit>
   static ARBORETUM_INLINE bool trace(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Vec3f* vertices,
                                      StackEntry* stack, const Ray& ray, NearestHit& best, Counting counting) {
-    const BoxLanes<N, Padded> box(BoxRay<N, Padded>(ray, max_coordinate));
+    Nodes nodes(ray, max_coordinate);
     const typename Intersector::RayData data(ray);
-    const F tnear(first_distance(ray));
-    F tfar(best.t);
     StackEntry* top = stack;
     bvh::NodeReference reference = root;
     for (;;) {
       while (!bvh::is_leaf(reference)) {
         const std::byte* node = base + bvh::offset_of(reference);
-        F entry;
-        const unsigned hit = box.test(node, tnear, tfar, entry);
-        const auto* child = reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float));
+        vf<Nodes::W> entry;
+        const unsigned hit = nodes.test(node, entry);
         if constexpr (Counting::kCounting) count_node(counting, node, hit);
         if (hit == 0) goto pop;
+        const bvh::NodeReference* child = Nodes::children(node);
         if ((hit & (hit - 1)) == 0) {
-          reference = child[__builtin_ctz(hit)];
+          reference = child[__builtin_ctz(hit) * Nodes::kStride];
           continue;
         }
         {
-          alignas(64) std::uint32_t key[W];
+          alignas(64) std::uint32_t key[Nodes::W];
           entry.store(key);
-          reference = push_children<N>(base, child, key, hit, top);
+          reference = push_children<Nodes::kStride>(base, child, key, hit, top);
         }
       }
       {
@@ -108,7 +78,7 @@ struct SingleRay {
           }
         } while (++block != end);
         if constexpr (!AnyHit) {
-          if (changed) tfar = F(best.t);
+          if (changed) nodes.shorten(best.t);
         }
       }
     pop:
@@ -122,11 +92,11 @@ struct SingleRay {
   }
 
   static void count_node(Counting& counting, const std::byte* node, unsigned hit) {
+    const unsigned boxes = Nodes::boxes(node);
     ++counting.counters.nodes;
-    const auto* lower = reinterpret_cast<const float*>(node);
-    for (int i = 0; i < N; ++i) counting.counters.boxes += lower[i] <= lower[N + i], counting.counters.lanes_active += lower[i] <= lower[N + i];
+    counting.counters.boxes += boxes, counting.counters.lanes_active += boxes;
     counting.counters.boxes_hit += unsigned(__builtin_popcount(hit));
-    counting.counters.lanes += W;
+    counting.counters.lanes += Nodes::kSlots;
   }
   static void count_leaf(Counting& counting, const Block* block, const Block* end) {
     ++counting.counters.leaves;
@@ -138,55 +108,48 @@ struct SingleRay {
   }
 };
 
-/// A stack for one batch: on this frame while the tree is shallow, on the heap when it is deeper.
-class TraversalStack {
- public:
-  explicit TraversalStack(std::size_t entries) {
-    if (entries > kInline) heap_.resize(entries), data_ = heap_.data();
+/// Calls `answer(i, hit, best)` for each ray: whether anything was hit (any hit), or the nearest (closest hit).
+template <bool AnyHit, class Nodes, class Block, class Intersector, class Counting, class Answer>
+ARBORETUM_INLINE void trace_single_rays(const Accel& accel, RayBatch rays, Counters* counters, Answer answer) {
+  const auto& tree = static_cast<const bvh::BvhBase&>(accel);
+  const std::byte* const base = tree.base();
+  const bvh::NodeReference root = tree.root();
+  const float max_coordinate = tree.max_coordinate();
+  TraversalStack stack(tree.stack_entries());
+  Counting counting(counters);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Ray& ray = rays[i];
+    NearestHit best{ray.tfar};
+    const bool hit = is_valid_in_lanes(ray) && SingleRay<Nodes, Block, Intersector, Counting>::template trace<AnyHit>(
+                                                   base, root, max_coordinate, tree.vertices(), stack.data(), ray, best, counting);
+    answer(i, hit, best);
   }
-  TraversalStack(const TraversalStack&) = delete;
-  TraversalStack& operator=(const TraversalStack&) = delete;
-  [[nodiscard]] StackEntry* data() noexcept { return data_; }
+  if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
+}
 
- private:
-  static constexpr std::size_t kInline = 1024;
-  StackEntry inline_[kInline];
-  std::vector<StackEntry> heap_;
-  StackEntry* data_ = inline_;
-};
-
-template <int N, class Block, class Intersector, bool Padded, class Counting>
+template <class Nodes, class Block, class Intersector, class Counting>
 void bvh_closest_hit(const Accel& accel, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-  const auto& tree = static_cast<const bvh::Bvh<N>&>(accel);
-  const std::byte* const base = tree.base();
-  const bvh::NodeReference root = tree.root();
-  const float max_coordinate = tree.max_coordinate();
-  TraversalStack stack(tree.stack_entries());
-  Counting counting(counters);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Ray& ray = rays[i];
-    NearestHit best{ray.tfar};
-    if (is_valid_in_lanes(ray)) SingleRay<N, Block, Intersector, Padded, Counting>::template trace<false>(base, root, max_coordinate, tree.vertices(), stack.data(), ray, best, counting);
-    hits[i] = to_hit(best);
-  }
-  if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
+  trace_single_rays<false, Nodes, Block, Intersector, Counting>(
+      accel, rays, counters, [&](std::size_t i, bool, const NearestHit& best) { hits[i] = to_hit(best); });
 }
 
-template <int N, class Block, class Intersector, bool Padded, class Counting>
+template <class Nodes, class Block, class Intersector, class Counting>
 void bvh_any_hit(const Accel& accel, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-  const auto& tree = static_cast<const bvh::Bvh<N>&>(accel);
-  const std::byte* const base = tree.base();
-  const bvh::NodeReference root = tree.root();
-  const float max_coordinate = tree.max_coordinate();
-  TraversalStack stack(tree.stack_entries());
-  Counting counting(counters);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Ray& ray = rays[i];
-    NearestHit best{ray.tfar};
-    occluded[i] = is_valid_in_lanes(ray) && SingleRay<N, Block, Intersector, Padded, Counting>::template trace<true>(base, root, max_coordinate, tree.vertices(), stack.data(), ray, best, counting);
-  }
-  if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
+  trace_single_rays<true, Nodes, Block, Intersector, Counting>(
+      accel, rays, counters, [&](std::size_t i, bool hit, const NearestHit&) { occluded[i] = hit; });
 }
+
+/// Makes table rows (traversal/kernel_rows.h) of single rays through nodes that `Nodes<Padded>` tests.
+template <template <bool> class Nodes>
+struct SingleRayKernels {
+  template <class Block, class Intersector, bool Padded>
+  struct Maker {
+    static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<Nodes<Padded>, Block, Intersector, NoCounters>(a, r, h, c); }
+    static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<Nodes<Padded>, Block, Intersector, NoCounters>(a, r, h, c); }
+    static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<Nodes<Padded>, Block, Intersector, WithCounters>(a, r, h, c); }
+    static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<Nodes<Padded>, Block, Intersector, WithCounters>(a, r, h, c); }
+  };
+};
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

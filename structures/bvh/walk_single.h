@@ -32,7 +32,7 @@ ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, c
       }
       alignas(64) std::uint32_t key[W];
       entry.store(key);
-      reference = push_children<N>(base, child, key, hit, top);
+      reference = push_children(base, child, key, hit, top);
     }
     if (leaf(reference)) return true;
     far = vf<W>(nearest);

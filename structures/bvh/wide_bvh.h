@@ -20,7 +20,12 @@ namespace arboretum::bvh {
 
 inline constexpr std::uint32_t kParallel = 1u << 12;
 
-[[nodiscard]] inline std::size_t round_up(std::size_t bytes) noexcept { return (bytes + 31) / 32 * 32; }
+/// Bytes that a node or leaf takes in the arena.
+template <class Format>
+[[nodiscard]] constexpr std::size_t round_up(std::size_t bytes) noexcept {
+  static_assert(Format::kGranule % alignof(typename Format::Node) == 0 && Format::kGranule % 32 == 0);
+  return (bytes + Format::kGranule - 1) / Format::kGranule * Format::kGranule;
+}
 
 /// Writes the wide tree into the arena: a node, then its leaves, then its inner children's subtrees.
 template <class Format, class Block>
@@ -34,7 +39,7 @@ class Emitter {
   /// Returns the depth of the deepest leaf below.
   unsigned subtree(std::uint32_t index, std::size_t offset) const {
     auto* node = new (base_ + offset) Node;
-    std::size_t next = offset + round_up(sizeof(Node));
+    std::size_t next = offset + round_up<Format>(sizeof(Node));
     const Slots slots = collapse_.children(index);
     std::size_t child_offset[kMaxBranching];
     for (const bool leaves : {true, false}) {
@@ -120,13 +125,13 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
 
     double start = wall_seconds();
     const Collapse collapse(tree, {unsigned(kBranching), unsigned(Block::kWidth), p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
-                                   p.collapse == "optimal", sizeof(typename Format::Node), sizeof(Block)});
+                                   p.collapse == "optimal", sizeof(typename Format::Node), sizeof(Block), Format::kGranule});
     report.phases.emplace_back("collapse", wall_seconds() - start);
 
     start = wall_seconds();
     leaf_ = settings.leaf;
     if (mesh.size() == 0) {  // a node without children: every ray misses
-      arena_ = Arena(round_up(sizeof(typename Format::Node)));
+      arena_ = Arena(round_up<Format>(sizeof(typename Format::Node)));
       Format::write(*new (arena_.data()) typename Format::Node, nullptr, nullptr, 0);
       root_ = 0, stack_entries_ = 2 * kBranching;
       set_scene(mesh, {});
@@ -172,13 +177,13 @@ bool WideBvh<Format>::visit(StructureVisitor& visitor) const {
         const unsigned blocks = block_count(e.reference);
         primitives.clear();
         append_primitives(block, blocks, primitives);
-        visitor.leaf({e.bounds, primitives, e.depth, blocks, unsigned(Block::kWidth), round_up(blocks * sizeof(Block))});
+        visitor.leaf({e.bounds, primitives, e.depth, blocks, unsigned(Block::kWidth), round_up<Format>(blocks * sizeof(Block))});
         continue;
       }
       Bounds3f boxes[kMaxBranching];
       NodeReference references[kMaxBranching];
       const unsigned count = Format::read(*reinterpret_cast<const typename Format::Node*>(at), boxes, references);
-      visitor.node({e.bounds, {boxes, count}, e.depth, round_up(sizeof(typename Format::Node))});
+      visitor.node({e.bounds, {boxes, count}, e.depth, round_up<Format>(sizeof(typename Format::Node))});
       for (unsigned i = count; i-- > 0;) stack.push_back({references[i], boxes[i], e.depth + 1});
     }
   });

@@ -1,0 +1,85 @@
+// The stack of a ray that goes depth first through a wide BVH, children near to far.
+//
+// A stack entry is 64 bits: the entry distance's bits above, the child reference below, so that one comparison orders
+// two entries (bits of t >= 0 order as integers). A popped entry that starts beyond the nearest hit is dropped.
+#pragma once
+
+#include "simd/simd.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+using StackEntry = std::uint64_t;
+
+[[nodiscard]] ARBORETUM_INLINE StackEntry stack_entry(std::uint32_t distance_bits, bvh::NodeReference child) {
+  return std::uint64_t(distance_bits) << 32 | child;
+}
+
+/// Orders two entries so that the nearer stands in `b`, on top.
+ARBORETUM_INLINE void sort_pair(StackEntry& a, StackEntry& b) {
+  const StackEntry far = a < b ? b : a, near = a < b ? a : b;
+  a = far, b = near;
+}
+
+/// Of every child that waits on the stack, so many cache lines are asked for at once (docs/performance.md).
+inline constexpr int kPrefetchLines = 5;
+
+/// Puts the children that `hit` names, two or more, on the stack, far to near, and takes the nearest off again as the
+/// result. Bit i of `hit` is the child with reference child[i * Stride], entered at the distance with the bits key[i].
+template <int Stride = 1>
+ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const bvh::NodeReference* child, const std::uint32_t* key,
+                                                  unsigned hit, StackEntry*& top) {
+  const auto next = [&] {
+    const int i = __builtin_ctz(hit);
+    hit &= hit - 1;
+    const bvh::NodeReference reference = child[i * Stride];
+    const auto* target = reinterpret_cast<const char*>(base + bvh::offset_of(reference));
+    for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
+    return stack_entry(key[i], reference);
+  };
+  StackEntry a = next(), b = next();
+  sort_pair(a, b);
+  if (__builtin_expect(hit == 0, 1)) {
+    *top++ = a;
+    return bvh::NodeReference(b);
+  }
+  StackEntry c = next();
+  sort_pair(b, c), sort_pair(a, b);
+  if (hit == 0) {
+    top[0] = a, top[1] = b;
+    top += 2;
+    return bvh::NodeReference(c);
+  }
+  StackEntry d = next();
+  sort_pair(c, d), sort_pair(b, c), sort_pair(a, b);  // d is put in its place among a >= b >= c
+  StackEntry* const bottom = top;
+  top[0] = a, top[1] = b, top[2] = c, top[3] = d;
+  top += 4;
+  while (hit) {  // five or more: insertion
+    const StackEntry e = next();
+    StackEntry* p = top++;
+    for (; p != bottom && p[-1] < e; --p) *p = p[-1];
+    *p = e;
+  }
+  return bvh::NodeReference(*--top);
+}
+
+/// A stack for one batch: on this frame while the tree is shallow, on the heap when it is deeper.
+class TraversalStack {
+ public:
+  explicit TraversalStack(std::size_t entries) {
+    if (entries > kInline) heap_.resize(entries), data_ = heap_.data();
+  }
+  TraversalStack(const TraversalStack&) = delete;
+  TraversalStack& operator=(const TraversalStack&) = delete;
+  [[nodiscard]] StackEntry* data() noexcept { return data_; }
+
+ private:
+  static constexpr std::size_t kInline = 1024;
+  StackEntry inline_[kInline];
+  std::vector<StackEntry> heap_;
+  StackEntry* data_ = inline_;
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
