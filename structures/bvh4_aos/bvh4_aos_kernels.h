@@ -1,0 +1,70 @@
+// One ray against the four boxes of a bvh4_aos node: 16 lanes as 4 x 4, one register with AVX-512, two with AVX2, four with SSE.
+//
+// Lanes x y z of a group hold one box's planes, lane w the ray's own interval: with r.w = 1 and the planes' w = 0 the same operation that
+// gives the distances leaves tnear (near) or tfar (far) there, so that the reduction over a group yields the clipped interval. Near planes
+// are chosen by the direction's signs, as in box_test.h, whose constants and promises these are.
+#pragma once
+
+#include "simd/swizzle.h"
+#include "structures/bvh/format_kernels.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+template <bool Padded>
+struct AosNodeTest {
+  /// AVX-512 leaves a child's result in lane 0 of its group, the others gather the four.
+  static constexpr bool kInGroups = kRegisterWidth == 16;
+  static constexpr int W = kInGroups ? 16 : 4, kSlots = 4, kStride = kInGroups ? 1 : 4;
+  using Lanes = vf<16>;
+  Lanes r, f, g;
+  vm<16> upper_is_near, upper_is_far;  ///< in lane w both: there the maximum's is a number, the minimum's a reference
+
+  ARBORETUM_INLINE AosNodeTest(const Ray& ray, float max_coordinate) {
+    const BoxRay<4, Padded> b(ray, max_coordinate);
+    r = repeat_four<16>(four(b.rx, b.ry, b.rz, 1.0f));
+    f = repeat_four<16>(four(b.fx, b.fy, b.fz, -ray.tnear));
+    g = repeat_four<16>(four(b.gx, b.gy, b.gz, -ray.tfar));
+    const unsigned negative = (__builtin_signbit(b.rx) ? 1u : 0u) | (__builtin_signbit(b.ry) ? 2u : 0u) | (__builtin_signbit(b.rz) ? 4u : 0u);
+    upper_is_near = vm<16>::from_bits((negative | 8u) * 0x1111u), upper_is_far = vm<16>::from_bits((~negative & 15u) * 0x1111u);
+  }
+
+  ARBORETUM_INLINE unsigned test(const std::byte* node, vf<W>& entry) const {
+    const Lanes lower = Lanes::load(node), upper = Lanes::load(node + 64);
+    const Lanes near = select(upper_is_near, upper, lower), far = select(upper_is_far, upper, lower);
+    Lanes enter, leave;
+    if constexpr (kHasFma) {
+      enter = msub(near, r, f), leave = msub(far, r, g);
+    } else {
+      enter = (near - f) * r, leave = (far - g) * r;
+    }
+    // x with z and y with w, then both: a NaN may take a neighbour's bound with it, but never lane w's.
+    const auto larger = []<int V>(vf<V> a, vf<V> b) { return max_x86(a, b); };
+    const auto smaller = []<int V>(vf<V> a, vf<V> b) { return min_x86(a, b); };
+    if constexpr (kInGroups) {
+      enter = larger(enter, permute_in_fours<2, 3, 0, 1>(enter)), leave = smaller(leave, permute_in_fours<2, 3, 0, 1>(leave));
+      entry = larger(enter, permute_in_fours<1, 0, 3, 2>(enter));
+      return (entry <= smaller(leave, permute_in_fours<1, 0, 3, 2>(leave))).bits() & 0x1111u;
+    } else {
+      entry = reduce_fours(enter, larger);
+      return (entry <= reduce_fours(leave, smaller)).bits();
+    }
+  }
+  ARBORETUM_INLINE void shorten(float t) { g = select(vm<16>::from_bits(0x8888u), Lanes(-t), g); }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return reinterpret_cast<const bvh::NodeReference*>(node) + 3;
+  }
+  static unsigned boxes(const std::byte* node) {
+    const auto* n = reinterpret_cast<const bvh4_aos::Node*>(node);
+    unsigned count = 0;
+    for (int i = 0; i < 4; ++i) count += n->lower[i].x <= n->upper[i].x;
+    return count;
+  }
+};
+
+inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows) {
+  add_format_rows<AosNodeTest>(bvh4_aos::Bvh4Aos::kName, rows);
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,77 @@
+// One ray against the quantised boxes of a node: planes are decoded on the way, near and far ones chosen by the direction's signs as
+// in box_test.h, whose constants and promises these are.
+//
+// With FMA the grid is moved into the ray's parameter once a node: t = q * (step * r) + (origin * r - f), one fused operation a plane.
+// step * r is exact (step is a power of two); where it underflows, what is lost is far below the pad's 2^-100. Padded: beside the
+// roundings that box_test.h counts, origin * r - f rounds by u (M + |o|)|r|, and planes reach to M + step <= 1.02 M: under 5.1 u (M + |o|)|r|
+// in all, still below e = 8 u (M + |o|)|r|. So the interval holds the dequantised box's, and that box holds the child's (bvh_quantised.h).
+//
+// Without FMA the plane is decoded to float, q * step exactly and one rounding for the sum, and goes the way of any other plane.
+#pragma once
+
+#include "simd/swizzle.h"
+#include "structures/bvh/format_kernels.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+template <int N, bool Padded>
+struct QuantisedNodeTest {
+  static constexpr int W = N, kSlots = N, kStride = 1;
+  using F = vf<W>;
+  using Node = bvh_quantised::Node<N>;
+  F rx, ry, rz, fx, fy, fz, gx, gy, gz, tnear, tfar;
+  std::size_t near_x, near_y, near_z, far_x, far_y, far_z;  ///< offsets within Node::planes
+
+  ARBORETUM_INLINE QuantisedNodeTest(const Ray& ray, float max_coordinate) : QuantisedNodeTest(ray, BoxRay<N, Padded>(ray, max_coordinate)) {}
+
+  ARBORETUM_INLINE unsigned test(const std::byte* at, F& entry) const {
+    const auto* node = reinterpret_cast<const Node*>(at);
+    const std::uint8_t* planes = node->planes[0];
+    // One broadcast for the three exponents; each is shifted to where a float has its own.
+    std::int32_t packed;
+    std::memcpy(&packed, node->exponent, sizeof packed);
+    const vi<W> exponents(packed), field(0x7f800000);
+    const F step_x = F::from_int_bits(exponents.template shift_left<23>() & field), step_y = F::from_int_bits(exponents.template shift_left<15>() & field),
+            step_z = F::from_int_bits(exponents.template shift_left<7>() & field);
+    const F ox(node->origin[0]), oy(node->origin[1]), oz(node->origin[2]);
+    const auto q = [planes](std::size_t offset) { return to_float(load_bytes<W>(planes + offset)); };
+    F nx, ny, nz, lx, ly, lz;
+    if constexpr (kHasFma) {
+      const F sx = step_x * rx, sy = step_y * ry, sz = step_z * rz;
+      const F cx = msub(ox, rx, fx), cy = msub(oy, ry, fy), cz = msub(oz, rz, fz);
+      const F dx = Padded ? msub(ox, rx, gx) : cx, dy = Padded ? msub(oy, ry, gy) : cy, dz = Padded ? msub(oz, rz, gz) : cz;
+      nx = madd(q(near_x), sx, cx), ny = madd(q(near_y), sy, cy), nz = madd(q(near_z), sz, cz);
+      lx = madd(q(far_x), sx, dx), ly = madd(q(far_y), sy, dy), lz = madd(q(far_z), sz, dz);
+    } else {
+      nx = (q(near_x) * step_x + ox - fx) * rx, ny = (q(near_y) * step_y + oy - fy) * ry, nz = (q(near_z) * step_z + oz - fz) * rz;
+      lx = (q(far_x) * step_x + ox - gx) * rx, ly = (q(far_y) * step_y + oy - gy) * ry, lz = (q(far_z) * step_z + oz - gz) * rz;
+    }
+    entry = max_x86(max_x86(nx, ny), max_x86(nz, tnear));
+    const F exit = min_x86(min_x86(lx, ly), min_x86(lz, tfar));
+    return (entry <= exit).bits() & node->children;
+  }
+  ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) { return reinterpret_cast<const Node*>(node)->child; }
+  static unsigned boxes(const std::byte* node) { return unsigned(__builtin_popcount(reinterpret_cast<const Node*>(node)->children)); }
+
+ private:
+  ARBORETUM_INLINE QuantisedNodeTest(const Ray& ray, const BoxRay<N, Padded>& b)
+      : rx(b.rx), ry(b.ry), rz(b.rz), fx(b.fx), fy(b.fy), fz(b.fz), gx(b.gx), gy(b.gy), gz(b.gz), tnear(first_distance(ray)), tfar(ray.tfar),
+        near_x(b.near_x / sizeof(float)), near_y(b.near_y / sizeof(float)), near_z(b.near_z / sizeof(float)),
+        far_x(N - near_x), far_y(5 * N - near_y), far_z(9 * N - near_z) {}
+};
+
+template <int N>
+struct QuantisedTests {
+  template <bool Padded>
+  using Nodes = QuantisedNodeTest<N, Padded>;
+};
+
+template <int N>
+void add_kernels(std::type_identity<bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>>, KernelRows& rows) {
+  add_format_rows<QuantisedTests<N>::template Nodes>(bvh_quantised::QuantisedNodes<N>::kName, rows);
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
