@@ -1,6 +1,8 @@
 // One translation unit of the builders for one ISA; the stub defines ARBORETUM_TARGET.
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -15,13 +17,17 @@
 #include "core/mesh.h"
 #include "core/timer.h"
 #include "structures/builders/builders.h"
+#include "structures/builders/clip.h"
 
 #include "simd/target.h"
 #include "simd/target_begin.h"
 #include "structures/builders/binned_sah.h"
+#include "structures/builders/spatial_sah.h"
 #include "simd/target_end.h"
 
 namespace arboretum::ARBORETUM_ISA_NAMESPACE {
 extern const BinaryBuilder kBinnedSah;
 const BinaryBuilder kBinnedSah = &build_binned_sah;
+extern const BinaryBuilder kSpatialSah;
+const BinaryBuilder kSpatialSah = &build_spatial_sah;
 }  // namespace arboretum::ARBORETUM_ISA_NAMESPACE

@@ -8,19 +8,21 @@
 
 namespace arboretum {
 
-namespace isa_scalar { extern const BinaryBuilder kBinnedSah; }
-namespace isa_sse { extern const BinaryBuilder kBinnedSah; }
-namespace isa_avx2 { extern const BinaryBuilder kBinnedSah; }
-namespace isa_avx512 { extern const BinaryBuilder kBinnedSah; }
+namespace isa_scalar { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
+namespace isa_sse { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
+namespace isa_avx2 { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
+namespace isa_avx512 { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
 
 namespace {
 
-BinaryBuilder binned_sah(Isa isa) {
+/// A builder that is compiled for each instruction set.
+template <const BinaryBuilder& Scalar, const BinaryBuilder& Sse, const BinaryBuilder& Avx2, const BinaryBuilder& Avx512>
+BinaryBuilder on_each(Isa isa) {
   switch (isa) {
-    case Isa::scalar: return isa_scalar::kBinnedSah;
-    case Isa::sse: return isa_sse::kBinnedSah;
-    case Isa::avx2: return isa_avx2::kBinnedSah;
-    case Isa::avx512: return isa_avx512::kBinnedSah;
+    case Isa::scalar: return Scalar;
+    case Isa::sse: return Sse;
+    case Isa::avx2: return Avx2;
+    case Isa::avx512: return Avx512;
   }
   return nullptr;
 }
@@ -37,7 +39,9 @@ struct Entry {
 };
 
 constexpr Entry kBuilders[] = {
-    {"binned_sah", binned_sah},
+    {"binned_sah", on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>},
+    {"sweep_sah", on_any<build_sweep_sah>},
+    {"spatial_sah", on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>},
     {"morton", on_any<build_morton>},
     {"ploc", on_any<build_ploc>},
 #ifdef ARBORETUM_HAVE_EMBREE
@@ -46,6 +50,15 @@ constexpr Entry kBuilders[] = {
     {"embree_high", on_any<build_embree_high>},
 #endif
 };
+
+/// A budget in range, and references that 32 bits can number.
+void require_budget(std::size_t triangles, float budget) {
+  if (!(budget >= 0.0f && budget <= 4.0f)) throw UserError("duplication_budget: " + std::to_string(budget) + " is not within 0 .. 4");
+  if (double(triangles) * (1.0 + double(budget)) >= 0x1p31) {
+    throw UserError("spatial_sah: " + std::to_string(triangles) + " triangles and a duplication_budget of " + std::to_string(budget) +
+                    " make more than 2^31 references; lower the budget");
+  }
+}
 
 /// Every builder has a second key, this behind its own: its tree improved by reinsertion.
 constexpr std::string_view kReinsertion = "_reinsertion";
@@ -76,6 +89,7 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
   if (reinserts && (rounds < 1 || rounds > 64)) throw UserError("reinsertion_rounds: " + std::to_string(rounds) + " is not within 1 .. 64");
   for (const Entry& e : kBuilders) {
     if (e.name != builder) continue;
+    if (builder == "spatial_sah") require_budget(mesh.size(), settings.parameters.duplication_budget);
     e.on(settings.isa)(mesh, settings.parameters, leaf_width, tree, report);
     if (reinserts) reinsert(tree, rounds, leaf_width, report);
     return;

@@ -9,6 +9,7 @@
 namespace arboretum {
 namespace {
 constexpr std::uint32_t kParallel = 1u << 12;
+constexpr std::uint32_t kTooMany = 1000;  // references, more than a leaf holds
 }
 
 /// cost[k - 1]: least cost of the subtree in at most k slots of its parent.
@@ -30,9 +31,27 @@ Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : t
   measure(0);
 }
 
+/// Counts what the leaf made from this node would hold. Where a subtree's leaves may repeat primitives, so does not the leaf.
+void Collapse::plan_leaf(std::uint32_t index) {
+  const BinaryNode& node = tree_.nodes[index];
+  LeafPrimitives room;
+  const bool repeats = tree_.duplicates && !node.is_leaf() && node.count <= room.size() && blocks_for(node.count) <= 2 * settings_.max_leaf_blocks;
+  plan_[index].references = repeats ? unsigned(primitives(index, room).size()) : std::min(node.count, kTooMany);
+}
+
+std::span<const std::uint32_t> Collapse::primitives(std::uint32_t index, LeafPrimitives& room) const noexcept {
+  const BinaryNode& node = tree_.nodes[index];
+  const std::span<const std::uint32_t> references{tree_.primitives.data() + tree_.begin_of(index), node.count};
+  if (!tree_.duplicates || node.is_leaf()) return references;
+  std::copy(references.begin(), references.end(), room.begin());
+  std::sort(room.begin(), room.begin() + node.count);
+  return {room.data(), std::size_t(std::unique(room.begin(), room.begin() + node.count) - room.begin())};
+}
+
 void Collapse::optimise(std::uint32_t index, Costs& out) {
   const BinaryNode& node = tree_.nodes[index];
   const float area = node.half_area();
+  plan_leaf(index);
   const float leaf_cost = area * float(blocks(index)) * settings_.intersection_cost;
   if (node.is_leaf()) {
     out.slots = 1, out.cost[0] = leaf_cost;
@@ -62,7 +81,7 @@ void Collapse::optimise(std::uint32_t index, Costs& out) {
     if (best < split_cost[cheapest - 1]) cheapest = k;
   }
   const float inner_cost = area * settings_.traversal_cost + split_cost[cheapest - 1];
-  plan_[index].leaf = blocks(index) <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;
+  plan_[index].leaf = node.count <= kMaxMergedReferences && blocks(index) <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;
   plan_[index].slots = cheapest;
   out.cost[0] = plan_[index].leaf ? leaf_cost : inner_cost;
   if (plan_[index].leaf) {
@@ -80,6 +99,7 @@ void Collapse::optimise(std::uint32_t index, Costs& out) {
 void Collapse::choose_leaves(std::uint32_t index) {
   const BinaryNode& node = tree_.nodes[index];
   plan_[index].slots = settings_.branching;
+  plan_leaf(index);
   plan_[index].leaf = node.is_leaf() || blocks(index) <= 1;
   if (plan_[index].leaf) return;
   if (node.count > kParallel) {

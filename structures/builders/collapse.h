@@ -2,8 +2,9 @@
 // least SAH cost by dynamic programming (as Aila and Karras 2010 choose treelets; Ylitie, Karras, Laine 2017 for wide BVHs).
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <memory>
+#include <span>
 
 #include "structures/accel.h"
 #include "structures/builders/binary_tree.h"
@@ -11,6 +12,8 @@
 namespace arboretum {
 
 inline constexpr unsigned kMaxBranching = 16;
+/// A subtree of more references does not become one leaf.
+inline constexpr unsigned kMaxMergedReferences = 256;
 
 struct CollapseSettings {
   unsigned branching = 8;
@@ -22,6 +25,9 @@ struct CollapseSettings {
   std::size_t node_bytes = 0, block_bytes = 0;  ///< what a wide node and a leaf block take
   std::size_t granule = 32;  ///< nodes and leaves take multiples of so many bytes
 };
+
+/// Room for the primitives of a leaf that is merged from a subtree.
+using LeafPrimitives = std::array<std::uint32_t, kMaxMergedReferences>;
 
 /// The wide children of a binary node, at most kMaxBranching.
 struct Slots {
@@ -40,20 +46,26 @@ class Collapse {
   [[nodiscard]] Slots children(std::uint32_t node) const noexcept;
   /// Bytes of the subtree at a node that is_leaf() or is some children()'s: its own, in granules, and all below.
   [[nodiscard]] std::uint64_t bytes(std::uint32_t node) const noexcept { return plan_[node].bytes; }
-  [[nodiscard]] unsigned blocks(std::uint32_t node) const noexcept {
-    return (tree_.nodes[node].count + settings_.block_width - 1) / settings_.block_width;
-  }
+  /// Blocks of the leaf made from `node`, which is_leaf().
+  [[nodiscard]] unsigned blocks(std::uint32_t node) const noexcept { return blocks_for(plan_[node].references); }
+  /// The primitives of that leaf, none of them twice; in `room`, or in the tree where it holds them so.
+  [[nodiscard]] std::span<const std::uint32_t> primitives(std::uint32_t node, LeafPrimitives& room) const noexcept;
 
  private:
   struct Plan {
     std::uint64_t bytes : 48;
-    std::uint64_t slots : 15;  ///< optimal: how many children the wide node made from this one has
+    std::uint64_t references : 10;  ///< of a leaf: without those that repeat
+    std::uint64_t slots : 5;        ///< optimal: how many children the wide node made from this one has
     std::uint64_t leaf : 1;
   };
   struct Costs;
   void optimise(std::uint32_t node, Costs& out);
   void choose_leaves(std::uint32_t node);
   std::uint64_t measure(std::uint32_t node);
+  void plan_leaf(std::uint32_t node);
+  [[nodiscard]] unsigned blocks_for(std::size_t references) const noexcept {
+    return unsigned((references + settings_.block_width - 1) / settings_.block_width);
+  }
   void expand(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
   void expand_children(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
 

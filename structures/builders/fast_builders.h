@@ -11,4 +11,7 @@ void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters,
 /// `ploc`: locally ordered clustering. Reads morton_bits and ploc_radius.
 void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report);
 
+/// `sweep_sah`: every split between the sorted centroids is tried. Reads no parameter.
+void build_sweep_sah(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report);
+
 }  // namespace arboretum

@@ -20,7 +20,7 @@ class Layout {
   BinaryTree run() {
     const Size all = count(tree_.root, 0);
     out_.nodes.resize(all.nodes), out_.first.resize(all.nodes), out_.primitives.resize(all.references);
-    out_.node_count = all.nodes;
+    out_.node_count = all.nodes, out_.duplicates = tree_.duplicates;
     place(tree_.root, 0, 1, 0);
     return std::move(out_);
   }
@@ -40,7 +40,7 @@ class Layout {
       left = count(node.left, level + 1), right = count(node.right, level + 1);
     }
     const std::uint32_t references = left.references + right.references;
-    return sizes_[index] = {references, references <= leaf_width_ ? 1 : 1 + left.nodes + right.nodes};
+    return sizes_[index] = {references, references <= leaf_width_ && !tree_.duplicates ? 1 : 1 + left.nodes + right.nodes};
   }
 
   /// Node `index` goes to `slot`, what is below to next, next + 1, ..., its references from `first` on.
@@ -92,7 +92,7 @@ LinkedTree to_linked(BinaryTree&& tree) {
       out.nodes[i] = node.is_leaf() ? LinkedNode::leaf(box, tree.first[i], node.count) : LinkedNode::inner(box, node.left, node.left + 1);
     }
   });
-  out.primitives = std::move(tree.primitives);
+  out.primitives = std::move(tree.primitives), out.duplicates = tree.duplicates;
   return out;
 }
 

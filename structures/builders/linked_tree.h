@@ -34,6 +34,7 @@ struct LinkedTree {
   MeteredVector<LinkedNode> nodes;
   std::uint32_t root = 0;
   MeteredVector<std::uint32_t> primitives;  ///< fewer than 2^31
+  bool duplicates = false;                  ///< a primitive may be referenced by several leaves
 };
 
 /// Area of a box's three faces; what builders compare.
@@ -43,7 +44,7 @@ struct LinkedTree {
 }
 
 /// The same tree with children next to each other and references in order of the leaves; a subtree of at most `leaf_width`
-/// references becomes one leaf. The result depends on the tree alone. Runs in the caller's TBB arena. The tree is not empty.
+/// references becomes one leaf, unless it might name a primitive twice. The result depends on the tree alone. Runs in the caller's TBB arena. The tree is not empty.
 [[nodiscard]] BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width);
 
 /// The other way: nodes keep their numbers.

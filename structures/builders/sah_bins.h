@@ -22,6 +22,7 @@ struct alignas(32) Reference {
 static_assert(sizeof(Reference) == 32);
 
 inline constexpr unsigned kMaxBins = 64;
+inline constexpr float kFlat = 1e-36f;              ///< no splits across less: kMaxBins / kFlat is finite
 inline constexpr std::size_t kChunk = 1u << 14;     ///< references a task takes at a time
 inline constexpr std::size_t kLarge = 4 * kChunk;   ///< more references than this are split by several tasks
 inline constexpr std::size_t kParallel = 1u << 12;  ///< smaller subtrees are built by one task
@@ -60,9 +61,13 @@ ARBORETUM_INLINE vf<4> high_half(Box b) {
 #endif
 }
 ARBORETUM_INLINE Box both_halves(vf<4> low, vf<4> high) {
+#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
+  return Box(_mm256_insertf128_ps(_mm256_castps128_ps256(low.v), high.v, 1));
+#else
   alignas(32) float v[8];
   low.store(v), high.store(v + 4);
   return Box::load(v);
+#endif
 }
 /// The centroid, doubled: upper + lower.
 ARBORETUM_INLINE vf<4> centroid(const Reference& r) { return vf<4>::load(r.upper) - vf<4>::load(r.neg_lower); }
@@ -81,8 +86,8 @@ struct BinMap {
     bins = std::min(max_bins, n < 48 ? 8u : n < 1024 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
     const vf<4> low = -low_half(centroids), extent = high_half(centroids) - low;
     lower = low;
-    // A flat axis gets scale 0: all in bin 0, and no split there.
-    scale = select(extent > vf<4>(std::numeric_limits<float>::min()), vf<4>(float(bins) * 0.9999f) / extent, vf<4>(0.0f));
+    // A flat axis, or one whose scale would overflow, gets scale 0: all in bin 0, and no split there.
+    scale = select(extent > vf<4>(kFlat), vf<4>(float(bins) * 0.9999f) / extent, vf<4>(0.0f));
   }
   ARBORETUM_INLINE void operator()(const Reference& r, std::int32_t* bin) const {
     truncate_to_int((centroid(r) - lower) * scale).store(bin);

@@ -79,7 +79,8 @@ class Emitter {
       boxes_.prefetch_triangle(tree_.primitives[std::min(i + 2 * kAhead, last)]);
       boxes_.prefetch_vertices(tree_.primitives[std::min(i + kAhead, last)]);
     }
-    fill_blocks(reinterpret_cast<Block*>(base_ + offset), mesh_, {tree_.primitives.data() + begin, end - begin});
+    LeafPrimitives room;
+    fill_blocks(reinterpret_cast<Block*>(base_ + offset), mesh_, collapse_.primitives(index, room));
   }
 
   [[nodiscard]] NodeReference reference(std::uint32_t index, std::size_t offset) const {
