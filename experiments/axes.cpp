@@ -28,6 +28,7 @@ constexpr Summary kBuilders[] = {
     {"embree_medium", "Embree's binned SAH builder, for our BVHs"},
     {"embree_high", "Embree's builder with spatial splits, for our BVHs"},
     {"auto", "the first that the structure takes"},
+    {"all", "each that the structure takes, a cell for each"},
 };
 constexpr Summary kIntersectors[] = {
     {"moller_trumbore", "Moeller and Trumbore 1997, on precomputed edges; may miss along edges"},
@@ -131,6 +132,7 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
         for (std::string_view builder : e.info.builders) append_new(list, builder);
       for (std::string_view builder : {"low", "medium", "high"}) append_new(list, builder);
       append_new(list, kAuto);
+      append_new(list, kAll);
       break;
     case Axis::leaf:
       for (const StructureEntry& e : registry.structures)

@@ -40,6 +40,8 @@ using AxisLists = std::array<std::vector<std::string>, kAxisCount>;
 /// Stands for the value that follows from the others: the structure's first builder, the kernel's own leaf,
 /// the box test that the intersector calls for. Builder, leaf and box take it.
 inline constexpr std::string_view kAuto = "auto";
+/// Of the builder axis: each builder that the structure takes.
+inline constexpr std::string_view kAll = "all";
 /// The value of an axis that does not apply.
 inline constexpr std::string_view kNone = "-";
 

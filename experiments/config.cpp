@@ -16,8 +16,8 @@ namespace arboretum {
 namespace {
 
 constexpr unsigned kMaxThreads = 4096;
-constexpr std::string_view kPlots[] = {"rays_per_second", "sah_cost", "build_time", "sah_vs_time",
-                                       "accuracy_vs_time"};
+constexpr std::string_view kPlots[] = {"rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time",
+                                       "sah_vs_time", "accuracy_vs_time"};
 
 std::vector<std::string> strings(std::span<const std::string_view> views) {
   return {views.begin(), views.end()};
@@ -203,9 +203,10 @@ class ConfigReader {
 
   bool plot_has_data(std::string_view plot) const {
     const Metrics& m = experiment_.metrics;
-    if (plot == "rays_per_second") return m.trace;
+    if (plot == "rays_per_second" || plot == "rays_by_builder") return m.trace;
     if (plot == "build_time") return m.build;
-    if (plot == "sah_cost") return m.quality;
+    if (plot == "sah_cost" || plot == "epo") return m.quality;
+    if (plot == "bytes_per_triangle") return m.trace || m.build;
     if (plot == "sah_vs_time") return m.quality && m.trace;
     return m.accuracy && m.trace;
   }

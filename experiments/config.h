@@ -19,8 +19,9 @@ inline constexpr std::array<std::string_view, 4> kMetricNames{"trace", "build", 
 
 struct SceneChoice {
   SceneSpec spec;
-  std::string name;  ///< as in cell names
-  bool moves = false;  ///< it has key frames, and its shutter opens
+  std::string name;          ///< as in cell names
+  bool moves = false;        ///< it has key frames, and its shutter opens
+  std::string missing = {};  ///< why an optional scene is not here: its cells are skipped with this reason
 };
 
 /// One entry of `include` or `exclude`. An empty list: the axis is not named.

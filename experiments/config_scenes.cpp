@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
 #include <system_error>
 
@@ -30,18 +31,27 @@ SceneSpec named(const std::string& name) {
   return spec;
 }
 
-std::filesystem::path existing(const YamlReader& yaml, const YAML::Node& node, std::string_view what,
-                               const std::filesystem::path& folder) {
-  const std::filesystem::path path = folder / yaml.text(node, what);
+/// Where the file is; with `optional` `missing` says why it is nowhere.
+std::filesystem::path find_file(const YamlReader& yaml, const YAML::Node& node, std::string_view what,
+                                const std::filesystem::path& folder, bool optional, std::string& missing) {
+  const std::string text = yaml.text(node, what);
+  const std::filesystem::path path = folder / text;
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    yaml.fail(node, fmt::format("{} '{}' is no file; paths are relative to the configuration", what,
-                                path.string()));
+  if (std::filesystem::is_regular_file(path, error)) return path;
+  const char* scenes = std::getenv("ARBORETUM_SCENES");
+  const bool has_folder = scenes && *scenes;
+  if (has_folder && std::filesystem::is_regular_file(std::filesystem::path(scenes) / text, error))
+    return std::filesystem::path(scenes) / text;
+  if (!optional) {
+    yaml.fail(node, fmt::format("{} '{}' is no file; paths are relative to the configuration, or to the folder "
+                                "that ARBORETUM_SCENES names", what, path.string()));
   }
-  return path;
+  missing = has_folder ? fmt::format("optional scene {} is not here: ARBORETUM_SCENES is {}", text, scenes)
+                       : fmt::format("optional scene {} is not here: ARBORETUM_SCENES, the folder to find it in, is not set", text);
+  return text;
 }
 
-SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::filesystem::path& folder) {
+SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::filesystem::path& folder, std::string& missing) {
   if (node.IsScalar()) {
     try {
       return named(yaml.text(node, "scene"));
@@ -49,12 +59,19 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
       yaml.fail(node, e.what());
     }
   }
-  yaml.check_map(node, "a scene", std::vector<std::string>{"file", "scene", "generate", "triangles", "seed"});
+  yaml.check_map(node, "a scene", std::vector<std::string>{"file", "scene", "generate", "triangles", "seed", "optional"});
   const int forms = int(bool(node["file"])) + int(bool(node["scene"])) + int(bool(node["generate"]));
   if (forms != 1) yaml.fail(node, "a scene has exactly one of file, scene and generate");
   SceneSpec spec;
-  if (const auto n = node["file"]) spec.file = existing(yaml, n, "file", folder);
-  if (const auto n = node["scene"]) spec.scene = existing(yaml, n, "scene", folder);
+  bool optional = false;
+  if (const auto n = node["optional"]) {
+    const std::string word = yaml.text(n, "optional");
+    if (word != "true" && word != "false") yaml.fail(n, fmt::format("optional must be true or false, not '{}'", word));
+    optional = word == "true";
+    if (node["generate"]) yaml.fail(n, "optional has no effect with generate: take it out");
+  }
+  if (const auto n = node["file"]) spec.file = find_file(yaml, n, "file", folder, optional, missing);
+  if (const auto n = node["scene"]) spec.scene = find_file(yaml, n, "scene", folder, optional, missing);
   if (const auto n = node["generate"]) {
     spec.generator = yaml.text(n, "generate");
     const std::vector<std::string> known = generator_names();
@@ -88,14 +105,15 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
   if (node.size() == 0) yaml.fail(node, "scenes is empty; name at least one, as in scenes: [bunny]");
   std::vector<SceneChoice> scenes;
   for (const YAML::Node& entry : node) {
-    SceneSpec spec = read_scene(yaml, entry, folder);
+    std::string missing;
+    SceneSpec spec = read_scene(yaml, entry, folder, missing);
     std::string name = cell_word(spec.name());
     if (std::ranges::find(scenes, name, &SceneChoice::name) != scenes.end()) {
       yaml.fail(entry,
                 fmt::format("scene '{}' is given twice; keep one, or give the files different names", name));
     }
-    const bool moves = scene_moves(spec);
-    scenes.push_back({std::move(spec), std::move(name), moves});
+    const bool moves = missing.empty() && scene_moves(spec);
+    scenes.push_back({std::move(spec), std::move(name), moves, std::move(missing)});
   }
   return scenes;
 }
@@ -104,7 +122,7 @@ SceneChoice scene_of_word(const std::string& word) {
   SceneSpec spec = parse_scene_word(word);
   std::string name = cell_word(spec.name());
   const bool moves = scene_moves(spec);
-  return {std::move(spec), std::move(name), moves};
+  return {.spec = std::move(spec), .name = std::move(name), .moves = moves};
 }
 
 }  // namespace arboretum

@@ -14,18 +14,19 @@ void emit_list(YAML::Emitter& out, const std::vector<std::string>& values) {
   out << YAML::EndSeq;
 }
 
-void emit_scene(YAML::Emitter& out, const SceneSpec& spec) {
+void emit_scene(YAML::Emitter& out, const SceneChoice& scene) {
+  const SceneSpec& spec = scene.spec;
   if (!spec.catalogue.empty()) {
     out << spec.catalogue;
     return;
   }
   out << YAML::Flow << YAML::BeginMap;
-  if (!spec.file.empty())
-    out << YAML::Key << "file" << YAML::Value
-        << std::filesystem::absolute(spec.file).lexically_normal().string();
-  if (!spec.scene.empty())
-    out << YAML::Key << "scene" << YAML::Value
-        << std::filesystem::absolute(spec.scene).lexically_normal().string();
+  const auto path = [&](const std::filesystem::path& file) {  // one that is missing has no place
+    return scene.missing.empty() ? std::filesystem::absolute(file).lexically_normal().string() : file.string();
+  };
+  if (!spec.file.empty()) out << YAML::Key << "file" << YAML::Value << path(spec.file);
+  if (!spec.scene.empty()) out << YAML::Key << "scene" << YAML::Value << path(spec.scene);
+  if (!scene.missing.empty()) out << YAML::Key << "optional" << YAML::Value << true;
   if (!spec.generator.empty()) {
     out << YAML::Key << "generate" << YAML::Value << spec.generator << YAML::Key << "triangles" << YAML::Value
         << spec.triangles << YAML::Key << "seed" << YAML::Value << spec.seed;
@@ -57,7 +58,7 @@ std::string text(const Experiment& e, bool whole) {
   YAML::Emitter out;
   out << YAML::BeginMap << YAML::Key << "experiment" << YAML::Value << e.name;
   out << YAML::Key << "scenes" << YAML::Value << YAML::BeginSeq;
-  for (const SceneChoice& scene : e.scenes) emit_scene(out, scene.spec);
+  for (const SceneChoice& scene : e.scenes) emit_scene(out, scene);
   out << YAML::EndSeq << YAML::Key << "axes" << YAML::Value << YAML::BeginMap;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     out << YAML::Key << std::string(kAxisNames[i]) << YAML::Value;

@@ -47,7 +47,7 @@ class Planner {
   void product(std::size_t scene, const AxisLists& lists, std::vector<Cell>& out) {
     const auto& values = [&](Axis a) -> const std::vector<std::string>& { return lists[index_of(a)]; };
     for (const std::string& structure : values(Axis::structure))
-      for (const std::string& builder : values(Axis::builder))
+      for (const std::string& builder : builders_of(structure, values(Axis::builder)))
         for (const ParameterPoint& point : points_)
           for (const std::string& leaf : values(Axis::leaf))
             for (const std::string& intersector : values(Axis::intersector))
@@ -65,6 +65,19 @@ class Planner {
                         cell.parameters = point.parameters, cell.parameter_label = point.label;
                         add(std::move(cell), out);
                       }
+  }
+
+  /// `all` is each builder of the structure; one that is named beside it does not come twice.
+  std::vector<std::string> builders_of(const std::string& structure, const std::vector<std::string>& named) const {
+    const StructureEntry* entry = registry_.structure(structure);
+    std::vector<std::string> builders;
+    for (const std::string& name : named) {
+      if (name == kAll && entry)
+        builders.insert(builders.end(), entry->info.builders.begin(), entry->info.builders.end());
+      else
+        builders.push_back(name == kAll ? std::string(kAuto) : name);
+    }
+    return builders;
   }
 
   /// Fills in `auto` and the ISA's own widths, as far as the structure is known.
@@ -169,7 +182,8 @@ class Planner {
     std::string name = cell.name();
     if (!names_.insert(name).second) return;
     ++added_;
-    const std::string reason = impossible(cell, entry);
+    const std::string& missing = experiment_.scenes[cell.scene_index].missing;
+    const std::string reason = missing.empty() ? impossible(cell, entry) : missing;
     cell.metric = Cell::Metric::trace;
     if (reason.empty())
       out.push_back(std::move(cell));
@@ -192,7 +206,7 @@ class Planner {
         if (!entry) continue;
         const auto keep = [&](auto&& taken) {
           std::erase_if(lists[i], [&](const std::string& v) {
-            return v != kAuto && std::ranges::find(taken, v) == taken.end();
+            return v != kAuto && v != kAll && std::ranges::find(taken, v) == taken.end();
           });
           if (lists[i].empty()) lists[i] = {std::string(kAuto)};
         };

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch  # noqa: E402
 
 from results import ordered  # noqa: E402
 
-COLOURS = {
+COLOURS = {  # structures
     "kdtree": "#CC6677", "bvh2": "#88CCEE", "bvh4": "#44AA99", "bvh8": "#332288", "bvh16": "#882255",
     "bvh4_aos": "#AA4499", "grid": "#999933", "octree": "#117733", "brute_force": "#DDCC77", "embree": "#555555",
 }
@@ -38,6 +38,20 @@ def colour(structure):
 
 def hatch(structure):
     return "///" if structure == "embree" else None
+
+
+PART_COLOURS = {"nodes": "#332288", "leaves": "#DDCC77", "other": "#AAAAAA", "build": "#4477AA", "collapse": "#CC6677",
+                "reinsertion": "#AA4499", "sort": "#88CCEE", "morton codes": "#44AA99", "clip": "#117733"}
+SPARE_PART_COLOURS = ("#6699CC", "#EE8866", "#997700", "#004488", "#994455", "#77AADD", "#BBCC33", "#99DDFF", "#44BB99", "#FFAABB")
+
+
+def part_colour(name):
+    """Of a phase of a build, a part of the memory: its own, or a spare one by its name."""
+    return PART_COLOURS.get(name) or SPARE_PART_COLOURS[sum(map(ord, name)) % len(SPARE_PART_COLOURS)]
+
+
+def part_legend(names):
+    return [Patch(facecolor=part_colour(n), edgecolor="white", label=n.replace("_", " ")) for n in names]
 
 
 def structure_legend(structures):

@@ -117,6 +117,8 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [buny]\n", ":1", "did you mean 'bunny'"},
       {"scenes: [bunny, bunny]\n", ":1", "given twice"},
       {"scenes: [{file: nowhere.obj}]\n", ":1", "is no file"},
+      {"scenes: [{file: nowhere.obj, optional: maybe}]\n", ":1", "true or false"},
+      {"scenes: [{generate: sphere, optional: true}]\n", ":1", "no effect with generate"},
       {"scenes: [{generate: sphere_flak}]\n", ":1", "did you mean 'sphere_flake'"},
       {"scenes: [{generate: sphere, triangles: 0}]\n", ":1", "triangles must be an integer"},
       {"scenes: [{file: a.obj, generate: sphere}]\n", ":1", "exactly one of"},
@@ -217,6 +219,42 @@ axes:
   CHECK(reasons["list has no watertight"] == 2);
   CHECK(reasons["tree has no builder none (it takes binned_sah, morton)"] == 4);
   CHECK(reasons["this build has no embree: install libembree-dev and build again"] == 8);
+}
+
+TEST_CASE("builder all is each that the structure takes, a named one not twice") {
+  TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const auto cells = [&](const std::string& axes) {
+    const fs::path file = folder.write("all.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {" + axes + ", isa: [sse], intersector: [moller_trumbore]}\n");
+    std::string builders;
+    for (const Cell& cell : make_plan(read_experiment(file, registry), registry).cells)
+      if (cell.metric == Cell::Metric::trace) builders += cell.structure + ":" + cell.builder + " ";
+    return builders;
+  };
+  CHECK(cells("structure: [tree, list], builder: [all]") == "tree:binned_sah tree:morton list:none ");
+  CHECK(cells("structure: [tree], builder: [morton, all]") == "tree:morton tree:binned_sah ");
+}
+
+TEST_CASE("an optional scene that is not there has its cells skipped with the reason; ARBORETUM_SCENES is where it may be") {
+  TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("optional.yaml", "scenes: [{file: away/far.obj, optional: true}, {generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\n");
+  ::unsetenv("ARBORETUM_SCENES");
+  const auto plan_now = [&] { return make_plan(read_experiment(file, registry), registry); };
+  Plan plan = plan_now();
+  REQUIRE(plan.skipped.size() == 1);
+  CHECK(plan.skipped[0].name.find("trace/far/tree/") == 0);
+  CHECK(plan.skipped[0].reason == "optional scene away/far.obj is not here: ARBORETUM_SCENES, the folder to find it in, is not set");
+  CHECK(plan.cells.size() == 2);
+  CHECK(effective_yaml(read_experiment(file, registry)).find("{file: away/far.obj, optional: true}") != std::string::npos);
+  const fs::path scenes = folder.path / "scenes";
+  ::setenv("ARBORETUM_SCENES", scenes.c_str(), 1);
+  CHECK(plan_now().skipped.at(0).reason == "optional scene away/far.obj is not here: ARBORETUM_SCENES is " + scenes.string());
+  fs::create_directories(scenes / "away");
+  folder.write("scenes/away/far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  CHECK(plan_now().skipped.empty());
+  CHECK(plan_now().cells.size() == 4);
+  ::unsetenv("ARBORETUM_SCENES");
 }
 
 TEST_CASE("include adds cells with the sweep's values where they apply, exclude takes cells away") {

@@ -30,9 +30,12 @@ def trace(structure="bvh8", isa="avx2", intersector="watertight", rate=10e6, rep
             "wrong_answers": 1, **axes, **more}
 
 
-def build(structure="bvh8", **more):
-    name = f"build/bunny/{structure}/binned_sah/triangle8/-/-/-/avx2/-/threads:1"
-    figures = {} if structure == "embree" else {"sah_cost": 31.5, "nodes": 10}
+def build(structure="bvh8", builder="binned_sah", **more):
+    name = f"build/bunny/{structure}/{builder}/triangle8/-/-/-/avx2/-/threads:1"
+    figures = {} if structure == "embree" else {
+        "sah_cost": 31.5, "nodes": 10, "epo": 4.5, "lcv": 3.0, "triangles": 100, "bytes_per_triangle": 10.0, "node_bytes": 300,
+        "leaf_bytes": 600, "other_bytes": 100, "peak_build_bytes": 1500, "leaf_histogram": [0, 3, 4],
+        "phase_seconds": {"splits": 0.01, "leaves": 0.005, "a new phase": 0.001}}
     return {"name": name, "run_type": "iteration", "build_seconds": 0.02, "triangles_per_second": 3e6, "bytes": 1000,
             **figures, **more}
 
@@ -40,6 +43,9 @@ def build(structure="bvh8", **more):
 def whole():
     rows = [trace(s, i, x, 1e6 * (3 + k) + r, r) for k, s in enumerate(("bvh2", "bvh4", "bvh8", "embree", "a_new_one"))
             for i in ("sse", "avx2") for x in ("moller_trumbore", "watertight") for r in range(5)]
+    rows += [trace("bvh4", "avx2", "watertight", 2e6 + r, r, builder="ploc",
+                   run_name="trace/bunny/bvh4/ploc/triangle8/watertight/padded/single/avx2/diffuse/threads:1") for r in range(3)]
+    rows.append(build("bvh4", "ploc"))
     return rows + [build(s, sah_cost=30.0 + k) if s != "embree" else build(s)
                    for k, s in enumerate(("bvh2", "bvh4", "bvh8", "embree"))]
 

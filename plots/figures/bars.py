@@ -1,11 +1,12 @@
 """Horizontal bars, one a built structure, one panel a scene: what sah_cost and build_time have in common."""
 
 from results import NoData, axis_sort_key, ordered, undetermined_axes
-from style import colour, hatch, panels, short
+from style import colour, hatch, legends_right, panels, part_colour, part_legend, short
 
 
-def bar_panels(results, value_of, axis_label, note_of, label_axes):
-    """`value_of(cell)` gives (median, low, high) or None; `note_of(cell)` the text at a bar's end.
+def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None):
+    """`value_of(cell)` gives (median, low, high) or None; `note_of(cell)` the text at a bar's end; `parts_of(cell)`, where
+    given, (name, value) of what the bar consists of: it is then stacked, and what the parts leave is drawn as the rest.
 
     `label_axes` are the axes that may tell bars of a scene apart; those that the ones before settle are not written.
     """
@@ -25,9 +26,13 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes):
         if index >= len(scenes):
             axis.set_visible(False)
             continue
-        draw_panel(axis, bars[scenes[index]], value_of, note_of, varied)
+        draw_panel(axis, bars[scenes[index]], value_of, note_of, varied, parts_of)
         axis.set_title(short(scenes[index]))
         axis.set_xlabel(axis_label)
+    if parts_of:
+        names = list(dict.fromkeys(name for cell in cells for name, value in parts_of(cell) if value > 0))
+        if names:
+            legends_right(figure, [("part", part_legend(names))])
     return figure
 
 
@@ -44,12 +49,18 @@ def scene_bars(cells, varied):
     return sorted(cells, key=lambda c: (order[c["structure"]], [axis_sort_key(a)(c[a]) for a in varied]))
 
 
-def draw_panel(axis, cells, value_of, note_of, varied):
+def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
     for place, cell in enumerate(cells):
         median, low, high = value_of(cell)
-        axis.barh(place, median, 0.74, color=colour(cell["structure"]), hatch=hatch(cell["structure"]),
-                  edgecolor="white", linewidth=0.5, xerr=None if low == high else [[median - low], [high - median]],
-                  error_kw={"elinewidth": 0.9, "ecolor": "#222222"})
+        parts = parts_of(cell) if parts_of else []
+        axis.barh(place, median, 0.74, color="#CCCCCC" if parts else colour(cell["structure"]),
+                  hatch=None if parts else hatch(cell["structure"]), edgecolor="white", linewidth=0.5,
+                  xerr=None if low == high else [[median - low], [high - median]],
+                  error_kw={"elinewidth": 0.9, "ecolor": "#222222", "zorder": 3})
+        left = 0.0
+        for name, value in parts:
+            axis.barh(place, value, 0.74, left=left, color=part_colour(name), edgecolor="white", linewidth=0.5)
+            left += value
         axis.annotate(note_of(cell), (high, place), (5, 0), textcoords="offset points", va="center", fontsize=8.5)
     axis.set_yticks(range(len(cells)), [" ".join([c["structure"]] + [label(a, c[a]) for a in varied if c[a]]) for c in cells])
     axis.set_ylim(len(cells) - 0.4, -0.6)

@@ -6,10 +6,11 @@ from results import axis_sort_key, swept_axes
 class Modes:
     """`label(cell)` is short and the same for cells that are traced alike; `labels` has all of them, in order."""
 
-    def __init__(self, cells):
+    def __init__(self, cells, without=()):
+        """`without`: axes that the figure shows otherwise."""
         swept = swept_axes(cells)
         varied = [a for a in ("intersector", "box", "traversal", "threads") if len({c[a] for c in cells}) > 1]
-        self.axes = [a for a in ("builder", "leaf") if a in swept] + varied
+        self.axes = [a for a in [a for a in ("builder", "leaf") if a in swept] + varied if a not in without]
         found = {}
         for cell in cells:
             found.setdefault(self.label(cell), [axis_sort_key(a)(cell[a]) for a in self.axes])

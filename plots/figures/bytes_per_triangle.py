@@ -1,0 +1,27 @@
+"""Memory of what was built, by part: one panel a scene."""
+
+from figures.bars import bar_panels, digits
+
+TITLE = "Bytes per triangle"
+CAPTION = ("What tracing needs besides the mesh, a triangle of the mesh: nodes, leaves (references that are shared count as often as "
+           "they are stored), and what is neither. Structures that cannot be looked into, as embree, have one part. Beside it, the "
+           "most memory held while building, as a multiple of the result. Lower is better.")
+PARTS = (("nodes", "node_bytes"), ("leaves", "leaf_bytes"), ("other", "other_bytes"))
+
+
+def draw(results):
+    def value(cell):
+        found = cell.value("bytes_per_triangle")
+        return None if found is None else (found, found, found)
+
+    def note(cell):
+        peak, size = cell.value("peak_build_bytes"), cell.value("bytes")
+        return digits(value(cell)[0]) + (f"  (peak {peak / size:.2f} ×)" if peak and size else "")
+
+    def parts(cell):
+        triangles = cell.value("triangles")
+        if not triangles or cell.value("node_bytes") is None:
+            return []
+        return [(name, (cell.value(key) or 0.0) / triangles) for name, key in PARTS]
+
+    return bar_panels(results, value, "bytes a triangle", note, ("builder", "leaf", "isa"), parts)

@@ -1,0 +1,56 @@
+"""Throughput by structure and builder: one panel a scene, workload and instruction set, a bar for each structure as built."""
+
+from figures.bars import digits, draw_panel, scene_bars
+from figures.modes import Modes
+from results import NoData, ordered, undetermined_axes
+from style import MARKERS, legends_right, marker_legend, marker_map, panels, short
+
+TITLE = "Rays per second by structure and builder"
+CAPTION = ("A bar reaches the fastest mode of a structure as built, with the 95 % confidence interval of the median; markers "
+           "show its other modes. Higher is better. The wrong answers of each cell stand in the table.")
+BUILT = ("scene", "workload", "isa", "structure", "builder", "threads")
+
+
+def draw(results):
+    metric, unit = results.throughput()
+    cells = [c for c in results.traces if c.estimate(metric)]
+    if not cells:
+        raise NoData("no cell has a throughput")
+    if len({(c["structure"], c["builder"]) for c in cells}) == len({c["structure"] for c in cells}):
+        raise NoData("no structure has two builders")
+    groups = {}
+    for cell in cells:
+        groups.setdefault(tuple(cell[a] for a in BUILT), []).append(cell)
+    best = [max(group, key=lambda c: c.estimate(metric).median) for group in groups.values()]
+    varied = [a for a in undetermined_axes(best, BUILT) if a in ("builder", "threads")]
+    modes = Modes([c for c in cells], without=("builder", "leaf"))
+    markers = marker_map(modes.labels) if 1 < len(modes.labels) <= len(MARKERS) else {}
+
+    keys = [(s, w, i) for s in ordered((c["scene"] for c in cells), "scene")
+            for w in ordered((c["workload"] for c in cells), "workload") for i in ordered((c["isa"] for c in cells), "isa")
+            if any((c["scene"], c["workload"], c["isa"]) == (s, w, i) for c in best)]
+    shown = {key: scene_bars([c for c in best if (c["scene"], c["workload"], c["isa"]) == key], varied) for key in keys}
+    columns = min(2, len(keys))
+    figure, axes = panels(-(-len(keys) // columns), columns, 5.6, 0.9 + 0.26 * max(map(len, shown.values())))
+    figure.get_layout_engine().set(w_pad=0.15)
+
+    def value(cell):
+        rate = cell.estimate(metric)
+        return rate.median / 1e6, rate.low / 1e6, rate.high / 1e6
+
+    for index, axis in enumerate(axes.flat):
+        if index >= len(keys):
+            axis.set_visible(False)
+            continue
+        scene, workload, isa = keys[index]
+        bars = shown[keys[index]]
+        draw_panel(axis, bars, value, lambda c: digits(value(c)[0]), varied)
+        for place, bar in enumerate(bars):
+            for cell in groups[tuple(bar[a] for a in BUILT)] if markers else ():
+                axis.plot(cell.estimate(metric).median / 1e6, place, markers[modes.label(cell)], color="#222222", markersize=4,
+                          markerfacecolor="white", markeredgewidth=0.8)
+        axis.set_title(f"{short(scene)}, {workload.replace('_', ' ')}, {isa}")
+        axis.set_xlabel(unit)
+    if markers:
+        legends_right(figure, [("mode", marker_legend(markers))])
+    return figure
