@@ -113,7 +113,7 @@ class Planner {
   std::string impossible_below(const Cell& cell) const {
     const std::string& name = cell.parameters.below;
     const StructureEntry* below = registry_.structure(name);
-    std::string why = below ? why_not_below(below->info) : "there is no structure of that name";
+    std::string why = below ? why_not_below(below->info) : "this build has no structure of that name";
     if (why.empty()) why = lacks_builder(*below, cell.builder);
     if (why.empty() && !registry_.kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa)) {
       why = registry_.why_no_kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
@@ -134,6 +134,10 @@ class Planner {
     const bool moves = experiment_.scenes[cell.scene_index].moves;
     if (moves && !entry->info.holds_motion) return fmt::format("{} holds one moment, and the scene moves", cell.structure);
     if (!moves && entry->info.needs_motion) return fmt::format("{} is for moving scenes, and nothing moves", cell.structure);
+    // First what is below: builder and leaf are its own.
+    if (entry->info.takes_below && !moves) {
+      if (std::string why = impossible_below(cell); !why.empty()) return why;
+    }
     if (const std::string why = lacks_builder(*entry, cell.builder); !why.empty()) return why;
     cell.kernel =
         registry_.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
@@ -143,7 +147,6 @@ class Planner {
       return why.empty() ? "no such kernel in this build" : why;
     }
     if (!registry_.has(cell.isa)) return fmt::format("no {}", to_string(cell.isa));
-    if (entry->info.takes_below) return impossible_below(cell);
     return {};
   }
 

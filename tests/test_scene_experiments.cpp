@@ -1,0 +1,86 @@
+// Instances and motion in experiments: what the plan keeps and skips, cells by the structure below, a run of both, and its resumption.
+#include "experiments/config.h"
+#include "experiments/journal.h"
+#include "experiments/plan.h"
+#include "experiments/results_writer.h"
+#include "experiments/runner.h"
+#include "tests/catch.h"
+#include "tests/scene_files.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+namespace {
+
+constexpr const char* kSweep = R"(
+scenes: [{generate: forest, triangles: 3000}, {generate: waving_cloth, triangles: 600}]
+axes: {structure: [bvh8, two_level, bvh4_motion], isa: [avx2], intersector: [watertight], workload: [primary, shadow]}
+parameters: {below: [bvh4, brute_force, two_level, embree]}
+measure: {repetitions: 2, warmup: 0, min_time: 0.001, resolution: [48, 32]}
+)";
+
+std::size_t with(const Plan& plan, const std::string& part) {
+  std::size_t count = 0;
+  for (const Cell& cell : plan.cells) count += cell.name().find(part) != std::string::npos;
+  return count;
+}
+
+std::size_t skipped(const Plan& plan, const std::string& part, const std::string& reason) {
+  std::size_t count = 0;
+  for (const SkippedCell& cell : plan.skipped) count += cell.name.find(part) != std::string::npos && cell.reason.find(reason) != std::string::npos;
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("the plan knows what moves and what can stand below, and gives reasons") {
+  const Folder folder;
+  const Registry registry = this_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("sweep.yaml", kSweep), registry), registry);
+  if (!registry.has(Isa::avx2)) return;
+  // Of a structure that takes none below the parameter makes no cells of its own.
+  CHECK(with(plan, "trace/forest-3000/bvh8/binned_sah/") == 2);
+  CHECK(with(plan, "trace/forest-3000/two_level/binned_sah:below=bvh4/") == 2);
+  CHECK(with(plan, "trace/forest-3000/two_level/in_order:below=brute_force/") == 2);
+  CHECK(skipped(plan, "forest-3000/two_level/binned_sah:below=two_level/", "two_level over two_level: two_level stands above other structures") == 2);
+  if (find_structure("embree")) CHECK(skipped(plan, "forest-3000/two_level/", "two_level over embree: embree is a library") == 2);
+  CHECK(skipped(plan, "forest-3000/bvh4_motion/", "bvh4_motion is for moving scenes, and nothing moves") == 2);
+  CHECK(with(plan, "trace/waving_cloth-600/bvh4_motion/") == 2);
+  CHECK(skipped(plan, "waving_cloth-600/bvh8/", "bvh8 holds one moment, and the scene moves") == 2);
+  CHECK(skipped(plan, "waving_cloth-600/two_level/", "two_level holds one moment, and the scene moves") > 0);
+}
+
+TEST_CASE("both are measured, journalled, resumed and written as CSV") {
+  const Folder folder;
+  const Registry registry = this_registry();
+  if (!registry.has(Isa::avx2)) return;
+  const Experiment experiment = read_experiment(folder.write("sweep.yaml", kSweep), registry);
+  const Plan plan = make_plan(experiment, registry);
+  RunOutcome outcome;
+  {
+    Journal journal(folder.path(), "hash", plan, false);
+    outcome = run_plan(experiment, plan, registry, journal, {});
+  }
+  CHECK(outcome.error.empty());
+  CHECK(outcome.failed.empty());
+  REQUIRE(outcome.results.size() == plan.cells.size());
+  std::size_t traced = 0;
+  for (const CellResult& result : outcome.results) {
+    INFO(result.cell.name());
+    CHECK(result.repetitions.size() >= 2);
+    CHECK(result.fact("bytes") > 0);
+    CHECK(result.fact("sah_cost") > 0);
+    if (!result.is_trace()) continue;
+    ++traced;
+    CHECK(result.fact("hits") > 50);
+    CHECK(result.fact("wrong_answers") == 0);
+    CHECK(result.fact("cracks") == 0);
+    CHECK(result.fact("triangles_per_ray") > 0);
+  }
+  CHECK(traced == 8);
+  const std::string csv = results_csv(outcome);
+  CHECK(csv.find("bvh4_motion") != std::string::npos);
+  CHECK(csv.find("in_order:below=brute_force") != std::string::npos);
+  Journal again(folder.path(), "hash", plan, true);
+  CHECK(again.done().size() == plan.cells.size());
+}
