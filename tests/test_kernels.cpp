@@ -189,7 +189,7 @@ TEST_CASE("every way of traversal gives the single ray's answers, bit for bit") 
       }
     }
   }
-  CHECK(traversals.count("queued") == 1);
+  CHECK(traversals.count("queued") == (find_structure("bvh8") ? 1u : 0u));
 }
 
 TEST_CASE("watertight with padded boxes has no crack in a closed mesh") {
