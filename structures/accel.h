@@ -29,9 +29,9 @@ struct BuilderParameters {
   unsigned max_leaf_blocks = 4;   ///< leaf blocks in a leaf at most, 1 .. 7
   unsigned morton_bits = 63;      ///< morton, ploc: bits of a code, 30 or 63
   unsigned ploc_radius = 16;      ///< ploc: neighbours looked at on each side, 1 .. 128
-  float duplication_budget = 0.5f;  ///< spatial_sah: references added at most, as a share of the triangles, 0 .. 4
-  float spatial_overlap = 1e-5f;  ///< spatial_sah: tries a spatial split where the children's overlap is above this share of the root's area
-  float spatial_gain = 0.8f;      ///< spatial_sah: takes it where it costs less than this times the object split
+  float duplication_budget = 0.75f;  ///< spatial_sah: references added at most, as a share of the triangles, 0 .. 4
+  float spatial_overlap = 1e-5f;  ///< spatial_sah: least overlap of an object split for a spatial one to be tried, and least area that a reference more must save: shares of the root's area
+  float spatial_gain = 0.8f;      ///< spatial_sah: a share x of references more must lower the estimated cost by (1 - this) x, 0.01 .. 1
   unsigned reinsertion_rounds = 4;  ///< builders that end in _reinsertion: passes over the tree, 1 .. 64
   float empty_bonus = 0.2f;       ///< kdtree: share of the cost taken off a split that cuts away empty space, 0 .. 0.95
   unsigned max_depth = 0;         ///< kdtree, octree: deepest leaf; 0: 8 + 1.3 log2 n for the kdtree, 21 for the octree
