@@ -102,13 +102,12 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
 /// Rays in flight at most.
 inline constexpr unsigned kMostInFlight = 64;
 
-template <int N, class Block, class Intersector, bool Padded, class Counting, bool AnyHit>
+template <int N, class Block, class Intersector, bool Padded, bool AnyHit>
 class Queued {
  public:
   /// `in_flight`: 1 to kMostInFlight.
-  Queued(const bvh::BvhBase& tree, RayBatch rays, unsigned in_flight, Counting counting)
+  Queued(const bvh::BvhBase& tree, RayBatch rays, unsigned in_flight)
       : in_flight_(in_flight), base_(tree.base()), vertices_(tree.vertices()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), rays_(rays),
-        counting_(counting),
         stride_(((tree.stack_entries() + 6 + 7) / 8 | 1) * 8), stacks_(stride_ * in_flight) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
@@ -207,7 +206,6 @@ class Queued {
       const std::byte* node = base_ + bvh::offset_of(steps[i].target);
       F entry;
       const unsigned hit = BoxLanes<N, Padded>(s.box).test(node, F(s.first), F(s.best.t), entry);
-      if constexpr (Counting::kCounting) SingleRay<SoaNodeTest<N, Padded>, Block, Intersector, Counting>::count_node(counting_, node, hit);
       push<N>(reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float)), entry, hit, s.top);
       tails.route(steps[i].slot, pop(s));
     }
@@ -220,7 +218,6 @@ class Queued {
       State& s = state(step.slot);
       const auto* block = reinterpret_cast<const Block*>(base_ + bvh::offset_of(step.target));
       const Block* const end = block + bvh::block_count(step.target);
-      if constexpr (Counting::kCounting) SingleRay<SoaNodeTest<N, Padded>, Block, Intersector, Counting>::count_leaf(counting_, block, end);
       bool changed = false;
       do {
         if constexpr (AnyHit) {
@@ -247,7 +244,6 @@ class Queued {
   const bvh::NodeReference root_;
   const float max_coordinate_;
   const RayBatch rays_;
-  Counting counting_;
   std::size_t next_ = 0;
   const std::size_t stride_;
   std::vector<StackEntry> stacks_;
@@ -257,18 +253,16 @@ class Queued {
   alignas(64) std::byte states_[kMostInFlight * sizeof(State)];
 };
 
-template <int N, class Block, class Intersector, bool Padded, class Counting>
-void queued_closest_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<Hit> hits, Counters* c) {
-  Queued<N, Block, Intersector, Padded, Counting, false> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight, Counting(c));
+template <int N, class Block, class Intersector, bool Padded>
+void queued_closest_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<Hit> hits) {
+  Queued<N, Block, Intersector, Padded, false> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight);
   queued.run([&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-  if constexpr (Counting::kCounting) c->rays += rays.size();
 }
 
-template <int N, class Block, class Intersector, bool Padded, class Counting>
-void queued_any_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded, Counters* c) {
-  Queued<N, Block, Intersector, Padded, Counting, true> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight, Counting(c));
+template <int N, class Block, class Intersector, bool Padded>
+void queued_any_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded) {
+  Queued<N, Block, Intersector, Padded, true> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight);
   queued.run([&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-  if constexpr (Counting::kCounting) c->rays += rays.size();
 }
 
 /// `Closest` and `Any` rays in flight for the two kinds of query: one function serves all.
@@ -276,10 +270,11 @@ template <int N, unsigned Closest, unsigned Any = Closest>
 struct BvhQueued {
   template <class Block, class Intersector, bool Padded>
   struct Maker {
-    static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { queued_closest_hit<N, Block, Intersector, Padded, NoCounters>(a, r, Closest, h, c); }
-    static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { queued_any_hit<N, Block, Intersector, Padded, NoCounters>(a, r, Any, h, c); }
-    static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { queued_closest_hit<N, Block, Intersector, Padded, WithCounters>(a, r, Closest, h, c); }
-    static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { queued_any_hit<N, Block, Intersector, Padded, WithCounters>(a, r, Any, h, c); }
+    static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters*) { queued_closest_hit<N, Block, Intersector, Padded>(a, r, Closest, h); }
+    static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters*) { queued_any_hit<N, Block, Intersector, Padded>(a, r, Any, h); }
+    // A ray visits the same nodes and leaves in the same order as alone, so the single rays' counting kernels count for it (compile time).
+    static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<SoaNodeTest<N, Padded>, Block, Intersector, WithCounters>(a, r, h, c); }
+    static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<SoaNodeTest<N, Padded>, Block, Intersector, WithCounters>(a, r, h, c); }
   };
 };
 

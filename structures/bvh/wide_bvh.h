@@ -14,7 +14,7 @@
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
 #include "structures/bvh/wide_refit.h"
-#include "structures/leaves/blocks.h"
+#include "structures/leaves/leaf_form.h"
 
 namespace arboretum::bvh {
 
@@ -28,13 +28,13 @@ template <class Format>
 }
 
 /// Writes the wide tree into the arena: a node, then its leaves, then its inner children's subtrees.
-template <class Format, class Block>
+template <class Format>
 class Emitter {
  public:
   using Node = typename Format::Node;
 
-  Emitter(const TriangleMesh& mesh, const BinaryTree& tree, const Collapse& collapse, std::byte* base)
-      : mesh_(mesh), boxes_(mesh), tree_(tree), collapse_(collapse), base_(base) {}
+  Emitter(const TriangleMesh& mesh, const LeafForm& form, const BinaryTree& tree, const Collapse& collapse, std::byte* base)
+      : mesh_(mesh), boxes_(mesh), form_(form), tree_(tree), collapse_(collapse), base_(base) {}
 
   /// Returns the depth of the deepest leaf below.
   unsigned subtree(std::uint32_t index, std::size_t offset) const {
@@ -80,7 +80,7 @@ class Emitter {
       boxes_.prefetch_vertices(tree_.primitives[std::min(i + kAhead, last)]);
     }
     LeafPrimitives room;
-    fill_blocks(reinterpret_cast<Block*>(base_ + offset), mesh_, collapse_.primitives(index, room));
+    form_.fill(base_ + offset, mesh_, collapse_.primitives(index, room));
   }
 
   [[nodiscard]] NodeReference reference(std::uint32_t index, std::size_t offset) const {
@@ -92,6 +92,7 @@ class Emitter {
 
   const TriangleMesh& mesh_;
   const TriangleBoxes boxes_;
+  const LeafForm& form_;
   const BinaryTree& tree_;
   const Collapse& collapse_;
   std::byte* base_;
@@ -104,7 +105,7 @@ const StructureInfo& WideBvh<Format>::static_info() {
     i.name = kName;
     i.summary = Format::kSummary;
     i.builders = binary_builder_names();
-    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    for (const LeafForm& form : leaf_forms()) i.leaves.push_back(form.name);
     return i;
   }();
   return info;
@@ -120,43 +121,43 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   if (p.collapse != "optimal" && p.collapse != "greedy") throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
   if (mesh.size() >= (1u << 30)) throw UserError(std::string(kName) + " takes at most 2^30 - 1 triangles");
 
-  const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
-    BinaryTree tree;
-    build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
+  const LeafForm* form = find_leaf_form(settings.leaf);
+  if (!form) throw UserError(std::string(kName) + " has no leaf '" + settings.leaf + "'");
 
-    double start = wall_seconds();
-    const Collapse collapse(tree, {unsigned(kBranching), unsigned(Block::kWidth), p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
-                                   p.collapse == "optimal", sizeof(typename Format::Node), sizeof(Block), Format::kGranule});
-    report.phases.emplace_back("collapse", wall_seconds() - start);
+  BinaryTree tree;
+  build_binary_tree(mesh, settings, form->width, tree, report);
 
-    start = wall_seconds();
-    leaf_ = settings.leaf;
-    if (mesh.size() == 0) {  // a node without children: every ray misses
-      arena_ = Arena(round_up<Format>(sizeof(typename Format::Node)));
-      Format::write(*new (arena_.data()) typename Format::Node, nullptr, nullptr, 0);
-      root_ = 0, stack_entries_ = 2 * kBranching;
-      set_scene(mesh, {});
-      return;
-    }
-    const std::uint64_t bytes = collapse.bytes(0);
-    if (bytes > std::numeric_limits<NodeReference>::max()) {
-      throw UserError(std::string(kName) + " with " + settings.leaf + " would take " + std::to_string(bytes >> 20) +
-                      " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
-    }
-    arena_ = Arena(bytes);
-    const Emitter<Format, Block> emitter(mesh, tree, collapse, arena_.data());
-    root_ = emitter.reference(0, 0);
-    unsigned depth = 0;
-    if (is_leaf(root_)) {
-      emitter.leaf(0, 0);
-    } else {
-      depth = emitter.subtree(0, 0);
-    }
-    stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
-    set_scene(mesh, {tree.nodes[0].lower, tree.nodes[0].upper});
-    report.phases.emplace_back("leaves", wall_seconds() - start);
-  });
-  if (!known) throw UserError(std::string(kName) + " has no leaf '" + settings.leaf + "'");
+  double start = wall_seconds();
+  const Collapse collapse(tree, {unsigned(kBranching), form->width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
+                                 p.collapse == "optimal", sizeof(typename Format::Node), form->bytes, Format::kGranule});
+  report.phases.emplace_back("collapse", wall_seconds() - start);
+
+  start = wall_seconds();
+  leaf_ = settings.leaf;
+  if (mesh.size() == 0) {  // a node without children: every ray misses
+    arena_ = Arena(round_up<Format>(sizeof(typename Format::Node)));
+    Format::write(*new (arena_.data()) typename Format::Node, nullptr, nullptr, 0);
+    root_ = 0, stack_entries_ = 2 * kBranching;
+    set_scene(mesh, {});
+    return;
+  }
+  const std::uint64_t bytes = collapse.bytes(0);
+  if (bytes > std::numeric_limits<NodeReference>::max()) {
+    throw UserError(std::string(kName) + " with " + settings.leaf + " would take " + std::to_string(bytes >> 20) +
+                    " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
+  }
+  arena_ = Arena(bytes);
+  const Emitter<Format> emitter(mesh, *form, tree, collapse, arena_.data());
+  root_ = emitter.reference(0, 0);
+  unsigned depth = 0;
+  if (is_leaf(root_)) {
+    emitter.leaf(0, 0);
+  } else {
+    depth = emitter.subtree(0, 0);
+  }
+  stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
+  set_scene(mesh, {tree.nodes[0].lower, tree.nodes[0].upper});
+  report.phases.emplace_back("leaves", wall_seconds() - start);
 }
 
 template <class Format>
@@ -166,28 +167,26 @@ bool WideBvh<Format>::visit(StructureVisitor& visitor) const {
     Bounds3f bounds;
     unsigned depth;
   };
-  with_block(leaf_, [&]<class Block>(std::type_identity<Block>) {
-    std::vector<Entry> stack{{root_, bounds_, 0}};
-    std::vector<std::uint32_t> primitives;
-    while (!stack.empty()) {
-      const Entry e = stack.back();
-      stack.pop_back();
-      const std::byte* at = base() + offset_of(e.reference);
-      if (bvh::is_leaf(e.reference)) {
-        const auto* block = reinterpret_cast<const Block*>(at);
-        const unsigned blocks = block_count(e.reference);
-        primitives.clear();
-        append_primitives(block, blocks, primitives);
-        visitor.leaf({e.bounds, primitives, e.depth, blocks, unsigned(Block::kWidth), round_up<Format>(blocks * sizeof(Block))});
-        continue;
-      }
-      Bounds3f boxes[kMaxBranching];
-      NodeReference references[kMaxBranching];
-      const unsigned count = Format::read(*reinterpret_cast<const typename Format::Node*>(at), boxes, references);
-      visitor.node({e.bounds, {boxes, count}, e.depth, round_up<Format>(sizeof(typename Format::Node))});
-      for (unsigned i = count; i-- > 0;) stack.push_back({references[i], boxes[i], e.depth + 1});
+  const LeafForm* form = find_leaf_form(leaf_);
+  std::vector<Entry> stack{{root_, bounds_, 0}};
+  std::vector<std::uint32_t> primitives;
+  while (!stack.empty()) {
+    const Entry e = stack.back();
+    stack.pop_back();
+    const std::byte* at = base() + offset_of(e.reference);
+    if (bvh::is_leaf(e.reference)) {
+      const unsigned blocks = block_count(e.reference);
+      primitives.clear();
+      form->append(at, blocks, primitives);
+      visitor.leaf({e.bounds, primitives, e.depth, blocks, form->width, round_up<Format>(blocks * form->bytes)});
+      continue;
     }
-  });
+    Bounds3f boxes[kMaxBranching];
+    NodeReference references[kMaxBranching];
+    const unsigned count = Format::read(*reinterpret_cast<const typename Format::Node*>(at), boxes, references);
+    visitor.node({e.bounds, {boxes, count}, e.depth, round_up<Format>(sizeof(typename Format::Node))});
+    for (unsigned i = count; i-- > 0;) stack.push_back({references[i], boxes[i], e.depth + 1});
+  }
   return true;
 }
 

@@ -5,25 +5,26 @@
 #include <bit>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
-#include "structures/leaves/blocks.h"
+#include "structures/leaves/leaf_form.h"
 
 namespace arboretum::bvh {
 
-template <class Format, class Block>
+template <class Format>
 class Refitter {
  public:
-  Refitter(const TriangleMesh& mesh, std::byte* base) : mesh_(mesh), base_(base) {}
+  Refitter(const TriangleMesh& mesh, const LeafForm& form, std::byte* base) : mesh_(mesh), form_(form), base_(base) {}
 
   /// The new box of what is below `reference`.
   Bounds3f subtree(NodeReference reference, unsigned depth) const {
     std::byte* const at = base_ + offset_of(reference);
-    if (is_leaf(reference)) return leaf(reinterpret_cast<Block*>(at), block_count(reference));
+    if (is_leaf(reference)) return leaf(at, block_count(reference));
     auto& node = *reinterpret_cast<typename Format::Node*>(at);
     Bounds3f boxes[kMaxBranching];
     NodeReference references[kMaxBranching] = {};
@@ -44,19 +45,21 @@ class Refitter {
   /// So many levels make some 256 tasks.
   static constexpr unsigned kForkLevels = 8 / unsigned(std::bit_width(unsigned(Format::kBranching)) - 1);
 
-  Bounds3f leaf(Block* block, unsigned blocks) const {
+  /// Block by block, since any of a leaf's blocks may have empty lanes.
+  Bounds3f leaf(std::byte* at, unsigned blocks) const {
     Bounds3f box;
-    for (Block* const end = block + blocks; block != end; ++block) {
-      std::uint32_t ids[std::size_t(Block::kWidth)];
-      const auto count = std::size_t(triangles_in(*block));
-      std::copy_n(block->id, count, ids);
-      for (std::size_t i = 0; i < count; ++i) box.extend(mesh_.bounds(ids[i]));
-      fill_block(*block, mesh_, {ids, count});
+    std::vector<std::uint32_t> ids;
+    for (unsigned b = 0; b < blocks; ++b, at += form_.bytes) {
+      ids.clear();
+      form_.append(at, 1, ids);
+      for (const std::uint32_t id : ids) box.extend(mesh_.bounds(id));
+      form_.fill(at, mesh_, ids);
     }
     return box;
   }
 
   const TriangleMesh& mesh_;
+  const LeafForm& form_;
   std::byte* base_;
 };
 
@@ -67,9 +70,7 @@ void WideBvh<Format>::refit(const TriangleMesh& mesh) {
                     std::to_string(mesh.size()) + "; build it anew");
   }
   require_finite(mesh);
-  with_block(leaf_, [&]<class Block>(std::type_identity<Block>) {
-    set_scene(mesh, Refitter<Format, Block>(mesh, arena_.data()).subtree(root_, 0));
-  });
+  set_scene(mesh, Refitter<Format>(mesh, *find_leaf_form(leaf_), arena_.data()).subtree(root_, 0));
 }
 
 }  // namespace arboretum::bvh
