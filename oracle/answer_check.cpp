@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "oracle/exact_predicate.h"
+#include "core/exact/exact_predicate.h"
 
 namespace arboretum {
 namespace {

@@ -8,7 +8,7 @@
 #include <mutex>
 
 #include "oracle/answer_check.h"
-#include "oracle/exact_predicate.h"
+#include "core/exact/exact_predicate.h"
 #include "oracle/search_tree.h"
 
 namespace arboretum {

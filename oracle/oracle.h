@@ -19,7 +19,7 @@
 
 namespace arboretum {
 
-struct DecisionCounts;  // oracle/exact_predicate.h
+struct DecisionCounts;  // core/exact/exact_predicate.h
 
 /// The exact answer of one closest-hit ray. `hit`: t, u, v rounded from the exact values to float32, and the
 /// lowest id of those at the exact nearest t. `t` as a double has a relative error of at most 2^-50.

@@ -11,7 +11,7 @@
 
 #include "core/mesh.h"
 #include "core/ray.h"
-#include "oracle/exact_integer.h"
+#include "core/exact/exact_integer.h"
 
 namespace arboretum {
 

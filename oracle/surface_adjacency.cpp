@@ -5,7 +5,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "oracle/determinant.h"
+#include "core/exact/determinant.h"
 
 namespace arboretum {
 namespace {

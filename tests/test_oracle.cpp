@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "oracle/exact_predicate.h"
+#include "core/exact/exact_predicate.h"
 #include "tests/catch.h"
 #include "tests/hard_cases.h"
 #include "tests/rational_brute_force.h"

@@ -11,9 +11,9 @@
 #include <cstdint>
 
 #include "core/ray.h"
-#include "oracle/determinant.h"
-#include "oracle/double_double.h"
-#include "oracle/exact_integer.h"
+#include "core/exact/determinant.h"
+#include "core/exact/double_double.h"
+#include "core/exact/exact_integer.h"
 
 namespace arboretum {
 

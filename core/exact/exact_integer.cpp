@@ -1,4 +1,4 @@
-#include "oracle/exact_integer.h"
+#include "core/exact/exact_integer.h"
 
 #include <algorithm>
 #include <bit>
@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "oracle/determinant.h"
+#include "core/exact/determinant.h"
 
 namespace arboretum {
 namespace {

@@ -11,7 +11,7 @@
 //
 // In double-doubles the differences are exact, five operations remain, each within 10 * 2^-106: 6 * 5.01 * 10
 // * 2^-106 < 2^-97.
-#include "oracle/exact_predicate.h"
+#include "core/exact/exact_predicate.h"
 
 #include <algorithm>
 #include <cmath>
