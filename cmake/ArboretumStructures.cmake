@@ -47,6 +47,21 @@ macro(arboretum_split_record prefix record)
   string(REPLACE "," ";" ${prefix}_types "${${prefix}_types}")
 endmacro()
 
+# Compile options of a generated unit for an instruction set.
+function(arboretum_kernel_options unit isa)
+  # GCC's own AVX-512 headers set off -Wmaybe-uninitialized.
+  set(options "-Wno-uninitialized;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
+  # The scalar kernels are the reference, not a race: unrolling their lane loops would cost a minute of compile time each.
+  # Units of ISAs with FMA are scheduled for the machines that have it (2 to 3 % on incoherent rays); tuning uses no
+  # instruction that the pragma does not allow.
+  if(isa MATCHES "^avx")
+    list(APPEND options "-mtune=haswell")
+  elseif(isa STREQUAL "scalar")
+    list(APPEND options "$<$<CONFIG:Release>:-O1>")
+  endif()
+  set_source_files_properties(${unit} PROPERTIES GENERATED ON COMPILE_OPTIONS "${options}")
+endfunction()
+
 function(arboretum_kernel_units out folder)
   set(units "")
   foreach(record IN LISTS ARGN)
@@ -71,17 +86,7 @@ void ${function}(KernelRows& rows);
 void ${function}(KernelRows& rows) { add_kernels(std::type_identity<${s_folder}::${type}>{}, rows); }
 }  // namespace arboretum::isa_${isa}
 ")
-        # GCC's own AVX-512 headers set off -Wmaybe-uninitialized.
-        set(options "-Wno-uninitialized;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
-        # The scalar kernels are the reference, not a race: unrolling their lane loops would cost a minute of compile time each.
-        # Units of ISAs with FMA are scheduled for the machines that have it (2 to 3 % on incoherent rays); tuning uses no
-        # instruction that the pragma does not allow.
-        if(isa MATCHES "^avx")
-          list(APPEND options "-mtune=haswell")
-        elseif(isa STREQUAL "scalar")
-          list(APPEND options "$<$<CONFIG:Release>:-O1>")
-        endif()
-        set_source_files_properties(${unit} PROPERTIES GENERATED ON COMPILE_OPTIONS "${options}")
+        arboretum_kernel_options(${unit} ${isa})
         list(APPEND units ${unit})
       endforeach()
     endforeach()
@@ -115,7 +120,7 @@ function(arboretum_registry file)
   arboretum_write("${file}"
 "// Made by cmake/ArboretumStructures.cmake: the structures of this executable and their kernels.
 #include \"structures/registry.h\"
-#include \"traversal/kernel_rows.h\"
+#include \"traversal/kernel_table.h\"
 ${includes}
 namespace arboretum {
 ${declarations}

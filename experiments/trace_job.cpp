@@ -46,11 +46,11 @@ void TraceJob::trace(std::size_t rays) const {
 Counters TraceJob::count() const {
   Counters counters;
   const RayBatch rays = workload_.batch();
-  if (workload_.query == Query::closest_hit && cell_.kernel->count_closest_hit) {
-    cell_.kernel->count_closest_hit(accel_, rays, std::span(buffers_.hits).first(rays.size()), &counters);
+  if (workload_.query == Query::closest_hit && cell_.kernel->counts()) {
+    cell_.kernel->closest_hit(accel_, rays, std::span(buffers_.hits).first(rays.size()), &counters);
     counters.rays = rays.size();
-  } else if (workload_.query == Query::any_hit && cell_.kernel->count_any_hit) {
-    cell_.kernel->count_any_hit(accel_, rays, std::span(buffers_.occluded).first(rays.size()), &counters);
+  } else if (workload_.query == Query::any_hit && cell_.kernel->counts()) {
+    cell_.kernel->any_hit(accel_, rays, std::span(buffers_.occluded).first(rays.size()), &counters);
     counters.rays = rays.size();
   }
   return counters;

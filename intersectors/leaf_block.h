@@ -1,5 +1,14 @@
-// One ray against one leaf block: the intersector's lanes, the ray's interval, and the rule that among equal t the
+// One ray against leaf blocks: the intersector's lanes, the ray's interval, and the rule that among equal t the
 // lowest primitive id wins.
+//
+// An intersector is a struct with
+//   kName; kNeedsVertices: cannot read blocks of edges; kEveryLeaf: compiled for every block that it can read, else for the usual ones;
+//   RayData(ray): what it keeps for one ray, PreparedRay::kBytes at most;
+//   intersect(const RayData&, const Block&, TriangleHits<W>&): the lanes whose closed triangle the ray's line meets.
+// It may have
+//   finish(RayData&, NearestHit&): the search is over, and this is its hit. Without it RayData never changes;
+//   accept(RayData&, const Block&, lane): that lane has become the nearest hit;
+//   closest_hit_block(RayData&, const Block&, tnear, NearestHit&) and any_hit_block(RayData&, const Block&, tnear, tfar): instead of those below.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -15,14 +24,6 @@ ARBORETUM_INLINE bool is_valid_in_lanes(const Ray& ray) {
   const unsigned nonzero = (direction_tfar != vf<4>(0.0f)).bits() & 7u;
   return (finite == 7u) & (nonzero != 0) & (ray.tnear <= ray.tfar);
 }
-
-/// The nearest hit so far. `primitive` is INT_MAX while there is none, so that a hit at exactly tfar still counts.
-struct NearestHit {
-  static constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
-  float t;
-  float u = 0.0f, v = 0.0f;
-  std::int32_t primitive = kNone;
-};
 
 /// What a batch reports for a ray.
 ARBORETUM_INLINE Hit to_hit(const NearestHit& best) {
@@ -60,42 +61,89 @@ ARBORETUM_INLINE VertexBlock<M> readable(const IndexBlock<M>& block, const Vec3f
   return out;
 }
 
+template <class Intersector>
+inline constexpr bool kFinishes = requires { &Intersector::finish; };
+
+template <class Intersector, bool Changes = kFinishes<Intersector>>
+struct RayDataFor {
+  using Type = const typename Intersector::RayData;
+};
+template <class Intersector>
+struct RayDataFor<Intersector, true> {
+  using Type = typename Intersector::RayData;
+};
+/// Constant where it can be: what is written elsewhere then cannot change it, and it stays in registers.
+template <class Intersector>
+using RayDataOf = typename RayDataFor<Intersector>::Type;
+
 template <class Intersector, class Block>
-ARBORETUM_INLINE bool closest_hit_block(const typename Intersector::RayData& ray, const Block& block, float tnear, NearestHit& best) {
-  constexpr int W = Block::kWidth;
-  TriangleHits<W> hits;
-  vm<W> m = Intersector::intersect(ray, block, hits);
-  if (none(m)) return false;
-  const vi<W> id = vi<W>::load(block.id);
-  m = m & (hits.t >= vf<W>(tnear)) & ((hits.t < vf<W>(best.t)) | ((hits.t == vf<W>(best.t)) & (id < vi<W>(best.primitive))));
-  unsigned bits = m.bits();
-  if (!bits) return false;
-  if (bits & (bits - 1)) {
-    const vf<W> t = select(m, hits.t, vf<W>(std::numeric_limits<float>::infinity()));
-    unsigned nearest = (m & (t == vf<W>(reduce_min(t)))).bits();
-    bits = nearest & (0u - nearest);
-    for (nearest &= nearest - 1; nearest; nearest &= nearest - 1) {  // equal t: the lowest id
-      if (block.id[__builtin_ctz(nearest)] < block.id[__builtin_ctz(bits)]) bits = nearest & (0u - nearest);
+ARBORETUM_INLINE bool closest_hit_block(RayDataOf<Intersector>& ray, const Block& block, float tnear, NearestHit& best) {
+  if constexpr (requires { Intersector::closest_hit_block(ray, block, tnear, best); }) {
+    return Intersector::closest_hit_block(ray, block, tnear, best);
+  } else {
+    constexpr int W = Block::kWidth;
+    TriangleHits<W> hits;
+    vm<W> m = Intersector::intersect(ray, block, hits);
+    if (none(m)) return false;
+    const vi<W> id = vi<W>::load(block.id);
+    m = m & (hits.t >= vf<W>(tnear)) & ((hits.t < vf<W>(best.t)) | ((hits.t == vf<W>(best.t)) & (id < vi<W>(best.primitive))));
+    unsigned bits = m.bits();
+    if (!bits) return false;
+    if (bits & (bits - 1)) {
+      const vf<W> t = select(m, hits.t, vf<W>(std::numeric_limits<float>::infinity()));
+      unsigned nearest = (m & (t == vf<W>(reduce_min(t)))).bits();
+      bits = nearest & (0u - nearest);
+      for (nearest &= nearest - 1; nearest; nearest &= nearest - 1) {  // equal t: the lowest id
+        if (block.id[__builtin_ctz(nearest)] < block.id[__builtin_ctz(bits)]) bits = nearest & (0u - nearest);
+      }
     }
+    const int lane = __builtin_ctz(bits);
+    alignas(64) float t[W], u[W], v[W], den[W];
+    hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(den);
+    best.t = t[lane];
+    best.u = u[lane] / den[lane];
+    best.v = v[lane] / den[lane];
+    best.primitive = static_cast<std::int32_t>(block.id[lane]);
+    if constexpr (requires { Intersector::accept(ray, block, lane); }) Intersector::accept(ray, block, lane);
+    return true;
   }
-  const int lane = __builtin_ctz(bits);
-  alignas(64) float t[W], u[W], v[W], den[W];
-  hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(den);
-  best.t = t[lane];
-  best.u = u[lane] / den[lane];
-  best.v = v[lane] / den[lane];
-  best.primitive = static_cast<std::int32_t>(block.id[lane]);
-  return true;
 }
 
 template <class Intersector, class Block>
-ARBORETUM_INLINE bool any_hit_block(const typename Intersector::RayData& ray, const Block& block, float tnear, float tfar) {
-  constexpr int W = Block::kWidth;
-  TriangleHits<W> hits;
-  const vm<W> m = Intersector::intersect(ray, block, hits);
-  if (none(m)) return false;
-  return any(m & (hits.t >= vf<W>(tnear)) & (hits.t <= vf<W>(tfar)));
+ARBORETUM_INLINE bool any_hit_block(RayDataOf<Intersector>& ray, const Block& block, float tnear, float tfar) {
+  if constexpr (requires { Intersector::any_hit_block(ray, block, tnear, tfar); }) {
+    return Intersector::any_hit_block(ray, block, tnear, tfar);
+  } else {
+    constexpr int W = Block::kWidth;
+    TriangleHits<W> hits;
+    const vm<W> m = Intersector::intersect(ray, block, hits);
+    if (none(m)) return false;
+    return any(m & (hits.t >= vf<W>(tnear)) & (hits.t <= vf<W>(tfar)));
+  }
 }
+
+/// The functions of LeafTests.
+template <class Intersector, class Block>
+struct BlockTests {
+  using RayData = RayDataOf<Intersector>;
+
+  static ARBORETUM_INLINE bool closest_hit(RayData& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, NearestHit& best) {
+    const auto* block = reinterpret_cast<const Block*>(blocks);
+    const Block* const end = block + count;
+    bool changed = false;
+    do changed |= closest_hit_block<Intersector>(ray, readable(*block, vertices), tnear, best);
+    while (++block != end);
+    return changed;
+  }
+  static ARBORETUM_INLINE bool any_hit(RayData& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, float tfar) {
+    const auto* block = reinterpret_cast<const Block*>(blocks);
+    const Block* const end = block + count;
+    do {
+      if (any_hit_block<Intersector>(ray, readable(*block, vertices), tnear, tfar)) return true;
+    } while (++block != end);
+    return false;
+  }
+};
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -11,6 +11,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 struct MollerTrumbore {
   static constexpr std::string_view kName = "moller_trumbore";
   static constexpr bool kNeedsVertices = false;
+  static constexpr bool kEveryLeaf = true;
 
   /// One ray's constants.
   struct RayData {

@@ -12,6 +12,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 struct Pluecker {
   static constexpr std::string_view kName = "pluecker";
   static constexpr bool kNeedsVertices = true;
+  static constexpr bool kEveryLeaf = false;
 
   struct RayData {
     Vec3f origin, direction;

@@ -59,7 +59,7 @@ class Structures {
 [[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel,
                                                   std::span<const Ray> rays, Counters* counters = nullptr) {
   std::vector<Hit> hits(rays.size(), Hit{std::numeric_limits<float>::quiet_NaN(), 0, 0, 0xdeadbeefu});
-  (counters ? row.count_closest_hit : row.closest_hit)(accel, rays, hits, counters);
+  row.closest_hit(accel, rays, hits, counters);
   return hits;
 }
 
@@ -67,7 +67,7 @@ class Structures {
                                                        std::span<const Ray> rays,
                                                        Counters* counters = nullptr) {
   std::vector<std::uint8_t> occluded(rays.size(), 0xee);
-  (counters ? row.count_any_hit : row.any_hit)(accel, rays, occluded, counters);
+  row.any_hit(accel, rays, occluded, counters);
   return occluded;
 }
 

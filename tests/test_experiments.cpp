@@ -56,8 +56,8 @@ std::vector<KernelRow> paper_kernels() {
       for (std::string_view box : {"fast", "padded"})
         for (std::string_view leaf : {"triangle4", "triangle8"})
           for (std::string_view traversal : {"single", "packet4", "packet8", "packet16"})
-            rows.push_back({"tree", leaf, intersector, box, traversal, isa});
-    rows.push_back({"list", "triangle4", "moller_trumbore", "fast", "single", isa});
+            rows.push_back({.structure = "tree", .leaf = leaf, .intersector = intersector, .box = box, .traversal = traversal, .isa = isa});
+    rows.push_back({.structure = "list", .leaf = "triangle4", .intersector = "moller_trumbore", .box = "fast", .traversal = "single", .isa = isa});
   }
   return rows;
 }

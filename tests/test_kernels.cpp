@@ -112,7 +112,7 @@ TEST_CASE("any hit, the counting kernels and batches of any size agree with clos
         REQUIRE(same_bits(closest_hit(row, accel, part), std::span(hits).subspan(2, size)));
         REQUIRE(std::ranges::equal(any_hit(row, accel, part), std::span(occluded).subspan(2, size)));
       }
-      if (!row.count_closest_hit) {
+      if (!row.counts()) {
         CHECK(row.structure == "embree");
         continue;
       }
@@ -232,9 +232,9 @@ TEST_CASE("the kernel table has every structure, and names each row once") {
     REQUIRE(find_structure(row.structure));
     const auto& leaves = find_structure(row.structure)->info.leaves;
     CHECK(std::ranges::find(leaves, row.leaf) != leaves.end());
-    REQUIRE(row.closest_hit);
-    REQUIRE(row.any_hit);
-    CHECK((row.count_closest_hit == nullptr) == (row.count_any_hit == nullptr));
+    REQUIRE(row.timed.closest_hit);
+    REQUIRE(row.timed.any_hit);
+    CHECK((row.counting.closest_hit == nullptr) == (row.counting.any_hit == nullptr));
     CHECK(find_kernel(row.structure, row.leaf, row.intersector, row.box, row.traversal, row.isa) == &row);
     CHECK(why_no_kernel(row.structure, row.leaf, row.intersector, row.box, row.traversal, row.isa).empty());
   }

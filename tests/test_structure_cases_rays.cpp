@@ -77,7 +77,7 @@ TEST_CASE("B19: rays of NaN and infinity miss, and visit no more than others do"
     const auto accel = combination.build(mesh);
     for (const KernelRow* row : combination.rows) {
       INFO(name_of(*row) << ", " << combination.builder);
-      if (!row->count_closest_hit) continue;
+      if (!row->counts()) continue;
       Counters usual, odd, usual_any, odd_any;
       (void)closest_hit(*row, *accel, valid, &usual), (void)any_hit(*row, *accel, valid, &usual_any);
       for (const Hit& hit : closest_hit(*row, *accel, invalid, &odd)) REQUIRE_FALSE(hit.is_hit());

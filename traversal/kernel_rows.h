@@ -1,36 +1,32 @@
-// Making rows of the kernel table from type lists: every combination of leaf block, intersector and box test for which
-// a Maker gives kernels.
+// Making rows of the kernel table: every leaf and intersector that this instruction set has tests for, with both box tests.
 #pragma once
 
 #include "core/type_list.h"
-#include "structures/leaves/blocks.h"
-#include "traversal/counting.h"
-#include "traversal/kernel_table.h"
+#include "traversal/leaves.h"
 
 namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
 
-/// Where a kernel unit puts its rows.
-using KernelRows = std::vector<KernelRow>;
-
-/// An intersector can read a block's form.
-template <class Intersector, class Block>
-concept CanRead = !Intersector::kNeedsVertices || Block::kForm != TriangleForm::edges;
-
-/// One row for each (block, intersector, box) that can be. `Maker<Block, Intersector, Padded>` has four static
-/// functions: closest_hit, any_hit, count_closest_hit, count_any_hit.
-template <template <class, class, bool> class Maker, class... Blocks, class... Intersectors>
-void add_rows(KernelRows& rows, std::string_view structure, std::string_view traversal, Isa isa, TypeList<Blocks...>, TypeList<Intersectors...>) {
-  const auto add = [&]<class Block, class Intersector, bool Padded>(std::type_identity<Block>, std::type_identity<Intersector>, Value<Padded>) {
-    if constexpr (CanRead<Intersector, Block>) {
-      using M = Maker<Block, Intersector, Padded>;
-      rows.push_back({structure, Block::kName, Intersector::kName, Padded ? "padded" : "fast", traversal, isa, &M::closest_hit,
-                      &M::any_hit, &M::count_closest_hit, &M::count_any_hit});
-    }
+/// Adds the rows of one way of traversal. `Functions` makes a row's functions:
+///   template <class Leaves, bool Padded> static RowFunctions timed();   template <bool Padded> static RowFunctions counting();
+/// `Compiled...` are the CompiledLeaves (traversal/leaves.h) that get functions of their own; all others share those of CalledLeaves.
+template <class Structure, class Functions, class... Compiled>
+void add_rows(KernelRows& rows, std::string_view traversal, TypeList<Compiled...>) {
+  const StructureInfo& info = Structure::static_info();
+  const auto add = [&]<bool Padded>(const LeafTests& tests, Value<Padded>) {
+    RowFunctions timed = Functions::template timed<CalledLeaves, Padded>();
+    [[maybe_unused]] const auto compiled = [&]<class Leaves>(std::type_identity<Leaves>) {
+      if (Leaves::Block::kName == tests.leaf && Leaves::Intersector::kName == tests.intersector) timed = Functions::template timed<Leaves, Padded>();
+    };
+    (compiled(std::type_identity<Compiled>{}), ...);
+    rows.push_back({info.name, tests.leaf, tests.intersector, Padded ? "padded" : "fast", traversal, kIsa, &tests, timed,
+                    Functions::template counting<Padded>()});
   };
-  const auto add_block = [&]<class Block>(std::type_identity<Block> block) {
-    ((add(block, std::type_identity<Intersectors>{}, Value<false>{}), add(block, std::type_identity<Intersectors>{}, Value<true>{})), ...);
-  };
-  (add_block(std::type_identity<Blocks>{}), ...);
+  for (const LeafTests& tests : leaf_tests()) {
+    if (tests.isa != kIsa || std::find(info.leaves.begin(), info.leaves.end(), tests.leaf) == info.leaves.end()) continue;
+    add(tests, Value<false>{}), add(tests, Value<true>{});
+  }
 }
 
+}  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

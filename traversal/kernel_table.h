@@ -1,7 +1,7 @@
 // The kernel table: every way of tracing rays that this build can do, one row a combination.
 //
-// Rows are made by the compiler from type lists and a concept (traversal/kernel_rows.h), one translation unit for each
-// structure and instruction set. A function pointer takes a whole batch of rays: below it all is templates.
+// Rows are made in one translation unit for each structure and instruction set (traversal/kernel_rows.h) from its ways of traversal and the
+// table of leaf tests (intersectors/leaf_tests.h). A function pointer takes a whole batch of rays: below it all is templates.
 #pragma once
 
 #include <cstddef>
@@ -17,6 +17,7 @@
 namespace arboretum {
 
 class Accel;
+struct LeafTests;
 
 /// Work done by a batch; filled by the counting kernels alone (the timed ones carry no counters).
 struct Counters {
@@ -32,19 +33,36 @@ struct Counters {
   Counters& operator+=(const Counters& o) noexcept;
 };
 
+struct KernelRow;
 /// hits[i] answers rays[i]; both spans have the same size. The structure must be of the row's structure and leaf.
-using ClosestHitFunction = void (*)(const Accel&, RayBatch rays, std::span<Hit> hits, Counters*);
+using ClosestHitFunction = void (*)(const Accel&, const KernelRow&, RayBatch rays, std::span<Hit> hits, Counters*);
 /// occluded[i] becomes 1 when anything lies within [tnear, tfar] of rays[i], else 0.
-using AnyHitFunction = void (*)(const Accel&, RayBatch rays, std::span<std::uint8_t> occluded, Counters*);
+using AnyHitFunction = void (*)(const Accel&, const KernelRow&, RayBatch rays, std::span<std::uint8_t> occluded, Counters*);
+
+struct RowFunctions {
+  ClosestHitFunction closest_hit = nullptr;
+  AnyHitFunction any_hit = nullptr;
+};
 
 struct KernelRow {
   std::string_view structure, leaf, intersector, box, traversal;
   Isa isa = Isa::scalar;
-  ClosestHitFunction closest_hit = nullptr;  ///< timed; ignores its Counters*
-  AnyHitFunction any_hit = nullptr;          ///< timed; ignores its Counters*
-  ClosestHitFunction count_closest_hit = nullptr;  ///< same answers, adds to the Counters; nullptr where none
-  AnyHitFunction count_any_hit = nullptr;
+  const LeafTests* tests = nullptr;  ///< nullptr where the structure has its own (embree)
+  RowFunctions timed{};              ///< ignore their Counters*
+  RowFunctions counting{};           ///< same answers, add to the Counters; nullptr where there are none
+
+  /// With `counters`, by the counting functions, which must be there.
+  void closest_hit(const Accel& accel, RayBatch rays, std::span<Hit> hits, Counters* counters = nullptr) const {
+    (counters ? counting : timed).closest_hit(accel, *this, rays, hits, counters);
+  }
+  void any_hit(const Accel& accel, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters = nullptr) const {
+    (counters ? counting : timed).any_hit(accel, *this, rays, occluded, counters);
+  }
+  [[nodiscard]] bool counts() const noexcept { return counting.closest_hit != nullptr; }
 };
+
+/// Where a kernel unit puts its rows.
+using KernelRows = std::vector<KernelRow>;
 
 /// Every row of this executable, those of ISAs that this machine lacks included (do not call them).
 [[nodiscard]] std::span<const KernelRow> kernel_table();

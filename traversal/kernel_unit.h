@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <span>
 #include <string_view>
 #include <type_traits>
@@ -19,10 +20,11 @@
 
 #include "core/isa.h"
 #include "core/ray.h"
+#include "core/type_list.h"
+#include "intersectors/leaf_tests.h"
 #include "structures/accel.h"
 #include "structures/leaves/blocks.h"
 #include "traversal/counting.h"
-#include "traversal/kernel_rows.h"
 #include "traversal/kernel_table.h"
 
 #include "simd/target.h"

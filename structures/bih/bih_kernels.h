@@ -5,6 +5,7 @@
 #pragma once
 
 #include "structures/leaves/leaf_kernels.h"
+#include "traversal/batch_stack.h"
 #include "traversal/box_test.h"
 
 namespace arboretum {
@@ -46,30 +47,16 @@ struct IntervalEntry {
   float low, high;
 };
 
-/// A stack for one batch: on this frame while the tree is shallow, on the heap when it is deeper.
-class IntervalStack {
- public:
-  explicit IntervalStack(const bih::Bih& tree) {
-    if (tree.stack_entries() > kInline) heap_.resize(tree.stack_entries()), data_ = heap_.data();
-  }
-  IntervalStack(const IntervalStack&) = delete;
-  IntervalStack& operator=(const IntervalStack&) = delete;
-  [[nodiscard]] IntervalEntry* data() noexcept { return data_; }
-
- private:
-  static constexpr std::size_t kInline = 128;
-  IntervalEntry inline_[kInline];
-  std::vector<IntervalEntry> heap_;
-  IntervalEntry* data_ = inline_;
+struct IntervalStack : BatchStack<IntervalEntry, 128> {
+  explicit IntervalStack(const bih::Bih& tree) : BatchStack(tree.stack_entries()) {}
 };
 
-template <class Block, class Intersector, bool Padded, class Counting>
+template <bool Padded, class Counting>
 struct BihSingle {
   using Scratch = IntervalStack;
-  template <bool AnyHit>
+  template <bool AnyHit, class Visits>
   static ARBORETUM_INLINE bool trace(const bih::Bih& tree, const Ray& ray, NearestHit& best,
-                                     Counting counting, Scratch& stack) {
-    LeafTests<Block, Intersector, AnyHit> tests(tree.leaves(), ray, best);
+                                     const Counting& counting, Scratch& stack, Visits& visits) {
     const IntervalRay<Padded> interval(ray, tree.max_coordinate());
     float low = ray.tnear, high = best.t;
     for (unsigned a = 0; a < 3; ++a) {
@@ -88,7 +75,7 @@ struct BihSingle {
         const float near_high = earlier(interval.at_end(node->clip[back], axis), high);
         const float far_low = later(interval.at_begin(node->clip[1 - back], axis), low);
         const bool near = low <= near_high, far = far_low <= high;
-        count_node(counting, 2, unsigned(near) + unsigned(far));
+        counting.node(2, 2, unsigned(near) + unsigned(far));
         const std::uint32_t first = node->first();
         if (near) {
           if (far) *top++ = {first + 1 - back, far_low, high};
@@ -100,12 +87,12 @@ struct BihSingle {
           continue;
         }
       } else if (kind == bih::Node::kLeaf) {
-        if (tests(node->code(), counting)) return true;
+        if (visits(node->code())) return true;
       } else {
         const unsigned axis = kind - bih::Node::kClip, back = interval.negative[axis];
         low = later(interval.at_begin(node->clip[back], axis), low);
         high = earlier(interval.at_end(node->clip[1 - back], axis), high);
-        count_node(counting, 1, low <= high);
+        counting.node(1, 1, low <= high);
         if (low <= high) {
           node = nodes + node->first();
           continue;
@@ -118,23 +105,10 @@ struct BihSingle {
       low = top->low, high = earlier(best.t, top->high), node = nodes + top->node;
     }
   }
-
- private:
-  static ARBORETUM_INLINE void count_node(Counting& counting, unsigned children, unsigned hit) {
-    if constexpr (Counting::kCounting) {
-      ++counting.counters.nodes;
-      counting.counters.boxes += children, counting.counters.lanes += children,
-          counting.counters.lanes_active += children;
-      counting.counters.boxes_hit += hit;
-    }
-  }
 };
 
-template <class Block, class Intersector, bool Padded>
-struct BihMaker : SingleRayMaker<bih::Bih, BihSingle, Block, Intersector, Padded> {};
-
 inline void add_kernels(std::type_identity<bih::Bih>, KernelRows& rows) {
-  add_single_rows<BihMaker>(rows, bih::Bih::kName);
+  ListedLeaves<bih::Bih, BihSingle>::add(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

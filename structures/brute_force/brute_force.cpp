@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "structures/archive.h"
+#include "structures/leaves/leaf_form.h"
 
 namespace arboretum::brute_force {
 
@@ -16,8 +17,7 @@ const StructureInfo& BruteForce::static_info() {
     i.summary = "every ray tests every triangle: the reference, for small scenes";
     i.builders = {"in_order"};
     i.uses_parameters = false;
-    for_each_type(AllBlocks{},
-                  [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    for (const LeafForm& form : leaf_forms()) i.leaves.push_back(form.name);
     return i;
   }();
   return info;
@@ -32,21 +32,18 @@ void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, 
       0x7ffffffe;  // ids are compared as int32, and INT_MAX stands for none
   if (mesh.size() > kMostTriangles)
     throw UserError("brute_force: the mesh has more than 2^31 - 2 triangles; split it");
-  const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
-    constexpr std::size_t kWidth = Block::kWidth;
-    block_width_ = kWidth;
-    block_count_ = (mesh.size() + kWidth - 1) / kWidth;
-    arena_ = Arena();
-    arena_ = Arena(block_count_ * sizeof(Block));
-    std::vector<std::uint32_t> ids(mesh.size());
-    std::iota(ids.begin(), ids.end(), 0u);
-    fill_blocks(reinterpret_cast<Block*>(arena_.data()), mesh, ids);
-  });
-  if (!known) {
-    throw UserError(
-        unknown_name_message("leaf of brute_force", settings.leaf,
-                             std::vector<std::string>(info().leaves.begin(), info().leaves.end())));
+  const LeafForm* form = find_leaf_form(settings.leaf);
+  if (!form) {
+    throw UserError(unknown_name_message("leaf of brute_force", settings.leaf,
+                                         std::vector<std::string>(info().leaves.begin(), info().leaves.end())));
   }
+  block_width_ = form->width;
+  block_count_ = unsigned((mesh.size() + form->width - 1) / form->width);
+  arena_ = Arena();
+  arena_ = Arena(block_count_ * form->bytes);
+  std::vector<std::uint32_t> ids(mesh.size());
+  std::iota(ids.begin(), ids.end(), 0u);
+  form->fill(arena_.data(), mesh, ids);
   triangles_ = mesh.size();
   bounds_ = mesh.bounds();
   vertices_ = mesh.vertices.data();
@@ -65,7 +62,7 @@ bool BruteForce::visit(StructureVisitor& visitor) const {
   visitor.leaf({.bounds = bounds_,
                 .primitives = primitives,
                 .depth = 0,
-                .blocks = unsigned(block_count_),
+                .blocks = block_count_,
                 .block_width = block_width_,
                 .bytes = arena_.bytes()});
   return true;

@@ -4,13 +4,11 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <string>
 
 #include "core/arena.h"
 #include "core/type_list.h"
 #include "structures/accel.h"
-#include "structures/leaves/blocks.h"
 
 namespace arboretum::brute_force {
 
@@ -31,16 +29,14 @@ class BruteForce final : public Accel {
   [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }
   /// The mesh's vertices, which leaf blocks of indices name.
   [[nodiscard]] const Vec3f* vertices() const noexcept { return vertices_; }
-  /// The leaf's blocks. `Block` must be the one that leaf() names.
-  template <class Block>
-  [[nodiscard]] std::span<const Block> blocks() const noexcept {
-    return {reinterpret_cast<const Block*>(arena_.data()), block_count_};
-  }
+  /// The leaf's blocks, of the form that leaf() names.
+  [[nodiscard]] const std::byte* base() const noexcept { return arena_.data(); }
+  [[nodiscard]] unsigned block_count() const noexcept { return block_count_; }
 
  private:
   Arena arena_;
-  std::size_t triangles_ = 0, block_count_ = 0;
-  unsigned block_width_ = 1;
+  std::size_t triangles_ = 0;
+  unsigned block_count_ = 0, block_width_ = 1;
   Bounds3f bounds_;
   const Vec3f* vertices_ = nullptr;
   std::string leaf_;

@@ -6,7 +6,9 @@
 // visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however many rays are in flight.
 #pragma once
 
+#include "intersectors/usual_leaves.h"
 #include "structures/bvh/bvh_single.h"
+#include "traversal/kernel_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -102,12 +104,12 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
 /// Rays in flight at most.
 inline constexpr unsigned kMostInFlight = 64;
 
-template <int N, class Block, class Intersector, bool Padded, bool AnyHit>
+template <int N, class Leaves, bool Padded, bool AnyHit>
 class Queued {
  public:
   /// `in_flight`: 1 to kMostInFlight.
-  Queued(const bvh::BvhBase& tree, RayBatch rays, unsigned in_flight)
-      : in_flight_(in_flight), base_(tree.base()), vertices_(tree.vertices()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), rays_(rays),
+  Queued(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, unsigned in_flight)
+      : in_flight_(in_flight), base_(tree.base()), leaves_(row, tree.vertices()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), rays_(rays),
         stride_(((tree.stack_entries() + 6 + 7) / 8 | 1) * 8), stacks_(stride_ * in_flight) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
@@ -120,7 +122,9 @@ class Queued {
       const unsigned done = std::exchange(counts_[2], 0u);
       for (unsigned i = 0; i < done; ++i) {
         const unsigned slot = queues_[2][i].slot;
-        report(state(slot).index, state(slot).best);
+        State& s = state(slot);
+        if constexpr (!AnyHit) leaves_.finish(s.data, s.best);
+        report(s.index, s.best);
         start(slot, report);
       }
     }
@@ -138,7 +142,10 @@ class Queued {
     StackEntry* top;
     NearestHit best;
     std::size_t index;
-    typename Intersector::RayData data;
+    typename Leaves::RayData data;
+
+    ARBORETUM_INLINE State(const Ray& ray, const Leaves& leaves, float max_coordinate, StackEntry* stack, std::size_t i)
+        : box(ray, max_coordinate), first(first_distance(ray)), tnear(ray.tnear), top(stack), best{ray.tfar}, index(i), data(leaves.prepare(ray)) {}
   };
   struct Step {
     std::uint32_t slot;
@@ -156,7 +163,7 @@ class Queued {
 
     /// Asks for the lines of the target and puts the step on the queue of its kind.
     ARBORETUM_INLINE void route(unsigned slot, bvh::NodeReference target) {
-      constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), sizeof(Block)) + 63 + 32) / 64);
+      constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead) + 63 + 32) / 64);
       const auto* at = reinterpret_cast<const char*>(q.base_ + bvh::offset_of(target));
       for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
       const Step step{slot, target};
@@ -176,8 +183,7 @@ class Queued {
       }
       StackEntry* const stack = stacks_.data() + slot * stride_;
       stack[0] = kDone;
-      new (&state(slot)) State{Box(ray, max_coordinate_), first_distance(ray), ray.tnear, stack + 1, NearestHit{ray.tfar}, next_, typename Intersector::RayData(ray)};
-      ++next_;
+      new (&state(slot)) State(ray, leaves_, max_coordinate_, stack + 1, next_++);
       Tails(*this).route(slot, root_);
       return;
     }
@@ -216,21 +222,16 @@ class Queued {
     for (unsigned i = 0; i < count; ++i) {
       const Step step = queues_[1][i];
       State& s = state(step.slot);
-      const auto* block = reinterpret_cast<const Block*>(base_ + bvh::offset_of(step.target));
-      const Block* const end = block + bvh::block_count(step.target);
-      bool changed = false;
-      do {
-        if constexpr (AnyHit) {
-          if (any_hit_block<Intersector>(s.data, readable(*block, vertices_), s.tnear, s.best.t)) {
-            s.best.primitive = 0;
-            s.top = stacks_.data() + step.slot * stride_ + 1;
-            break;
-          }
-        } else {
-          changed |= closest_hit_block<Intersector>(s.data, readable(*block, vertices_), s.tnear, s.best);
+      const std::byte* const blocks = base_ + bvh::offset_of(step.target);
+      const unsigned blocks_in_leaf = bvh::block_count(step.target);
+      if constexpr (AnyHit) {
+        if (leaves_.any_hit(s.data, blocks, blocks_in_leaf, s.tnear, s.best.t)) {
+          s.best.primitive = 0;
+          s.top = stacks_.data() + step.slot * stride_ + 1;
         }
-      } while (++block != end);
-      if (changed) drop_far(s, step.slot);
+      } else if (leaves_.closest_hit(s.data, blocks, blocks_in_leaf, s.tnear, s.best)) {
+        drop_far(s, step.slot);
+      }
       // Only nodes and ends come back to this queue's place: the steps before i are spent.
       pending_[i] = {step.slot, pop(s)};
     }
@@ -240,7 +241,7 @@ class Queued {
 
   const unsigned in_flight_;
   const std::byte* base_;
-  const Vec3f* vertices_;
+  const Leaves leaves_;
   const bvh::NodeReference root_;
   const float max_coordinate_;
   const RayBatch rays_;
@@ -253,39 +254,41 @@ class Queued {
   alignas(64) std::byte states_[kMostInFlight * sizeof(State)];
 };
 
-template <int N, class Block, class Intersector, bool Padded>
-void queued_closest_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<Hit> hits) {
-  Queued<N, Block, Intersector, Padded, false> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight);
+template <int N, class Leaves, bool Padded>
+void queued_closest_hit(const Accel& a, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<Hit> hits) {
+  Queued<N, Leaves, Padded, false> queued(static_cast<const bvh::Bvh<N>&>(a), row, rays, in_flight);
   queued.run([&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
 }
 
-template <int N, class Block, class Intersector, bool Padded>
-void queued_any_hit(const Accel& a, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded) {
-  Queued<N, Block, Intersector, Padded, true> queued(static_cast<const bvh::Bvh<N>&>(a), rays, in_flight);
+template <int N, class Leaves, bool Padded>
+void queued_any_hit(const Accel& a, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded) {
+  Queued<N, Leaves, Padded, true> queued(static_cast<const bvh::Bvh<N>&>(a), row, rays, in_flight);
   queued.run([&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
 }
 
-/// `Closest` and `Any` rays in flight for the two kinds of query: one function serves all.
+/// `Closest` and `Any` rays in flight for the two kinds of query.
 template <int N, unsigned Closest, unsigned Any = Closest>
 struct BvhQueued {
-  template <class Block, class Intersector, bool Padded>
-  struct Maker {
-    static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters*) { queued_closest_hit<N, Block, Intersector, Padded>(a, r, Closest, h); }
-    static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters*) { queued_any_hit<N, Block, Intersector, Padded>(a, r, Any, h); }
-    // A ray visits the same nodes and leaves in the same order as alone, so the single rays' counting kernels count for it (compile time).
-    static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { bvh_closest_hit<SoaNodeTest<N, Padded>, Block, Intersector, WithCounters>(a, r, h, c); }
-    static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { bvh_any_hit<SoaNodeTest<N, Padded>, Block, Intersector, WithCounters>(a, r, h, c); }
-  };
+  template <class Leaves, bool Padded>
+  static RowFunctions timed() {
+    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters*) { queued_closest_hit<N, Leaves, Padded>(a, row, rays, Closest, hits); },
+            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters*) { queued_any_hit<N, Leaves, Padded>(a, row, rays, Any, occluded); }};
+  }
+  /// A ray visits the same nodes and leaves in the same order as alone, so the single rays' counting functions count for it.
+  template <bool Padded>
+  static RowFunctions counting() {
+    return BvhSingle<SoaTests<N>::template Nodes>::Functions::template counting<Padded>();
+  }
 };
 
 /// The rows of queued traversal: `queued` with the numbers that paid most (docs/performance.md), and fixed ones.
-template <int N, class Blocks, class Intersectors>
-void add_queued_rows(KernelRows& rows, std::string_view name, Blocks blocks, Intersectors intersectors) {
-  add_rows<BvhQueued<N, 32, 64>::template Maker>(rows, name, "queued", kIsa, blocks, intersectors);
-  add_rows<BvhQueued<N, 8>::template Maker>(rows, name, "queued8", kIsa, blocks, intersectors);
-  add_rows<BvhQueued<N, 16>::template Maker>(rows, name, "queued16", kIsa, blocks, intersectors);
-  add_rows<BvhQueued<N, 32>::template Maker>(rows, name, "queued32", kIsa, blocks, intersectors);
-  add_rows<BvhQueued<N, 64>::template Maker>(rows, name, "queued64", kIsa, blocks, intersectors);
+template <int N>
+void add_queued_rows(KernelRows& rows) {
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 32, 64>>(rows, "queued", UsualLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 8>>(rows, "queued8", UsualLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 16>>(rows, "queued16", UsualLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 32>>(rows, "queued32", UsualLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 64>>(rows, "queued64", UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

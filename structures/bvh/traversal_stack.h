@@ -4,7 +4,7 @@
 // two entries (bits of t >= 0 order as integers). A popped entry that starts beyond the nearest hit is dropped.
 #pragma once
 
-#include "simd/simd.h"
+#include "traversal/batch_stack.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -64,22 +64,7 @@ ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const b
   return bvh::NodeReference(*--top);
 }
 
-/// A stack for one batch: on this frame while the tree is shallow, on the heap when it is deeper.
-class TraversalStack {
- public:
-  explicit TraversalStack(std::size_t entries) {
-    if (entries > kInline) heap_.resize(entries), data_ = heap_.data();
-  }
-  TraversalStack(const TraversalStack&) = delete;
-  TraversalStack& operator=(const TraversalStack&) = delete;
-  [[nodiscard]] StackEntry* data() noexcept { return data_; }
-
- private:
-  static constexpr std::size_t kInline = 1024;
-  StackEntry inline_[kInline];
-  std::vector<StackEntry> heap_;
-  StackEntry* data_ = inline_;
-};
+using TraversalStack = BatchStack<StackEntry, 1024>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -6,7 +6,9 @@
 #pragma once
 
 #include "simd/swizzle.h"
-#include "structures/bvh/format_kernels.h"
+#include "intersectors/usual_leaves.h"
+#include "structures/bvh/bvh_single.h"
+#include "traversal/kernel_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -63,7 +65,7 @@ struct AosNodeTest {
 };
 
 inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows) {
-  add_format_rows<AosNodeTest>(bvh4_aos::Bvh4Aos::kName, rows);
+  add_rows<bvh4_aos::Bvh4Aos, BvhSingle<AosNodeTest>::Functions>(rows, "single", UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -4,24 +4,26 @@
 // less where it is fused). Times |r| that is less than what box_test.h leaves of its pad: it needs 4 u (M + |o|)|r| of 8 u (M + |o|)|r|.
 #pragma once
 
-#include "intersectors/moller_trumbore.h"
-#include "intersectors/pluecker.h"
-#include "intersectors/watertight.h"
-#include "structures/bvh/walk_single.h"
+#include "structures/bvh/bvh_single.h"
+#include "traversal/kernel_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// One ray and a node's boxes at its time (structures/bvh/bvh_single.h).
 template <bool Padded>
-struct MovingBoxes {
-  BoxLanes<4, Padded> lanes;
+struct MovingNodeTest : SoaNodeTest<4, Padded> {
   vf<4> time;
 
-  ARBORETUM_INLINE unsigned test(const std::byte* node, vf<4> tnear, vf<4> tfar, vf<4>& entry) const {
+  ARBORETUM_INLINE MovingNodeTest(const Ray& ray, float max_coordinate, float at) : SoaNodeTest<4, Padded>(ray, max_coordinate), time(at) {}
+  ARBORETUM_INLINE unsigned test(const std::byte* node, vf<4>& entry) const {
     const auto planes = [&](unsigned offset) {
       return madd(vf<4>::load(node + offsetof(bvh4_motion::Node, motion) + offset), time, vf<4>::load(node + offset));
     };
-    return lanes.test_planes(planes, tnear, tfar, entry);
+    return this->box.test_planes(planes, this->tnear, this->tfar, entry);
+  }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return reinterpret_cast<const bvh4_motion::Node*>(node)->child;
   }
 };
 
@@ -38,11 +40,13 @@ ARBORETUM_INLINE VertexBlock<M> posed(const IndexBlock<M>& block, const Vec3f* f
   return a;
 }
 
-template <class Intersector, bool Padded, class Counting>
-class MotionTracer {
+/// Leaves hold indices; their vertices at the ray's time go to the intersector's tests of vertices.
+template <class Leaves, bool Padded, class Counting>
+class MotionKernel {
  public:
-  MotionTracer(const Accel& accel, Counters* counters)
-      : accel_(static_cast<const bvh4_motion::Bvh4Motion&>(accel)), counting_(counters), stack_(accel_.stack_entries()) {}
+  MotionKernel(const Accel& accel, const KernelRow& row, Counting counting)
+      : accel_(static_cast<const bvh4_motion::Bvh4Motion&>(accel)), tests_(*find_leaf_tests(VertexBlock<4>::kName, row.intersector, kIsa)),
+        form_(*row.tests->form), counting_(counting), stack_(accel_.stack_entries()) {}
 
   template <bool AnyHit>
   bool trace(const Ray& ray, float time, NearestHit& best) {
@@ -50,85 +54,41 @@ class MotionTracer {
     const FrameTime at = frame_at(time, mesh.frames());
     const Vec3f* from = mesh.frame(at.frame).data();
     const Vec3f* to = mesh.moves() ? mesh.frame(at.frame + 1).data() : from;
-    const float within = time > 0.0f ? (time < 1.0f ? time : 1.0f) : 0.0f;
-    const MovingBoxes<Padded> boxes{BoxLanes<4, Padded>(BoxRay<4, Padded>(ray, accel_.max_coordinate())), vf<4>(within)};
-    const typename Intersector::RayData data(ray);
-    const auto leaf = [&](bvh::NodeReference reference) {
-      const auto* block = reinterpret_cast<const IndexBlock<4>*>(accel_.base() + bvh::offset_of(reference));
-      const auto* const end = block + bvh::block_count(reference);
-      count_leaf(block, end);
-      for (; block != end; ++block) {
+    MovingNodeTest<Padded> nodes(ray, accel_.max_coordinate(), time > 0.0f ? (time < 1.0f ? time : 1.0f) : 0.0f);
+    PreparedRay data;
+    tests_.prepare(ray, data);
+    const std::byte* const base = accel_.base();
+    const bool hit = walk_bvh<AnyHit>(base, accel_.root(), nodes, stack_.data(), best.t, counting_, [&](bvh::NodeReference reference) {
+      const std::byte* const blocks = base + bvh::offset_of(reference);
+      const unsigned count = bvh::block_count(reference);
+      counting_.leaf(form_, blocks, count);
+      const auto* block = reinterpret_cast<const IndexBlock<4>*>(blocks);
+      for (const auto* const end = block + count; block != end; ++block) {
+        const VertexBlock<4> now = posed(*block, from, to, at.weight);
+        const auto* bytes = reinterpret_cast<const std::byte*>(&now);
         if constexpr (AnyHit) {
-          if (any_hit_block<Intersector>(data, posed(*block, from, to, at.weight), ray.tnear, ray.tfar)) return true;
+          if (tests_.any_hit(data, bytes, 1, nullptr, ray.tnear, ray.tfar)) return true;
         } else {
-          closest_hit_block<Intersector>(data, posed(*block, from, to, at.weight), ray.tnear, best);
+          tests_.closest_hit(data, bytes, 1, nullptr, ray.tnear, best);
         }
       }
+      if constexpr (!AnyHit) nodes.shorten(best.t);
       return false;
-    };
-    const auto node = [&](const std::byte* n, unsigned hit) { count_node(n, hit); };
-    return walk_bvh<4, offsetof(bvh4_motion::Node, child)>(accel_.base(), accel_.root(), boxes, ray.tnear, best.t, stack_.data(), leaf, node);
+    });
+    if (!AnyHit && tests_.finish && best.primitive != NearestHit::kNone) tests_.finish(data, best);
+    return hit;
   }
 
  private:
-  void count_node(const std::byte* node, unsigned hit) {
-    if constexpr (Counting::kCounting) {
-      const auto* lower = reinterpret_cast<const float*>(node);
-      for (int i = 0; i < 4; ++i) {
-        const bool child = lower[i] <= lower[4 + i];
-        counting_.counters.boxes += child, counting_.counters.lanes_active += child;
-      }
-      ++counting_.counters.nodes;
-      counting_.counters.boxes_hit += unsigned(__builtin_popcount(hit));
-      counting_.counters.lanes += 4;
-    }
-  }
-  void count_leaf(const IndexBlock<4>* block, const IndexBlock<4>* end) {
-    if constexpr (Counting::kCounting) {
-      ++counting_.counters.leaves;
-      for (; block != end; ++block) {
-        ++counting_.counters.blocks;
-        counting_.counters.lanes += 4;
-        counting_.counters.triangles += unsigned(triangles_in(*block)), counting_.counters.lanes_active += unsigned(triangles_in(*block));
-      }
-    }
-  }
-
   const bvh4_motion::Bvh4Motion& accel_;
+  const LeafTests& tests_;
+  const LeafForm& form_;
   Counting counting_;
   TraversalStack stack_;
 };
 
-template <class Block, class Intersector, bool Padded>
-struct MotionMaker {
-  template <class Counting>
-  static void closest(const Accel& a, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-    MotionTracer<Intersector, Padded, Counting> tracer(a, counters);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      NearestHit best{rays[i].tfar};
-      if (is_valid_in_lanes(rays[i])) tracer.template trace<false>(rays[i], rays.time(i), best);
-      hits[i] = to_hit(best);
-    }
-    if constexpr (Counting::kCounting) counters->rays += rays.size();
-  }
-  template <class Counting>
-  static void any(const Accel& a, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-    MotionTracer<Intersector, Padded, Counting> tracer(a, counters);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      NearestHit best{rays[i].tfar};
-      occluded[i] = is_valid_in_lanes(rays[i]) && tracer.template trace<true>(rays[i], rays.time(i), best);
-    }
-    if constexpr (Counting::kCounting) counters->rays += rays.size();
-  }
-  static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { closest<NoCounters>(a, r, h, c); }
-  static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { any<NoCounters>(a, r, h, c); }
-  static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { closest<WithCounters>(a, r, h, c); }
-  static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { any<WithCounters>(a, r, h, c); }
-};
-
 inline void add_kernels(std::type_identity<bvh4_motion::Bvh4Motion>, KernelRows& rows) {
-  add_rows<MotionMaker>(rows, bvh4_motion::Bvh4Motion::kName, "single", kIsa, TypeList<IndexBlock<4>>{},
-                        TypeList<MollerTrumbore, Pluecker, Watertight>{});
+  add_rows<bvh4_motion::Bvh4Motion, SingleRayFunctions<MotionKernel>>(rows, "single", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -10,7 +10,9 @@
 #pragma once
 
 #include "simd/swizzle.h"
-#include "structures/bvh/format_kernels.h"
+#include "intersectors/usual_leaves.h"
+#include "structures/bvh/bvh_single.h"
+#include "traversal/kernel_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -70,7 +72,8 @@ struct QuantisedTests {
 
 template <int N>
 void add_kernels(std::type_identity<bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>>, KernelRows& rows) {
-  add_format_rows<QuantisedTests<N>::template Nodes>(bvh_quantised::QuantisedNodes<N>::kName, rows);
+  using Structure = bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>;
+  add_rows<Structure, typename BvhSingle<QuantisedTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

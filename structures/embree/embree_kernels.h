@@ -11,10 +11,10 @@ struct EmbreeSingle {
   static const embree::EmbreeAccel& scene(const Accel& accel) {
     return static_cast<const embree::EmbreeAccel&>(accel).expect(kIsa, Robust);
   }
-  static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters*) {
+  static void closest_hit(const Accel& a, const KernelRow&, RayBatch r, std::span<Hit> h, Counters*) {
     scene(a).intersect_single(r.rays, h);
   }
-  static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters*) {
+  static void any_hit(const Accel& a, const KernelRow&, RayBatch r, std::span<std::uint8_t> h, Counters*) {
     scene(a).occluded_single(r.rays, h);
   }
 };
@@ -22,10 +22,10 @@ struct EmbreeSingle {
 inline void add_kernels(std::type_identity<embree::EmbreeAccel>, KernelRows& rows) {
   if constexpr (kIsa != Isa::scalar) {
     constexpr std::string_view name = embree::EmbreeAccel::kName;
-    rows.push_back({name, "triangle4", "moller_trumbore", "fast", "single", kIsa,
-                    &EmbreeSingle<false>::closest_hit, &EmbreeSingle<false>::any_hit});
-    rows.push_back({name, "triangle4v", "pluecker", "padded", "single", kIsa,
-                    &EmbreeSingle<true>::closest_hit, &EmbreeSingle<true>::any_hit});
+    rows.push_back({name, "triangle4", "moller_trumbore", "fast", "single", kIsa, nullptr,
+                    {&EmbreeSingle<false>::closest_hit, &EmbreeSingle<false>::any_hit}, {}});
+    rows.push_back({name, "triangle4v", "pluecker", "padded", "single", kIsa, nullptr,
+                    {&EmbreeSingle<true>::closest_hit, &EmbreeSingle<true>::any_hit}, {}});
   }
 }
 

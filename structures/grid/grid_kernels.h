@@ -9,16 +9,15 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-template <class Block, class Intersector, bool Padded, class Counting>
+template <bool Padded, class Counting>
 struct GridSingle {
   using Scratch = NoScratch;
   /// True where any hit is found.
-  template <bool AnyHit>
+  template <bool AnyHit, class Visits>
   static ARBORETUM_INLINE bool trace(const grid::Grid& grid, const Ray& ray, NearestHit& best,
-                                     Counting counting, Scratch&) {
-    LeafTests<Block, Intersector, AnyHit> tests(grid.leaves(), ray, best);
+                                     const Counting& counting, Scratch&, Visits& visits) {
     if constexpr (Padded) {
-      if (__builtin_expect(!within_walk_bounds(grid, ray), 0)) return far(grid, ray, best, tests, counting);
+      if (__builtin_expect(!within_walk_bounds(grid, ray), 0)) return far(grid, ray, best, visits);
     }
     const grid::Level& outer = grid.levels()[0];
     const GridRay lanes(ray);
@@ -45,14 +44,14 @@ struct GridSingle {
             count_cell(counting, inside);
             if (inside != kEmptyLeaf && inside != last) {
               last = inside;
-              if (tests(inside, counting)) return true;
+              if (visits(inside)) return true;
             }
             if (best.t < inner_leave) return false;
             if (!inner.step(inner_axes)) break;
           }
         } else if (code != last) {
           last = code;
-          if (tests(code, counting)) return true;
+          if (visits(code)) return true;
         }
       }
       if (best.t < leave) return false;
@@ -62,16 +61,15 @@ struct GridSingle {
   }
 
  private:
-  template <class T>
-  static __attribute__((noinline)) bool far(const grid::Grid& grid, const Ray& ray, const NearestHit& best,
-                                            T& tests, Counting& counting) {
-    auto leaf = [&](LeafCode code) { return tests(code, counting); };
+  template <class Visits>
+  static __attribute__((noinline)) bool far(const grid::Grid& grid, const Ray& ray, const NearestHit& best, Visits& visits) {
+    auto leaf = [&](LeafCode code) { return visits(code); };
     return FarWalk(grid, ray, best.t, leaf).search(grid.levels()[0]);
   }
-  static ARBORETUM_INLINE void count_grid(Counting& counting) {
+  static ARBORETUM_INLINE void count_grid(const Counting& counting) {
     if constexpr (Counting::kCounting) ++counting.counters.nodes;
   }
-  static ARBORETUM_INLINE void count_cell(Counting& counting, LeafCode code) {
+  static ARBORETUM_INLINE void count_cell(const Counting& counting, LeafCode code) {
     if constexpr (Counting::kCounting) {
       ++counting.counters.boxes, ++counting.counters.lanes, ++counting.counters.lanes_active;
       counting.counters.boxes_hit += code != kEmptyLeaf;
@@ -79,11 +77,8 @@ struct GridSingle {
   }
 };
 
-template <class Block, class Intersector, bool Padded>
-struct GridMaker : SingleRayMaker<grid::Grid, GridSingle, Block, Intersector, Padded> {};
-
 inline void add_kernels(std::type_identity<grid::Grid>, KernelRows& rows) {
-  add_single_rows<GridMaker>(rows, grid::Grid::kName);
+  ListedLeaves<grid::Grid, GridSingle>::add(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -16,7 +16,8 @@
 // one that is not taken is written to the stack whether it stays there or not.
 #pragma once
 
-#include "intersectors/leaf_block.h"
+#include "traversal/batch_stack.h"
+#include "traversal/single_rays.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -61,42 +62,54 @@ struct KdRay {
   ARBORETUM_INLINE float leaving(float plane, unsigned axis) const { return fused(plane, r[axis], leave[axis]); }
 };
 
-/// What a batch needs of the tree.
-struct KdView {
-  const std::byte* base;
-  std::uint64_t root;
-  Bounds3f bounds;
-  const Vec3f* vertices;
-};
+template <class Leaves, class Counting>
+class KdSingle {
+ public:
+  KdSingle(const Accel& accel, const KernelRow& row, Counting counting) : KdSingle(static_cast<const kdtree::KdTree&>(accel), row, counting) {}
 
-template <class Block, class Intersector, class Counting>
-struct KdSingleRay {
   template <bool AnyHit>
-  static ARBORETUM_INLINE bool trace(const KdView& tree, KdStackEntry* stack, const Ray& ray, const KdRay& planes, NearestHit& best, Counting counting) {
+  ARBORETUM_INLINE bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
+    typename Leaves::RayData data = leaves_.prepare(ray);
+    const bool hit = walk<AnyHit>(ray, data, best);
+    if constexpr (!AnyHit) leaves_.finish(data, best);
+    return hit;
+  }
+
+ private:
+  KdSingle(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
+      : base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()), max_coordinate_(tree.max_coordinate()),
+        pad_(row.box == "padded" ? KdRay::kPad : 0.0f), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting),
+        stack_(tree.stack_entries()) {}
+
+  template <bool AnyHit>
+  ARBORETUM_INLINE bool walk(const Ray& ray, typename Leaves::RayData& data, NearestHit& best) {
+    const KdRay planes(ray, max_coordinate_, pad_);
     float begin = ray.tnear, end = best.t;
     for (unsigned axis = 0; axis < 3; ++axis) {
       const bool up = planes.far[axis] != 0;
-      const float low = (&tree.bounds.lower.x)[axis], high = (&tree.bounds.upper.x)[axis];
+      const float low = (&bounds_.lower.x)[axis], high = (&bounds_.upper.x)[axis];
       const float in = planes.entering(up ? low : high, axis), out = planes.leaving(up ? high : low, axis);
       begin = in > begin ? in : begin, end = out < end ? out : end;
     }
     if (begin > end) return false;
-    const typename Intersector::RayData data(ray);
+    const std::byte* const base = base_;
+    KdStackEntry* const stack = stack_.data();
     KdStackEntry* top = stack;
-    std::uint64_t node = tree.root;
+    std::uint64_t node = root_;
     for (;;) {
       for (;;) {
         const auto link = std::uint32_t(node >> 32);
         const unsigned axis = link & 3u;
         if (axis == 3) break;
         const float plane = __builtin_bit_cast(float, std::uint32_t(node));
-        const std::byte* pair = tree.base + std::size_t(link & ~3u) * 4;
+        const std::byte* pair = base + std::size_t(link & ~3u) * 4;
         const std::uint32_t far_offset = planes.far[axis];
         std::uint64_t near, far;
         std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
         const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
         const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell), skip_far = (enter > end) | (far == kdtree::kEmptyCell);
-        if constexpr (Counting::kCounting) count_node(counting, 2u - skip_near - skip_far);
+        // A plane decides about two cells; a lane each.
+        counting_.node(2, 2, 2u - skip_near - skip_far);
         const float far_begin = enter > begin ? enter : begin;
         if (skip_near) {
           if (skip_far) goto pop;
@@ -107,16 +120,13 @@ struct KdSingleRay {
           node = near, end = leave < end ? leave : end;
         }
       }
-      {
-        const auto* block = reinterpret_cast<const Block*>(tree.base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4);
-        const Block* const last = block + std::uint32_t(node);
-        if constexpr (Counting::kCounting) count_leaf(counting, block, last);
-        for (; block != last; ++block) {
-          if constexpr (AnyHit) {
-            if (any_hit_block<Intersector>(data, readable(*block, tree.vertices), ray.tnear, ray.tfar)) return true;
-          } else {
-            closest_hit_block<Intersector>(data, readable(*block, tree.vertices), ray.tnear, best);
-          }
+      if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf
+        const std::byte* const blocks = base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
+        counting_.leaf(form_, blocks, count);
+        if constexpr (AnyHit) {
+          if (leaves_.any_hit(data, blocks, count, ray.tnear, ray.tfar)) return true;
+        } else {
+          leaves_.closest_hit(data, blocks, count, ray.tnear, best);
         }
       }
     pop:
@@ -129,81 +139,19 @@ struct KdSingleRay {
     }
   }
 
- private:
-  /// A plane decides about two cells; a lane each.
-  static void count_node(Counting& counting, unsigned visited) {
-    ++counting.counters.nodes;
-    counting.counters.boxes += 2, counting.counters.boxes_hit += visited;
-    counting.counters.lanes += 2, counting.counters.lanes_active += 2;
-  }
-  static void count_leaf(Counting& counting, const Block* block, const Block* last) {
-    counting.counters.leaves += block != last;  // an empty cell is none
-    for (; block != last; ++block) {
-      const auto triangles = unsigned(triangles_in(*block));
-      ++counting.counters.blocks;
-      counting.counters.lanes += Block::kWidth;
-      counting.counters.triangles += triangles, counting.counters.lanes_active += triangles;
-    }
-  }
+  const std::byte* base_;
+  std::uint64_t root_;
+  Bounds3f bounds_;
+  float max_coordinate_, pad_;
+  Leaves leaves_;
+  const LeafForm& form_;
+  Counting counting_;
+  BatchStack<KdStackEntry, 80> stack_;
 };
 
-/// A stack for one batch: on this frame, on the heap for a tree deeper than any that the builders make.
-class KdStack {
- public:
-  explicit KdStack(std::size_t entries) {
-    if (entries > kInline) heap_.resize(entries), data_ = heap_.data();
-  }
-  KdStack(const KdStack&) = delete;
-  KdStack& operator=(const KdStack&) = delete;
-  [[nodiscard]] KdStackEntry* data() noexcept { return data_; }
-
- private:
-  static constexpr std::size_t kInline = 80;
-  KdStackEntry inline_[kInline];
-  std::vector<KdStackEntry> heap_;
-  KdStackEntry* data_ = inline_;
-};
-
-/// Calls trace(view, stack, ray, constants, i) for every valid ray of a batch.
-template <class Trace>
-ARBORETUM_INLINE void kd_for_each_ray(const Accel& accel, RayBatch rays, float pad, Trace&& trace) {
-  const auto& tree = static_cast<const kdtree::KdTree&>(accel);
-  const KdView view{tree.base(), __builtin_bit_cast(std::uint64_t, tree.root()), tree.bounds(), tree.vertices()};
-  const float max_coordinate = tree.max_coordinate();
-  KdStack stack(tree.stack_entries());
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    trace(i, [&](auto&& go) {
-      if (is_valid_in_lanes(rays[i])) go(view, stack.data(), KdRay(rays[i], max_coordinate, pad));
-    });
-  }
-}
-
-template <class Block, class Intersector, class Counting>
-void kd_closest_hit(const Accel& accel, RayBatch rays, std::span<Hit> hits, Counters* counters, float pad) {
-  Counting counting(counters);
-  kd_for_each_ray(accel, rays, pad, [&](std::size_t i, auto&& with_valid) {
-    NearestHit best{rays[i].tfar};
-    with_valid([&](const KdView& view, KdStackEntry* stack, const KdRay& planes) {
-      KdSingleRay<Block, Intersector, Counting>::template trace<false>(view, stack, rays[i], planes, best, counting);
-    });
-    hits[i] = to_hit(best);
-  });
-  if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
-}
-
-template <class Block, class Intersector, class Counting>
-void kd_any_hit(const Accel& accel, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters, float pad) {
-  Counting counting(counters);
-  kd_for_each_ray(accel, rays, pad, [&](std::size_t i, auto&& with_valid) {
-    NearestHit best{rays[i].tfar};
-    bool hit = false;
-    with_valid([&](const KdView& view, KdStackEntry* stack, const KdRay& planes) {
-      hit = KdSingleRay<Block, Intersector, Counting>::template trace<true>(view, stack, rays[i], planes, best, counting);
-    });
-    occluded[i] = hit;
-  });
-  if constexpr (Counting::kCounting) counting.counters.rays += rays.size();
-}
+/// `fast` and `padded` are one function with other constants.
+template <class Leaves, bool, class Counting>
+using KdKernel = KdSingle<Leaves, Counting>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

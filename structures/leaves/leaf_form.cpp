@@ -14,7 +14,8 @@ std::span<const LeafForm> leaf_forms() {
                       },
                       [](const std::byte* at, unsigned blocks, std::vector<std::uint32_t>& out) {
                         append_primitives(reinterpret_cast<const Block*>(at), blocks, out);
-                      }});
+                      },
+                      [](const std::byte* at) noexcept { return unsigned(triangles_in(*reinterpret_cast<const Block*>(at))); }});
     });
     return list;
   }();

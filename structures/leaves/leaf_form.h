@@ -19,6 +19,8 @@ struct LeafForm {
   void (*fill)(std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids) noexcept;
   /// Appends the triangles of `blocks` consecutive blocks to `out`.
   void (*append)(const std::byte* at, unsigned blocks, std::vector<std::uint32_t>& out);
+  /// How many triangles a block holds.
+  unsigned (*triangles)(const std::byte* at) noexcept;
 };
 
 /// Every form, in the order of AllBlocks.

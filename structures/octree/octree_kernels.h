@@ -44,7 +44,7 @@ struct OctreeRay {
   }
 };
 
-template <class Block, class Intersector, bool Padded, class Counting>
+template <bool Padded, class Counting>
 struct OctreeSingle {
   using Scratch = NoScratch;
   struct alignas(16) Entry {
@@ -55,12 +55,11 @@ struct OctreeSingle {
   };
   static constexpr unsigned kStack = 7 * (octree::kMostLevels + 1) + 1;
 
-  template <bool AnyHit>
+  template <bool AnyHit, class Visits>
   static ARBORETUM_INLINE bool trace(const octree::Octree& tree, const Ray& ray, NearestHit& best,
-                                     Counting counting, Scratch&) {
+                                     const Counting& counting, Scratch&, Visits& visits) {
     using F4 = vf<4>;
     using F = vf<8>;
-    LeafTests<Block, Intersector, AnyHit> tests(tree.leaves(), ray, best);
     const OctreeRay<Padded> box(ray, tree.max_coordinate());
     const octree::Node* const nodes = tree.nodes();
     const F4 lower = F4::load(tree.cube().lower);
@@ -75,7 +74,7 @@ struct OctreeSingle {
       if (e.node.mask == 0) {
         if (e.node.first != last) {
           last = e.node.first;
-          if (tests(last, counting)) return true;
+          if (visits(last)) return true;
         }
       } else {
         const vi<4> twice = vi<4>::load(e.at).template shift_left<1>();
@@ -92,7 +91,7 @@ struct OctreeSingle {
             min_x86(min_x86(select(x, F(out[0]), F(middle_far[0])), select(y, F(out[1]), F(middle_far[1]))),
                     min_x86(select(z, F(out[2]), F(middle_far[2])), F(best.t)));
         unsigned hit = (entry <= exit).bits() & permute_by_octant(e.node.mask, box.octant);
-        if constexpr (Counting::kCounting) count_node(counting, e.node.mask, hit);
+        if constexpr (Counting::kCounting) counting.node(unsigned(__builtin_popcount(e.node.mask)), 8, unsigned(__builtin_popcount(hit)));
         if (hit != 0) {
           alignas(32) float t[8];
           entry.store(t);
@@ -125,21 +124,10 @@ struct OctreeSingle {
  private:
   static constexpr std::int32_t kOffsets[8][4] = {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 0, 0},
                                                   {0, 0, 1, 0}, {1, 0, 1, 0}, {0, 1, 1, 0}, {1, 1, 1, 0}};
-
-  static void count_node(Counting& counting, unsigned mask, unsigned hit) {
-    const auto children = unsigned(__builtin_popcount(mask));
-    ++counting.counters.nodes;
-    counting.counters.boxes += children, counting.counters.lanes_active += children,
-        counting.counters.lanes += 8;
-    counting.counters.boxes_hit += unsigned(__builtin_popcount(hit));
-  }
 };
 
-template <class Block, class Intersector, bool Padded>
-struct OctreeMaker : SingleRayMaker<octree::Octree, OctreeSingle, Block, Intersector, Padded> {};
-
 inline void add_kernels(std::type_identity<octree::Octree>, KernelRows& rows) {
-  add_single_rows<OctreeMaker>(rows, octree::Octree::kName);
+  ListedLeaves<octree::Octree, OctreeSingle>::add(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -14,47 +14,47 @@
 //   from. There the t in world space decides, and the search goes on behind a hit that is refused.
 #pragma once
 
-#include "intersectors/moller_trumbore.h"
-#include "intersectors/pluecker.h"
-#include "intersectors/watertight.h"
-#include "structures/bvh/walk_single.h"
+#include "structures/bvh/bvh_single.h"
+#include "traversal/kernel_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// The kernels of the structure below that a row stands for.
-[[nodiscard]] inline const KernelRow& row_below(const two_level::TwoLevel& accel, std::string_view intersector, bool padded) {
-  const KernelRow* row = find_kernel(accel.below(), accel.leaf(), intersector, padded ? "padded" : "fast", "single", kIsa);
+[[nodiscard]] inline const KernelRow& row_below(const two_level::TwoLevel& accel, const KernelRow& above) {
+  const KernelRow* row = find_kernel(accel.below(), accel.leaf(), above.intersector, above.box, "single", kIsa);
   if (!row) {
     throw UserError("two_level over " + accel.below() + ": " +
-                    why_no_kernel(accel.below(), accel.leaf(), intersector, padded ? "padded" : "fast", "single", kIsa));
+                    why_no_kernel(accel.below(), accel.leaf(), above.intersector, above.box, "single", kIsa));
   }
   return *row;
 }
 
-template <class Intersector, class Counting>
-class InstanceTracer {
+/// The structure below knows its leaves, and the row there its box test.
+template <class, bool, class Counting>
+class TwoLevelKernel {
  public:
-  InstanceTracer(const two_level::TwoLevel& accel, const KernelRow& row, Counters* counters)
-      : accel_(accel), row_(row), counters_(counters), stack_(accel.top().stack_entries()) {}
+  TwoLevelKernel(const Accel& accel, const KernelRow& row, Counting counting)
+      : accel_(static_cast<const two_level::TwoLevel&>(accel)), row_(row_below(accel_, row)), counting_(counting), stack_(accel_.top().stack_entries()) {
+    const LeafTests* alone = find_leaf_tests(VertexBlock<1>::kName, row.intersector, kIsa);
+    tests_ = alone ? alone : row.tests;
+  }
 
   template <bool AnyHit>
-  Hit trace(const Ray& ray) {
+  bool trace(const Ray& ray, float /*time*/, NearestHit& nearest_hit) {
     Hit best;
-    if (!is_valid_in_lanes(ray)) return best;
     float nearest = ray.tfar;
     const float origin = largest(ray.origin), k = accel_.magnification();
-    const BoxLanes<4, true> box(BoxRay<4, true>(ray, accel_.reach() + k * (origin + accel_.reach())));
+    SoaNodeTest<4, true> nodes(ray, accel_.reach() + k * (origin + accel_.reach()));
     const bvh::Bvh4& top = accel_.top();
-    const auto count = [&](const std::byte* node, unsigned hit) {
-      if constexpr (Counting::kCounting) count_top(node, hit);
-    };
-    const auto leaf = [&](bvh::NodeReference reference) {
+    walk_bvh<false>(top.base(), top.root(), nodes, stack_.data(), nearest, counting_, [&](bvh::NodeReference reference) {
       const auto& block = *reinterpret_cast<const IndexBlock<1>*>(top.base() + bvh::offset_of(reference));
-      return visit<AnyHit>(ray, accel_.placed()[block.id[0]], nearest, best);
-    };
-    walk_bvh<4, 6 * 4 * sizeof(float)>(top.base(), top.root(), box, ray.tnear, nearest, stack_.data(), leaf, count);
-    return best;
+      const bool over = visit<AnyHit>(ray, accel_.placed()[block.id[0]], nearest, best);
+      nodes.shorten(nearest);
+      return over;
+    });
+    if (best.is_hit()) nearest_hit = {best.t, best.u, best.v, std::int32_t(best.primitive)};
+    return best.is_hit();
   }
 
  private:
@@ -125,13 +125,16 @@ class InstanceTracer {
 
   /// The hit as the flat mesh's triangle has it.
   Hit in_world(const Ray& ray, const Hit& object, std::uint32_t primitive) const {
-    VertexBlock<1> block;
+    PreparedRay data;
+    tests_->prepare(ray, data);
+    alignas(64) std::byte block[sizeof(EdgeBlock<16>)];
+    tests_->form->fill(block, accel_.mesh(), {&primitive, 1});
+    NearestHit flat{std::numeric_limits<float>::infinity()};
+    if (tests_->closest_hit(data, block, 1, accel_.mesh().vertices.data(), -std::numeric_limits<float>::infinity(), flat)) {
+      if (tests_->finish) tests_->finish(data, flat);
+      return {flat.t, flat.u, flat.v, primitive};
+    }
     const std::array<Vec3f, 3> corner = accel_.mesh().corners(primitive);
-    block.set(0, corner, primitive);
-    const typename Intersector::RayData data(ray);
-    TriangleHits<1> hits;
-    if (any(Intersector::intersect(data, block, hits)))
-      return {hits.t.v, hits.u_numerator.v / hits.denominator.v, hits.v_numerator.v / hits.denominator.v, primitive};
     double a[3], e1[3], e2[3], d[3];
     for (unsigned i = 0; i < 3; ++i) {
       const double v0 = corner[0][i];
@@ -145,13 +148,24 @@ class InstanceTracer {
 
   Hit closest_below(const two_level::Placed& instance, const Ray& ray) {
     Hit hit;
-    (Counting::kCounting ? row_.count_closest_hit : row_.closest_hit)(*instance.below, RayBatch(&ray, 1), {&hit, 1}, counters_);
+    below([&](Counters* counters) { row_.closest_hit(*instance.below, RayBatch(&ray, 1), {&hit, 1}, counters); });
     return hit;
   }
   bool any_below(const two_level::Placed& instance, const Ray& ray) {
     std::uint8_t occluded = 0;
-    (Counting::kCounting ? row_.count_any_hit : row_.any_hit)(*instance.below, RayBatch(&ray, 1), {&occluded, 1}, counters_);
+    below([&](Counters* counters) { row_.any_hit(*instance.below, RayBatch(&ray, 1), {&occluded, 1}, counters); });
     return occluded != 0;
+  }
+  /// The batch counts its rays; those that go below are not rays more.
+  template <class Trace>
+  void below(const Trace& trace) {
+    if constexpr (Counting::kCounting) {
+      const std::uint64_t rays = counting_.counters.rays;
+      trace(&counting_.counters);
+      counting_.counters.rays = rays;
+    } else {
+      trace(nullptr);
+    }
   }
 
   static float largest(Vec3f v) {
@@ -160,59 +174,27 @@ class InstanceTracer {
     return xy > z ? xy : z;
   }
 
-  void count_top(const std::byte* node, unsigned hit) {
-    const auto* lower = reinterpret_cast<const float*>(node);
-    unsigned children = 0;
-    for (int i = 0; i < 4; ++i) children += lower[i] <= lower[4 + i];
-    ++counters_->nodes;
-    counters_->boxes += children, counters_->lanes_active += children;
-    counters_->boxes_hit += unsigned(__builtin_popcount(hit));
-    counters_->lanes += 4;
-  }
-
   const two_level::TwoLevel& accel_;
   const KernelRow& row_;
-  Counters* counters_;
+  const LeafTests* tests_;
+  Counting counting_;
   TraversalStack stack_;
 };
 
-template <class Intersector, class Counting>
-void two_level_closest_hit(const Accel& structure, bool padded, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-  const auto& accel = static_cast<const two_level::TwoLevel&>(structure);
-  const std::uint64_t traced = counters ? counters->rays : 0;
-  InstanceTracer<Intersector, Counting> tracer(accel, row_below(accel, Intersector::kName, padded), counters);
-  for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = tracer.template trace<false>(rays[i]);
-  if constexpr (Counting::kCounting) counters->rays = traced + rays.size();
-}
-
-template <class Intersector, class Counting>
-void two_level_any_hit(const Accel& structure, bool padded, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-  const auto& accel = static_cast<const two_level::TwoLevel&>(structure);
-  const std::uint64_t traced = counters ? counters->rays : 0;
-  InstanceTracer<Intersector, Counting> tracer(accel, row_below(accel, Intersector::kName, padded), counters);
-  for (std::size_t i = 0; i < rays.size(); ++i) occluded[i] = tracer.template trace<true>(rays[i]).is_hit();
-  if constexpr (Counting::kCounting) counters->rays = traced + rays.size();
-}
-
-/// One set of functions for all leaves: the structure below knows its own.
-template <class Intersector, bool Padded>
-struct TwoLevelRow {
-  static void closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { two_level_closest_hit<Intersector, NoCounters>(a, Padded, r, h, c); }
-  static void any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { two_level_any_hit<Intersector, NoCounters>(a, Padded, r, h, c); }
-  static void count_closest_hit(const Accel& a, RayBatch r, std::span<Hit> h, Counters* c) { two_level_closest_hit<Intersector, WithCounters>(a, Padded, r, h, c); }
-  static void count_any_hit(const Accel& a, RayBatch r, std::span<std::uint8_t> h, Counters* c) { two_level_any_hit<Intersector, WithCounters>(a, Padded, r, h, c); }
+/// One set of functions for all rows. Which rows the structure below has is asked when a cell is planned.
+struct TwoLevelFunctions {
+  template <class, bool>
+  static RowFunctions timed() {
+    return SingleRayFunctions<TwoLevelKernel>::timed<CalledLeaves, true>();
+  }
+  template <bool>
+  static RowFunctions counting() {
+    return SingleRayFunctions<TwoLevelKernel>::counting<true>();
+  }
 };
-template <class Block, class Intersector, bool Padded>
-struct TwoLevelMaker : TwoLevelRow<Intersector, Padded> {};
 
-/// The rows that some structure has; which of them the chosen one below has is asked when a cell is planned.
 inline void add_kernels(std::type_identity<two_level::TwoLevel>, KernelRows& rows) {
-  constexpr std::string_view name = two_level::TwoLevel::kName;
-  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, BlocksOfWidth<EdgeBlock, kRegisterWidth>{}, TypeList<MollerTrumbore>{});
-  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, BlocksOfWidth<VertexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
-  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, TypeList<VertexBlock<4>>{}, TypeList<MollerTrumbore, Pluecker>{});
-  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, BlocksOfWidth<IndexBlock, kRegisterWidth>{}, TypeList<Watertight>{});
-  add_rows<TwoLevelMaker>(rows, name, "single", kIsa, TypeList<IndexBlock<4>>{}, TypeList<MollerTrumbore>{});
+  add_rows<two_level::TwoLevel, TwoLevelFunctions>(rows, "single", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

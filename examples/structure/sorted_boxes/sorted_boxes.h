@@ -41,8 +41,10 @@ class SortedBoxes final : public Accel {
   /// The blocks, in the order of the boxes. `Block` must be the one that the structure was built with.
   template <class Block>
   [[nodiscard]] const Block* block_data() const noexcept {
-    return reinterpret_cast<const Block*>(arena_.data() + groups() * sizeof(BoxGroup));
+    return reinterpret_cast<const Block*>(block_bytes());
   }
+  /// The first of them.
+  [[nodiscard]] const std::byte* block_bytes() const noexcept { return arena_.data() + groups() * sizeof(BoxGroup); }
   /// The mesh's vertices, which leaf blocks of indices name.
   [[nodiscard]] const Vec3f* vertices() const noexcept { return vertices_; }
   /// Largest |coordinate|: what padded box tests scale their pad with.

@@ -1,0 +1,51 @@
+// Entries of the table of leaf tests for one intersector on one instruction set. Units are generated (cmake/Intersectors.cmake).
+#pragma once
+
+#include "intersectors/leaf_block.h"
+
+namespace arboretum {
+
+/// An intersector can read a block's form.
+template <class Intersector, class Block>
+concept CanRead = !Intersector::kNeedsVertices || Block::kForm != TriangleForm::edges;
+
+namespace ARBORETUM_ISA_NAMESPACE {
+
+template <class Intersector, class Block>
+struct CalledTests {
+  using RayData = typename Intersector::RayData;
+  static_assert(sizeof(RayData) <= PreparedRay::kBytes && std::is_trivially_destructible_v<RayData>);
+
+  static RayData& data(PreparedRay& ray) { return *reinterpret_cast<RayData*>(ray.bytes); }
+  static void prepare(const Ray& ray, PreparedRay& prepared) { new (prepared.bytes) RayData(ray); }
+  static bool closest_hit(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, NearestHit& best) {
+    return BlockTests<Intersector, Block>::closest_hit(data(ray), blocks, count, vertices, tnear, best);
+  }
+  static bool any_hit(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, float tfar) {
+    return BlockTests<Intersector, Block>::any_hit(data(ray), blocks, count, vertices, tnear, tfar);
+  }
+  static void finish(PreparedRay& ray, NearestHit& best) {
+    if constexpr (kFinishes<Intersector>) Intersector::finish(data(ray), best);
+  }
+};
+
+/// The blocks that an intersector is compiled for.
+template <class Intersector>
+using BlocksOf = std::conditional_t<
+    Intersector::kEveryLeaf,
+    ConcatLists<BlocksOfWidth<EdgeBlock, kRegisterWidth>, BlocksOfWidth<VertexBlock, kRegisterWidth>, BlocksOfWidth<IndexBlock, kRegisterWidth>>,
+    std::conditional_t<(kRegisterWidth >= 8), TypeList<VertexBlock<1>, VertexBlock<4>, VertexBlock<8>, IndexBlock<4>>,
+                       TypeList<VertexBlock<1>, VertexBlock<4>, IndexBlock<4>>>>;
+
+template <class Intersector>
+void add_leaf_tests(std::vector<LeafTests>& list) {
+  for_each_type(BlocksOf<Intersector>{}, [&]<class Block>(std::type_identity<Block>) {
+    if constexpr (CanRead<Intersector, Block>) {
+      using T = CalledTests<Intersector, Block>;
+      list.push_back({Block::kName, Intersector::kName, kIsa, nullptr, &T::prepare, &T::closest_hit, &T::any_hit, kFinishes<Intersector> ? &T::finish : nullptr});
+    }
+  });
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,64 @@
+// How a kernel tests its leaves: by the functions of the table of leaf tests, or with one block's and intersector's compiled in.
+//
+// A call costs a kernel what it keeps in registers, since none survives one: 1 to 2 % of a ray in bvh8 on AVX2, 6 to 8 % in bvh16 on AVX-512, whose
+// 32 registers otherwise hold a ray throughout (docs/performance.md). Compiling everything in would cost minutes of build time.
+#pragma once
+
+#include "intersectors/leaf_block.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// Any leaf and intersector.
+struct CalledLeaves {
+  const LeafTests* tests;
+  const Vec3f* vertices;
+  using RayData = PreparedRay;
+
+  CalledLeaves(const KernelRow& row, const Vec3f* mesh_vertices) : tests(row.tests), vertices(mesh_vertices) {}
+  ARBORETUM_INLINE RayData prepare(const Ray& ray) const {
+    RayData data;
+    tests->prepare(ray, data);
+    return data;
+  }
+  ARBORETUM_INLINE bool closest_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, NearestHit& best) const {
+    return tests->closest_hit(data, blocks, count, vertices, tnear, best);
+  }
+  ARBORETUM_INLINE bool any_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, float tfar) const {
+    return tests->any_hit(data, blocks, count, vertices, tnear, tfar);
+  }
+  ARBORETUM_INLINE void finish(RayData& data, NearestHit& best) const {
+    if (tests->finish && best.primitive != NearestHit::kNone) tests->finish(data, best);
+  }
+  ARBORETUM_INLINE std::size_t block_bytes() const { return tests->form->bytes; }
+  static constexpr std::size_t kBytesAhead = sizeof(EdgeBlock<8>);  ///< what of a leaf is worth asking for in advance
+};
+
+/// One leaf and intersector.
+template <class B, class I>
+struct CompiledLeaves {
+  using Block = B;
+  using Intersector = I;
+  using Tests = BlockTests<Intersector, Block>;
+  const Vec3f* vertices;
+  using RayData = RayDataOf<Intersector>;
+
+  CompiledLeaves(const KernelRow&, const Vec3f* mesh_vertices) : vertices(mesh_vertices) {}
+  ARBORETUM_INLINE RayData prepare(const Ray& ray) const { return RayData(ray); }
+  ARBORETUM_INLINE bool closest_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, NearestHit& best) const {
+    return Tests::closest_hit(data, blocks, count, vertices, tnear, best);
+  }
+  ARBORETUM_INLINE bool any_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, float tfar) const {
+    return Tests::any_hit(data, blocks, count, vertices, tnear, tfar);
+  }
+  ARBORETUM_INLINE void finish(RayData& data, NearestHit& best) const {
+    if constexpr (kFinishes<Intersector>) {
+      if (best.primitive != NearestHit::kNone) Intersector::finish(data, best);
+    }
+  }
+  static constexpr std::size_t block_bytes() { return sizeof(Block); }
+  static constexpr std::size_t kBytesAhead = sizeof(Block);
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
