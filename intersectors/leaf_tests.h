@@ -14,9 +14,10 @@
 
 #include "core/isa.h"
 #include "core/ray.h"
-#include "structures/leaves/leaf_form.h"
 
 namespace arboretum {
+
+struct LeafForm;
 
 /// The nearest hit so far. `primitive` is INT_MAX while there is none, so that a hit at exactly tfar still counts.
 struct NearestHit {

@@ -165,12 +165,34 @@ TEST_CASE("with padded boxes every structure gives the brute force's answers, bi
   }
 }
 
+/// Whether a way of traversal visits nodes in another order than a single ray. With `fast` boxes, which may begin behind their triangles by a
+/// rounding, that can change which of two triangles at nearly one distance is found.
+bool reorders(const KernelRow& row) {
+  return !row.traversal.starts_with("queued") && row.traversal != "single" && row.box == "fast";
+}
+
+/// Hits and misses alike, and t the same but for such roundings.
+bool nearly_same(std::span<const Hit> a, std::span<const Hit> b, float extent) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i].is_hit() != b[i].is_hit()) return false;
+    if (a[i].is_hit() && !(std::abs(a[i].t - b[i].t) <= 0x1p-18f * std::max(std::abs(a[i].t), extent))) return false;
+  }
+  return a.size() == b.size();
+}
+
 TEST_CASE("every way of traversal gives the single ray's answers, bit for bit") {
   std::set<std::string_view> traversals;
   for (const KernelScene& scene : kernel_scenes()) {
     std::vector<Ray> rays = generic_rays(scene.mesh, 150, 31);
-    const std::vector<Ray> aimed = aimed_rays(scene.mesh, scene.mesh.bounds().center(), 100, 32);
+    const Vec3f centre = scene.mesh.bounds().center();
+    const float extent = length(scene.mesh.bounds().extent()) + length(centre);
+    const std::vector<Ray> aimed = aimed_rays(scene.mesh, centre, 100, 32);
     rays.insert(rays.end(), aimed.begin(), aimed.end());
+    for (int i = 0; i < 150; ++i) {  // from one point, close together: what packets are for
+      const Vec3f target = centre + Vec3f{float(i % 12) - 6.0f, float(i / 12) - 6.0f, 0.0f} * (extent * 0.04f);
+      const Vec3f eye = centre + Vec3f{0.3f, 0.2f, 2.0f} * extent;
+      rays.push_back({eye, 0, target - eye, kInfinity});
+    }
     std::size_t place = 0;
     for (const Ray& ray : invalid_rays()) rays.insert(rays.begin() + std::ptrdiff_t(place), ray), place += 7;
     Structures structures(scene.mesh);
@@ -184,7 +206,8 @@ TEST_CASE("every way of traversal gives the single ray's answers, bit for bit") 
       for (std::size_t size : {std::size_t(0), std::size_t(1), std::size_t(5), std::size_t(33), rays.size()}) {
         INFO("batch of " << size);
         const std::vector<Ray> batch(rays.begin(), rays.begin() + std::ptrdiff_t(size));
-        REQUIRE(same_bits(closest_hit(row, accel, batch), closest_hit(*single, accel, batch)));
+        const std::vector<Hit> hits = closest_hit(row, accel, batch), alone = closest_hit(*single, accel, batch);
+        REQUIRE((same_bits(hits, alone) || (reorders(row) && nearly_same(hits, alone, extent))));
         REQUIRE(any_hit(row, accel, batch) == any_hit(*single, accel, batch));
       }
     }

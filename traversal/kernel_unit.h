@@ -24,6 +24,7 @@
 #include "intersectors/leaf_tests.h"
 #include "structures/accel.h"
 #include "structures/leaves/blocks.h"
+#include "structures/leaves/leaf_form.h"
 #include "traversal/counting.h"
 #include "traversal/kernel_table.h"
 

@@ -1,7 +1,8 @@
 // The kernels of the wide BVHs: their ways of traversal on this instruction set.
 #pragma once
 
-#include "intersectors/usual_leaves.h"
+#include "traversal/usual_leaves.h"
+#include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/kernel_rows.h"
@@ -13,6 +14,7 @@ template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_rows<bvh::Bvh<N>, typename BvhSingle<SoaTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
   add_queued_rows<N>(rows);
+  add_packet_rows<N>(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

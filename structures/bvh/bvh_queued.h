@@ -6,7 +6,7 @@
 // visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however many rays are in flight.
 #pragma once
 
-#include "intersectors/usual_leaves.h"
+#include "traversal/usual_leaves.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/kernel_rows.h"
 

@@ -10,7 +10,7 @@
 #pragma once
 
 #include "simd/swizzle.h"
-#include "intersectors/usual_leaves.h"
+#include "traversal/usual_leaves.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/kernel_rows.h"
 

@@ -1,7 +1,7 @@
 // The kernels of the kd-tree: its ways of traversal on this instruction set.
 #pragma once
 
-#include "intersectors/usual_leaves.h"
+#include "traversal/usual_leaves.h"
 #include "structures/kdtree/kdtree_single.h"
 #include "traversal/kernel_rows.h"
 

@@ -1,5 +1,7 @@
 #include "intersectors/leaf_tests.h"
 
+#include "structures/leaves/leaf_form.h"
+
 namespace arboretum {
 
 std::span<const LeafTests> leaf_tests() {

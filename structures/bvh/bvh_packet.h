@@ -1,0 +1,366 @@
+// Packets: up to 64 rays go through a wide BVH together, with masks of those that are still in it.
+//
+// Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant. A node's N children are first tested
+// at once against an interval that holds all rays of the packet, then each that is left against the rays, W at a time, with the very
+// arithmetic of single rays. Children go on the stack with the mask of their rays, nearest on top by the interval's entry. Where no more
+// than `threshold` rays are in a node they go on alone, with all N children in lanes, and the packet with what is left on its stack.
+//
+// The interval test. With r = 1/d and o within the packet's bounds a plane b is met at (b - o) r, whose ends over the packet are products of
+// ends. What a ray's own test computes is off it by less than 2^-20 (M + |o|)|r| (traversal/box_test.h: its pad and roundings are
+// three quarters of that, the interval's own roundings less than the rest), by which the interval is widened: no child is lost that a ray's test takes.
+// Without FMA r may be infinite; such a packet has no interval test.
+//
+// Every ray visits at least the leaves that it would visit alone, up to those that begin beyond its nearest hit. So with padded boxes
+// the answers are those of single rays, bit for bit.
+#pragma once
+
+#include "structures/bvh/bvh_single.h"
+#include "traversal/kernel_rows.h"
+#include "traversal/usual_leaves.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// Rays of a packet at most.
+inline constexpr int kMostPacketRays = 64;
+
+/// What large packets have compiled in.
+using PacketLeaves = std::conditional_t<
+    kRegisterWidth == 1, TypeList<>,
+    std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>, CompiledLeaves<VertexBlock<4>, Watertight>>,
+                       TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>, CompiledLeaves<VertexBlock<8>, Watertight>>>>;
+
+/// One ray through what hangs below `root`, with what it has met already.
+template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
+__attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Leaves& leaves, const LeafForm& form,
+                                           const Counting& counting, StackEntry* stack, const Ray& ray, typename Leaves::RayData& data, NearestHit& best) {
+  SoaNodeTest<N, Padded> nodes(ray, max_coordinate);
+  if constexpr (!AnyHit) nodes.shorten(best.t);
+  return walk_bvh<AnyHit>(base, root, nodes, stack, best.t, counting, [&](bvh::NodeReference r) {
+    const std::byte* const blocks = base + bvh::offset_of(r);
+    const unsigned count = bvh::block_count(r);
+    if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
+    if constexpr (AnyHit) return leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar);
+    if (leaves.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
+    return false;
+  });
+}
+
+/// W rays a register. `fast` and `padded` are one class: they differ in what rays bring with them (compile time).
+template <int N, int W, class Leaves, bool AnyHit, class Counting>
+class BvhPackets {
+ public:
+  BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"), leaves_(row, tree.vertices()),
+        form_(*row.tests->form), counting_(counting), stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
+
+  /// Traces `count` rays, 1 to kMostPacketRays; their hits are then in best().
+  void trace(const Ray* rays, int count, int threshold) {
+    rays_ = rays, threshold_ = threshold;
+    chunks_ = (count + W - 1) / W;
+    std::uint64_t octants[8] = {};
+    prepare(count, octants);
+    active_ = ~std::uint64_t{0};
+    for (std::uint64_t mask : octants)
+      if (mask != 0) traverse(mask);
+    if constexpr (!AnyHit) {
+      for (std::uint64_t valid = valid_; valid; valid &= valid - 1) {
+        const int i = __builtin_ctzll(valid);
+        leaves_.finish(data(i), best_[i]);
+      }
+    }
+  }
+  [[nodiscard]] const NearestHit& best(int i) const { return best_[i]; }
+
+ private:
+  using F = vf<W>;
+  static constexpr int kLanes = N < 4 ? 4 : N;
+  using Children = vf<kLanes>;
+  static constexpr int kPlane = N * int(sizeof(float));
+
+  struct Entry {
+    bvh::NodeReference reference;
+    float t;
+    std::uint64_t mask;
+  };
+  /// Bounds of a group of rays by axis: of 1/d, of the origin at the near and at the far planes, and what they are widened by.
+  struct Interval {
+    float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
+    float tnear;
+    bool usable;
+    unsigned near[3];  ///< byte offsets of the near planes
+  };
+
+  typename Leaves::RayData& data(int i) { return *reinterpret_cast<typename Leaves::RayData*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData)); }
+
+  void prepare(int count, std::uint64_t (&octants)[8]) {
+    valid_ = 0;
+    for (int i = 0; i < count; ++i) {
+      best_[i] = NearestHit{rays_[i].tfar};
+      if (!is_valid_in_lanes(rays_[i])) {
+        set(i, 0.0f, 0.0f, BoxRay<N, false>(Ray{}, 0.0f));
+        continue;
+      }
+      if (padded_) {
+        set(i, first_distance(rays_[i]), rays_[i].tfar, BoxRay<N, true>(rays_[i], max_coordinate_));
+      } else {
+        set(i, first_distance(rays_[i]), rays_[i].tfar, BoxRay<N, false>(rays_[i], max_coordinate_));
+      }
+      const auto negative = [&](int axis) { return unsigned(__builtin_signbit(r_[axis][i]) != 0); };
+      octants[negative(0) | negative(1) << 1 | negative(2) << 2] |= std::uint64_t{1} << i;
+      valid_ |= std::uint64_t{1} << i;
+      new (static_cast<void*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(rays_[i]));
+    }
+    for (int i = count; i < chunks_ * W; ++i) set(i, 0.0f, 0.0f, BoxRay<N, false>(Ray{}, 0.0f));
+  }
+  template <class Box>
+  ARBORETUM_INLINE void set(int i, float tnear, float tfar, const Box& b) {
+    tnear_[i] = tnear, t_[i] = tfar;
+    r_[0][i] = b.rx, r_[1][i] = b.ry, r_[2][i] = b.rz;
+    near_[0][i] = b.fx, near_[1][i] = b.fy, near_[2][i] = b.fz;
+    far_[0][i] = b.gx, far_[1][i] = b.gy, far_[2][i] = b.gz;
+  }
+
+  Interval interval_of(std::uint64_t mask) const {
+    Interval v;
+    v.usable = true;
+    v.tnear = std::numeric_limits<float>::infinity();
+    float o_low[3], o_high[3];
+    for (int a = 0; a < 3; ++a)
+      v.r_low[a] = o_low[a] = std::numeric_limits<float>::infinity(), v.r_high[a] = o_high[a] = -std::numeric_limits<float>::infinity();
+    for (std::uint64_t rest = mask; rest; rest &= rest - 1) {
+      const int i = __builtin_ctzll(rest);
+      const float* o = &rays_[i].origin.x;
+      v.tnear = tnear_[i] < v.tnear ? tnear_[i] : v.tnear;
+      for (int a = 0; a < 3; ++a) {
+        const float r = r_[a][i];
+        v.r_low[a] = r < v.r_low[a] ? r : v.r_low[a], v.r_high[a] = r > v.r_high[a] ? r : v.r_high[a];
+        o_low[a] = o[a] < o_low[a] ? o[a] : o_low[a], o_high[a] = o[a] > o_high[a] ? o[a] : o_high[a];
+      }
+    }
+    for (int a = 0; a < 3; ++a) {
+      const bool negative = __builtin_signbit(v.r_low[a]) != 0;
+      const float r = negative ? -v.r_low[a] : v.r_high[a];
+      const float o = -o_low[a] > o_high[a] ? -o_low[a] : o_high[a];
+      v.near_origin[a] = negative ? o_low[a] : o_high[a], v.far_origin[a] = negative ? o_high[a] : o_low[a];
+      v.pad[a] = 0x1p-20f * (max_coordinate_ + o) * r + 0x1p-99f;
+      v.near[a] = unsigned(2 * a + negative) * kPlane;
+      v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
+    }
+    return v;
+  }
+
+  /// The children that some ray of the packet may meet, and where it enters them at the earliest.
+  ARBORETUM_INLINE unsigned children_met(const Interval& v, const std::byte* node, float tfar, Children& entry) const {
+    Children near(v.tnear), far(tfar);
+    for (int a = 0; a < 3; ++a) {
+      const Children low(v.r_low[a]), high(v.r_high[a]), pad(v.pad[a]);
+      const Children n = Children::load(node + v.near[a]) - Children(v.near_origin[a]);
+      const Children f = Children::load(node + (unsigned(4 * a + 1) * kPlane - v.near[a])) - Children(v.far_origin[a]);
+      near = max_x86(min_x86(n * low, n * high) - pad, near);
+      far = min_x86(max_x86(f * low, f * high) + pad, far);
+    }
+    entry = near;
+    const unsigned bits = (near <= far).bits();
+    return N == kLanes ? bits : bits & ((1u << N) - 1u);
+  }
+
+  /// Those of `mask` that meet child i.
+  ARBORETUM_INLINE std::uint64_t rays_met(const unsigned (&near)[3], const std::byte* node, int i, std::uint64_t mask) const {
+    const auto plane = [&](unsigned offset) {
+      float p;
+      std::memcpy(&p, node + offset + std::size_t(i) * sizeof(float), sizeof p);
+      return F(p);
+    };
+    const F nx = plane(near[0]), ny = plane(near[1]), nz = plane(near[2]);
+    const F fx = plane(1 * kPlane - near[0]), fy = plane(5 * kPlane - near[1]), fz = plane(9 * kPlane - near[2]);
+    std::uint64_t met = 0;
+    for (int c = 0; c < chunks_; ++c) {
+      const unsigned in = unsigned(mask >> (c * W)) & ((1u << W) - 1u);
+      if (in == 0) continue;
+      const int k = c * W;
+      const F rx = F::load(r_[0] + k), ry = F::load(r_[1] + k), rz = F::load(r_[2] + k);
+      const auto at = [](F p, F r, const float* o) {
+        if constexpr (kHasFma) {
+          return msub(p, r, F::load(o));
+        } else {
+          return (p - F::load(o)) * r;
+        }
+      };
+      const F enter = max_x86(max_x86(at(nx, rx, near_[0] + k), at(ny, ry, near_[1] + k)), max_x86(at(nz, rz, near_[2] + k), F::load(tnear_ + k)));
+      const F leave = min_x86(min_x86(at(fx, rx, far_[0] + k), at(fy, ry, far_[1] + k)), min_x86(at(fz, rz, far_[2] + k), F::load(t_ + k)));
+      met |= std::uint64_t((enter <= leave).bits() & in) << k;
+    }
+    return met;
+  }
+
+  [[nodiscard]] float farthest(std::uint64_t mask) const {
+    F most(-std::numeric_limits<float>::infinity());
+    for (int c = 0; c < chunks_; ++c) {
+      const unsigned in = unsigned(mask >> (c * W)) & ((1u << W) - 1u);
+      most = max_x86(most, select(vm<W>::from_bits(in), F::load(t_ + c * W), most));
+    }
+    alignas(64) float lanes[W];
+    most.store(lanes);
+    float t = lanes[0];
+    for (int i = 1; i < W; ++i) t = lanes[i] > t ? lanes[i] : t;
+    return t;
+  }
+
+  void traverse(std::uint64_t group) {
+    const Interval interval = interval_of(group);
+    float tfar = farthest(group);
+    Entry* const stack = stack_.data();
+    Entry* top = stack;
+    Entry e{root_, interval.tnear, group};
+    for (;;) {
+      while (!bvh::is_leaf(e.reference)) {
+        if (__builtin_popcountll(e.mask) <= threshold_) {
+          for (std::uint64_t rest = e.mask; rest; rest &= rest - 1) alone(__builtin_ctzll(rest), e.reference);
+          if constexpr (!AnyHit) tfar = farthest(group);
+          goto pop;
+        }
+        const std::byte* node = base_ + bvh::offset_of(e.reference);
+        Children entry;
+        unsigned hit;
+        if (__builtin_expect(interval.usable, 1)) {
+          hit = children_met(interval, node, tfar, entry);
+        } else {
+          entry = Children(interval.tnear);
+          hit = (1u << SoaNodeTest<N, false>::boxes(node)) - 1u;
+        }
+        alignas(64) float t[kLanes];
+        entry.store(t);
+        const bvh::NodeReference* child = SoaNodeTest<N, false>::children(node);
+        Entry* const bottom = top;
+        [[maybe_unused]] unsigned taken = 0;
+        for (; hit; hit &= hit - 1) {
+          const int i = __builtin_ctz(hit);
+          const std::uint64_t mask = rays_met(interval.near, node, i, e.mask);
+          if (mask == 0) continue;
+          ++taken;
+          const auto* target = reinterpret_cast<const char*>(base_ + bvh::offset_of(child[i]));
+          for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
+          Entry* p = top++;
+          for (; p != bottom && p[-1].t < t[i]; --p) *p = p[-1];
+          *p = {child[i], t[i], mask};
+        }
+        if constexpr (Counting::kCounting) count(node, unsigned(__builtin_popcountll(e.mask)), taken);
+        if (top == bottom) goto pop;
+        e = *--top;
+      }
+      leaf(e);
+      if constexpr (!AnyHit) tfar = farthest(group);
+    pop:
+      for (;;) {
+        if (top == stack) return;
+        e = *--top;
+        if constexpr (AnyHit) e.mask &= active_;
+        if (e.mask != 0 && (AnyHit || e.t <= tfar)) break;
+      }
+    }
+  }
+
+  void alone(int i, bvh::NodeReference reference) {
+    const auto below = padded_ ? &trace_below<N, Leaves, true, AnyHit, Counting> : &trace_below<N, Leaves, false, AnyHit, Counting>;
+    const bool hit = below(base_, reference, max_coordinate_, leaves_, form_, counting_, single_stack_.data(), rays_[i], data(i), best_[i]);
+    if constexpr (AnyHit) {
+      if (hit) occluded(i);
+    }
+    t_[i] = best_[i].t;
+  }
+  void occluded(int i) {
+    best_[i].primitive = 0;
+    active_ &= ~(std::uint64_t{1} << i);
+  }
+
+  void leaf(const Entry& e) {
+    const std::byte* const blocks = base_ + bvh::offset_of(e.reference);
+    const unsigned count = bvh::block_count(e.reference);
+    for (std::uint64_t rest = e.mask; rest; rest &= rest - 1) {
+      const int i = __builtin_ctzll(rest);
+      if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
+      if constexpr (AnyHit) {
+        if (leaves_.any_hit(data(i), blocks, count, rays_[i].tnear, rays_[i].tfar)) occluded(i);
+      } else {
+        if (leaves_.closest_hit(data(i), blocks, count, rays_[i].tnear, best_[i])) t_[i] = best_[i].t;
+      }
+    }
+  }
+
+  /// A node visit of a packet counts as one of each of its rays.
+  void count(const std::byte* node, unsigned rays, unsigned taken) const {
+    const unsigned boxes = SoaNodeTest<N, false>::boxes(node);
+    for (unsigned i = 0; i < rays; ++i) counting_.node(boxes, kLanes, taken);
+  }
+
+  const std::byte* base_;
+  const bvh::NodeReference root_;
+  const float max_coordinate_;
+  const bool padded_;
+  Leaves leaves_;
+  const LeafForm& form_;
+  Counting counting_;
+  const Ray* rays_ = nullptr;
+  int threshold_ = 0, chunks_ = 0;
+  std::uint64_t active_ = 0, valid_ = 0;
+  alignas(64) float r_[3][kMostPacketRays], near_[3][kMostPacketRays], far_[3][kMostPacketRays], tnear_[kMostPacketRays], t_[kMostPacketRays];
+  NearestHit best_[kMostPacketRays];
+  alignas(64) std::byte data_[kMostPacketRays * sizeof(typename Leaves::RayData)];
+  BatchStack<Entry, 512> stack_;
+  TraversalStack single_stack_;
+};
+
+/// Packets of `Rays` rays that follow each other in the batch; with no more than `Threshold` of them in a node they go on alone.
+template <int N, int Rays, int Threshold>
+struct BvhPacketFunctions {
+  static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
+
+  template <int W, class Leaves, class Counting>
+  struct Batch {
+    static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+      packets<false>(accel, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+    }
+    static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+      packets<true>(accel, row, rays, counters, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
+    }
+    template <bool AnyHit, class Report>
+    static ARBORETUM_INLINE void packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
+      BvhPackets<N, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
+      for (std::size_t begin = 0; begin < rays.size(); begin += Rays) {
+        const int count = int(std::min<std::size_t>(Rays, rays.size() - begin));
+        packet.trace(&rays[begin], count, Threshold);
+        for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
+      }
+      if constexpr (Counting::kCounting) counters->rays += rays.size();
+    }
+  };
+
+  template <class Leaves, bool>
+  static RowFunctions timed() {
+    using B = Batch<(Rays < kNative ? Rays : kNative), Leaves, NoCounters>;
+    return {&B::closest_hit, &B::any_hit};
+  }
+  /// What is visited does not depend on the lanes.
+  template <bool>
+  static RowFunctions counting() {
+    using B = Batch<kNative, CalledLeaves, WithCounters>;
+    return {&B::closest_hit, &B::any_hit};
+  }
+};
+
+template <int N>
+void add_packet_rows(KernelRows& rows) {
+  using Structure = bvh::Bvh<N>;
+  add_rows<Structure, BvhPacketFunctions<N, 4, 0>>(rows, "packet4", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<N, 8, 0>>(rows, "packet8", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<N, 16, 0>>(rows, "packet16", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<N, 32, 4>>(rows, "packet32", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<N, 64, 6>>(rows, "packet64", PacketLeaves{});
+  add_rows<Structure, BvhPacketFunctions<N, 4, 1>>(rows, "hybrid4", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<N, 8, 2>>(rows, "hybrid8", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<N, 16, 3>>(rows, "hybrid16", TypeList<>{});
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
