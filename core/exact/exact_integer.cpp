@@ -21,11 +21,13 @@ struct Parts {
 
 Parts parts_of(double x) {
   if (x == 0.0) return {};
-  int exponent = 0;
-  long long mantissa = static_cast<long long>(std::ldexp(std::frexp(x, &exponent), 53));
-  exponent -= 53;
-  while ((mantissa & 1) == 0) mantissa >>= 1, ++exponent;
-  return {mantissa, exponent};
+  const auto bits = std::bit_cast<std::uint64_t>(x);
+  const int field = static_cast<int>(bits >> 52 & 0x7ff);
+  const std::uint64_t fraction = bits & 0xfffffffffffffu;
+  const std::uint64_t whole = field == 0 ? fraction : fraction | 0x10000000000000u;
+  const int zeros = std::countr_zero(whole);
+  const auto mantissa = static_cast<long long>(whole >> zeros);
+  return {x < 0 ? -mantissa : mantissa, std::max(field, 1) - 1075 + zeros};
 }
 
 ExactInteger shifted(ExactInteger x, int bits) {

@@ -95,7 +95,7 @@ int compare_distances_exactly(const Ray& ray, const Corners& first, const Corner
 RoundedHit round_exactly(const Ray& ray, const Corners& corners) noexcept {
   const DoublePoint p = point_in_double(ray, corners);
   const float t = static_cast<float>(p.t - p.radius);
-  if (t == static_cast<float>(p.t + p.radius) && p.weight_radius < 0x1p-40) return {t, weight(p.u), weight(p.v)};
+  if (t == static_cast<float>(p.t + p.radius) && p.weight_radius < 0x1p-30) return {t, weight(p.u), weight(p.v)};
   const RoundedPoint exact = ExactPredicate(ray).round(corners);
   return {exact.t_rounded, exact.u, exact.v};
 }

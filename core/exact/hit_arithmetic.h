@@ -28,7 +28,7 @@ struct DistanceInterval {
                                             const std::array<Vec3f, 3>& second) noexcept;
 
 /// A hit's t, rounded correctly from the exact value (nearest, ties to even; infinity beyond the float32 range), and the weights of
-/// the second and third corner, within [0, 1], each off by no more than an ulp of itself or 2^-40.
+/// the second and third corner, within [0, 1], each off by no more than an ulp of itself or 2^-30.
 struct RoundedHit {
   float t, u, v;
 };
