@@ -5,3 +5,4 @@
 #include "intersectors/moller_trumbore.h"
 #include "intersectors/pluecker.h"
 #include "intersectors/watertight.h"
+#include "intersectors/exact.h"

@@ -61,6 +61,8 @@ struct BoxRay {
         gx -= ex, gy -= ey, gz -= ez;
       }
     }
+    if (__builtin_expect(!(__builtin_fabsf(fx) + __builtin_fabsf(fy) + __builtin_fabsf(fz) < 0x1p126f), 0))
+      leave_out(rx, fx, gx), leave_out(ry, fy, gy), leave_out(rz, fz, gz);
     near_x = __builtin_signbit(rx) ? kSide : 0u;
     near_y = 2 * kSide + (__builtin_signbit(ry) ? kSide : 0u);
     near_z = 4 * kSide + (__builtin_signbit(rz) ? kSide : 0u);
@@ -71,6 +73,15 @@ struct BoxRay {
     const float x = __builtin_fabsf(d.x), y = __builtin_fabsf(d.y), z = __builtin_fabsf(d.z);
     const float xy = x > y ? x : y;
     return xy > z ? xy : z;
+  }
+  /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN. Its interval becomes
+  /// all t for boxes that exist, and stays empty for others.
+  static void leave_out(float& r, float& f, float& g) {
+    if (__builtin_fabsf(f) < 0x1p124f) return;
+    constexpr float largest = std::numeric_limits<float>::max();
+    r = __builtin_copysignf(1.0f, r);
+    f = kHasFma ? largest : __builtin_copysignf(largest, r);
+    g = -f;
   }
   static ARBORETUM_INLINE float reciprocal(float d, float tiny, float limit) {
     return __builtin_fabsf(d) > tiny ? 1.0f / d : __builtin_copysignf(limit, d);

@@ -18,6 +18,7 @@
 
 #include <immintrin.h>
 
+#include "core/exact/hit_arithmetic.h"
 #include "core/isa.h"
 #include "core/ray.h"
 #include "core/type_list.h"

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <limits>
 
+#include <emmintrin.h>
+
 #include "core/exact/exact_predicate.h"
 
 namespace arboretum {
@@ -18,20 +20,41 @@ namespace {
 constexpr double kBound = 56 * 0x1p-53;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-struct Double3 {
-  double x, y, z;
+/// Two triples of doubles side by side: what is done to one is done to the other in the same instruction.
+struct Pair3 {
+  __m128d x, y, z;
 };
-Double3 difference(Vec3f a, Vec3f b) {
-  return {double(a.x) - double(b.x), double(a.y) - double(b.y), double(a.z) - double(b.z)};
+Pair3 operator-(const Pair3& a, const Pair3& b) {
+  return {_mm_sub_pd(a.x, b.x), _mm_sub_pd(a.y, b.y), _mm_sub_pd(a.z, b.z)};
 }
-Double3 cross(Double3 a, Double3 b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+Pair3 pair(Vec3f low, Vec3f high) {
+  return {_mm_setr_pd(low.x, high.x), _mm_setr_pd(low.y, high.y), _mm_setr_pd(low.z, high.z)};
 }
-double dot(Double3 a, Double3 b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
+__m128d swapped(__m128d a) {
+  return _mm_shuffle_pd(a, a, 1);
 }
-double size_of(Double3 a) {
-  return std::max(std::max(std::fabs(a.x), std::fabs(a.y)), std::fabs(a.z));
+Pair3 swapped(const Pair3& a) {
+  return {swapped(a.x), swapped(a.y), swapped(a.z)};
+}
+__m128d difference_of_products(__m128d a, __m128d b, __m128d c, __m128d d) {
+  return _mm_sub_pd(_mm_mul_pd(a, b), _mm_mul_pd(c, d));
+}
+Pair3 cross(const Pair3& a, const Pair3& b) {
+  return {difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
+          difference_of_products(a.x, b.y, a.y, b.x)};
+}
+__m128d dot(const Pair3& a, const Pair3& b) {
+  return _mm_add_pd(_mm_add_pd(_mm_mul_pd(a.x, b.x), _mm_mul_pd(a.y, b.y)), _mm_mul_pd(a.z, b.z));
+}
+__m128d size_of(const Pair3& a) {
+  const __m128d sign = _mm_set1_pd(-0.0);
+  return _mm_max_pd(_mm_max_pd(_mm_andnot_pd(sign, a.x), _mm_andnot_pd(sign, a.y)), _mm_andnot_pd(sign, a.z));
+}
+double low(__m128d a) {
+  return _mm_cvtsd_f64(a);
+}
+double high(__m128d a) {
+  return _mm_cvtsd_f64(_mm_unpackhi_pd(a, a));
 }
 
 /// t within `radius` of the exact one, infinite where the determinant may be near 0; weights of the second and third corner within
@@ -40,20 +63,22 @@ struct DoublePoint {
   double t, radius, u, v, weight_radius;
 };
 
-DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
-  const Double3 d{ray.direction.x, ray.direction.y, ray.direction.z};
-  const Double3 e1 = difference(corners[1], corners[0]), e2 = difference(corners[2], corners[0]), s = difference(ray.origin, corners[0]);
-  const Double3 p = cross(d, e2), q = cross(s, e1);
-  const double det = dot(e1, p), inverse = 1.0 / det;
-  const double size_d = size_of(d), size_1 = size_of(e1), size_2 = size_of(e2), size_s = size_of(s);
-  DoublePoint r{dot(e2, q) * inverse, 0.0, dot(s, p) * inverse, dot(d, q) * inverse, 0.0};
+inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
+  const Vec3f a = corners[0];
+  const Pair3 e = pair(corners[1], corners[2]) - pair(a, a);                // e1, e2
+  const Pair3 ds = pair(ray.direction, ray.origin) - pair(Vec3f{}, a);      // d, s
+  const Pair3 pq = cross(ds, swapped(e));                                   // d x e2, s x e1
+  const __m128d det_t = dot(e, pq), weights = dot(swapped(ds), pq);
+  const __m128d size_e = size_of(e), size_ds = size_of(ds);
+  const __m128d det = _mm_unpacklo_pd(det_t, det_t);
   // (n + dn) / (det + dd) - n / det = (dn - (n / det) dd) / (det + dd), and dd is at most 2^-9 |det|.
-  const double scale = kBound * (1 + 0x1p-8) * std::fabs(inverse);
-  const double det_error = scale * size_d * size_1 * size_2;
-  if (!(det_error < 0x1p-9)) return {r.t, std::numeric_limits<double>::infinity(), r.u, r.v, 1.0};
-  r.radius = scale * size_1 * size_2 * size_s + std::fabs(r.t) * (det_error + 0x1p-50);
-  r.weight_radius = scale * size_d * size_s * std::max(size_1, size_2) + det_error + 0x1p-50;
-  return r;
+  const __m128d scale_t = _mm_div_pd(_mm_shuffle_pd(_mm_set1_pd(kBound * (1 + 0x1p-8)), det_t, 2), det);
+  const __m128d uv = _mm_div_pd(weights, det);
+  const double t = high(scale_t), scale = std::fabs(low(scale_t)), size_1 = low(size_e), size_2 = high(size_e);
+  const double size_d = low(size_ds), size_s = high(size_ds), det_error = scale * size_1 * size_2 * size_d;
+  if (!(det_error < 0x1p-9)) return {t, std::numeric_limits<double>::infinity(), low(uv), high(uv), 1.0};
+  return {t, scale * size_1 * size_2 * size_s + std::fabs(t) * (det_error + 0x1p-50), low(uv), high(uv),
+          scale * size_d * size_s * std::max(size_1, size_2) + det_error + 0x1p-50};
 }
 
 float rounded_down(double x) {

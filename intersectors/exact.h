@@ -1,0 +1,204 @@
+// Exact: hit or miss, the nearest primitive (of equal distances the lowest id) and the rounded t are those of rational arithmetic on
+// the float32 inputs. A float filter with a proved bound decides nearly all lanes; exact arithmetic (core/exact/hit_arithmetic.h)
+// decides the others. The idea of a filter is Shewchuk's (Adaptive Precision, 1997); its form is the sheared one of Woop, Benthin
+// and Wald (JCGT 2(1) 2013), as in watertight.h.
+//
+// The bound. u = 2^-24; p = (x, y, z) a vertex as seen from the origin, permuted so that |d_z| is the largest; S = d_x / d_z, so
+// |S| <= 1; x' = x - S z (y' likewise) the exact sheared vertex, x^ the computed one; Z, L the largest |z^| and |x^|, |y^| of a
+// triangle. z^ and the difference x are off by u of themselves, S by u / 2; |x| <= |x'| + |z|. So the shear is off by
+//   u (L + Z) + u Z + u Z / 2 + u L = u (2 L + 2.5 Z) < delta = u (2 L + 3 Z)   fused (what underflow adds, 2^-150, is less than
+// the slack u (L + Z / 2), or else so small that the last term of E holds it), with u Z more where the product is rounded.
+//   An edge function U = x^_c y^_b - y^_c x^_b is then off by 4 L delta + 2 delta^2, and by its own roundings, 3 u L^2 fused and
+// 4 u L^2 not: by less than u (12 L Z + 11 L^2) + 18 u^2 Z^2 + higher terms fused, and u (14 L Z + 12 L^2) + 25 u^2 Z^2 not. Hence
+//   E = k u (L + 7 u Z) (L + Z) + 2^-140,  k = 12.5 fused, 14.5 not:
+// at least 3.5 % are left for E's own five roundings, and 2^-140 is more than all underflows. U, V, W all beyond E on one side:
+// certainly hit; one beyond E, another beyond -E: certainly missed; else exact arithmetic. An overflow of z^, x^, y^ or of a product
+// makes E infinite or NaN, since (L + 7 u Z) (L + Z) is no less than any product, and then nothing is certain. Denormals must not be
+// flushed.
+//
+// Distances. With z in units of t (times 1 / d_z), t is the mean of the vertices' z with weights U / (U + V + W) >= 0. The weights'
+// errors move it by less than (E / |U + V + W|) (|z_a - t| + |z_b - t| + |z_c - t|) <= 2 (E / |U + V + W|) (z_max - z_min); the
+// roundings of weights, z and their sum by 4, 3 and 3 u max |z|, those of z_max - z_min by 4 u max |z| more, as E < |U + V + W| / 3.
+// The interval about t is padded by 3 E / |U + V + W| (z_max - z_min) + 20 u max |z| + 2^-140. A hit that the filter has not decided
+// lies within [z_min, z_max], padded by 8 u max |z|.
+//
+// The nearest. A hit is left out only when its interval lies beyond that of the best; where they overlap the exact distances are
+// compared. best.t is the high end of the best hit's interval until finish(), so that no box in front of the exact t is culled.
+#pragma once
+
+#include "intersectors/leaf_block.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+struct Exact {
+  static constexpr std::string_view kName = "exact";
+  static constexpr bool kNeedsVertices = true;
+  static constexpr bool kEveryLeaf = true;
+
+  /// The ray's constants as in watertight.h, and the search's state: the best hit's corners and the low end of its interval.
+  struct RayData {
+    float ox, oy, oz, sx, sy, sz;
+    int kx, ky, kz;
+    Vec3f origin, direction;
+    bool has_best = false;
+    float best_low = 0.0f;
+    std::array<Vec3f, 3> best;
+
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {
+      const float ax = __builtin_fabsf(ray.direction.x), ay = __builtin_fabsf(ray.direction.y), az = __builtin_fabsf(ray.direction.z);
+      kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
+      kx = kz == 2 ? 0 : kz + 1;
+      ky = kx == 2 ? 0 : kx + 1;
+      const float* o = &ray.origin.x;
+      const float* d = &ray.direction.x;
+      ox = o[kx], oy = o[ky], oz = o[kz];
+      sx = d[kx] / d[kz], sy = d[ky] / d[kz], sz = 1.0f / d[kz];
+      // Where 1 / d_z is not within u of itself: NaN leaves every lane to exact arithmetic.
+      const float largest = __builtin_fabsf(d[kz]);
+      if (__builtin_expect(!(largest >= 0x1p-120f && largest <= 0x1p120f), 0)) sx = sz = std::numeric_limits<float>::quiet_NaN();
+    }
+  };
+
+  /// True when `best` has changed.
+  template <class Block>
+  static ARBORETUM_INLINE bool closest_hit_block(RayData& ray, const Block& block, float tnear, NearestHit& best) {
+    const Edges<Block::kWidth> edges = filter(ray, block);
+    if (__builtin_expect(edges.candidates() == 0, 1)) return false;
+    Distances<Block::kWidth> d;
+    find_distances(ray, edges, tnear, best.t, d);
+    return d.candidates != 0 && nearest(ray, block, d, tnear, best);
+  }
+
+  template <class Block>
+  static ARBORETUM_INLINE bool any_hit_block(RayData& ray, const Block& block, float tnear, float tfar) {
+    const Edges<Block::kWidth> edges = filter(ray, block);
+    if (__builtin_expect(edges.candidates() == 0, 1)) return false;
+    Distances<Block::kWidth> d;
+    find_distances(ray, edges, tnear, tfar, d);
+    return d.candidates != 0 && any_within(ray, block, d, tnear, tfar);
+  }
+
+  /// Rounds t, u and v of the nearest hit.
+  static ARBORETUM_INLINE void finish(RayData& ray, NearestHit& best) {
+    if (!ray.has_best) return;
+    const RoundedHit hit = round_exactly({ray.origin, 0.0f, ray.direction, best.t}, ray.best);
+    best.t = hit.t, best.u = hit.u, best.v = hit.v;
+  }
+
+ private:
+  static constexpr float kBound = (kHasFma ? 12.5f : 14.5f) * 0x1p-24f;
+  static constexpr float kLeast = 0x1p-140f;
+
+  /// A block after the filter: sheared depths, edge functions, the least and the greatest of these, their bound.
+  template <int W>
+  struct Edges {
+    vf<W> az, bz, cz, u, v, w, lowest, highest, error;
+
+    /// Lanes that are not certainly missed. An error that is not finite misses nothing; an empty lane's depth is NaN, that of a
+    /// triangle never.
+    ARBORETUM_INLINE unsigned candidates() const { return (az == az).bits() & ~(min_x86(highest, -lowest) > error).bits(); }
+    ARBORETUM_INLINE vm<W> certainly_hit() const { return max_x86(lowest, -highest) > error; }
+  };
+
+  /// The candidates within an interval: t of lane i is within [low[i], high[i]] if it is hit; the `certain` lanes are.
+  template <int W>
+  struct Distances {
+    unsigned candidates, certain;
+    alignas(64) float low[W], high[W];
+  };
+
+  template <class Block>
+  static ARBORETUM_INLINE Edges<Block::kWidth> filter(const RayData& ray, const Block& block) {
+    using F = vf<Block::kWidth>;
+    const F ox(ray.ox), oy(ray.oy), oz(ray.oz), sx(ray.sx), sy(ray.sy);
+    const F az = F::load(block.v0[ray.kz]) - oz, bz = F::load(block.v1[ray.kz]) - oz, cz = F::load(block.v2[ray.kz]) - oz;
+    const F ax = nmadd(sx, az, F::load(block.v0[ray.kx]) - ox), ay = nmadd(sy, az, F::load(block.v0[ray.ky]) - oy);
+    const F bx = nmadd(sx, bz, F::load(block.v1[ray.kx]) - ox), by = nmadd(sy, bz, F::load(block.v1[ray.ky]) - oy);
+    const F cx = nmadd(sx, cz, F::load(block.v2[ray.kx]) - ox), cy = nmadd(sy, cz, F::load(block.v2[ray.ky]) - oy);
+    const F u = msub(cx, by, cy * bx), v = msub(ax, cy, ay * cx), w = msub(bx, ay, by * ax);
+    const F width = max_x86(max_x86(max_x86(abs(ax), abs(ay)), max_x86(abs(bx), abs(by))), max_x86(abs(cx), abs(cy)));
+    const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz));
+    const F error = madd(F(kBound), madd(F(7.0f * 0x1p-24f), depth, width) * (depth + width), F(kLeast));
+    return {az, bz, cz, u, v, w, min_x86(min_x86(u, v), w), max_x86(max_x86(u, v), w), error};
+  }
+
+  template <int W>
+  static ARBORETUM_INLINE void find_distances(const RayData& ray, const Edges<W>& l, float tnear, float tfar, Distances<W>& d) {
+    using F = vf<W>;
+    const F sz(ray.sz), za = sz * l.az, zb = sz * l.bz, zc = sz * l.cz;
+    const F nearest = min_x86(min_x86(za, zb), zc), farthest = max_x86(max_x86(za, zb), zc);
+    const F size = max_x86(abs(nearest), abs(farthest));
+    const F det = l.u + l.v + l.w, inverse = F(1.0f) / det;
+    const F t = madd(l.u * inverse, za, madd(l.v * inverse, zb, (l.w * inverse) * zc));
+    const F spread = madd(F(3.0f) * l.error * abs(inverse), farthest - nearest, madd(F(20.0f * 0x1p-24f), size, F(kLeast)));
+    // Beyond 2^126 the reciprocal loses bits, or all.
+    const vm<W> certain =
+        l.certainly_hit() & (abs(det) < F(0x1p126f)) & (abs(t) + spread < F(std::numeric_limits<float>::infinity()));
+    const F pad = madd(F(8.0f * 0x1p-24f), size, F(kLeast));
+    const F low = select(certain, t - spread, nearest - pad), high = select(certain, t + spread, farthest + pad);
+    low.store(d.low), high.store(d.high);
+    d.certain = certain.bits();
+    // Comparisons that a NaN makes false: a lane without a usable interval stays.
+    d.candidates = l.candidates() & ~((low > F(tfar)) | (high < F(tnear))).bits();
+  }
+
+  template <class Block>
+  static ARBORETUM_INLINE std::array<Vec3f, 3> corners(const Block& block, int i) {
+    return {Vec3f{block.v0[0][i], block.v0[1][i], block.v0[2][i]}, Vec3f{block.v1[0][i], block.v1[1][i], block.v1[2][i]},
+            Vec3f{block.v2[0][i], block.v2[1][i], block.v2[2][i]}};
+  }
+
+  template <class Block>
+  static __attribute__((noinline)) bool nearest(RayData& ray, const Block& block, const Distances<Block::kWidth>& d, float tnear, NearestHit& best) {
+    bool changed = false;
+    for (unsigned rest = d.candidates; rest; rest &= rest - 1) {
+      const int i = __builtin_ctz(rest);
+      changed |= offer(ray, corners(block, i), std::int32_t(block.id[i]), (d.certain >> i & 1u) != 0, {d.low[i], d.high[i]}, tnear, best);
+    }
+    return changed;
+  }
+
+  /// Takes a lane for the best hit if it is: it may be hit, at a t within `t`.
+  static __attribute__((noinline)) bool offer(RayData& ray, const std::array<Vec3f, 3>& corner, std::int32_t id, bool certain,
+                                              DistanceInterval t, float tnear, NearestHit& best) {
+    if (ray.has_best && (t.low > best.t || id == best.primitive)) return false;
+    // Nothing beyond the best hit is asked for, but its t is not known exactly: that is compared below.
+    const Ray exact{ray.origin, tnear, ray.direction, ray.has_best ? std::numeric_limits<float>::infinity() : best.t};
+    if (!certain || t.low < tnear || t.high > exact.tfar) {
+      if (!meets_exactly(exact, corner, t)) return false;
+    } else if (t.high - t.low > kWide * __builtin_fabsf(t.high)) {
+      const DistanceInterval closer = distance_in_double(exact, corner);
+      if (closer.low > t.low) t.low = closer.low;
+      if (closer.high < t.high) t.high = closer.high;
+    }
+    if (ray.has_best && t.high >= ray.best_low) {
+      if (t.low > best.t) return false;
+      const int order = compare_distances_exactly(exact, corner, ray.best);
+      if (order > 0 || (order == 0 && id > best.primitive)) return false;
+    }
+    ray.has_best = true, ray.best = corner, ray.best_low = t.low;
+    if (t.high < best.t) best.t = t.high;  // else the old bound, which holds for what is nearer still
+    best.primitive = id;
+    return true;
+  }
+
+  template <class Block>
+  static __attribute__((noinline)) bool any_within(const RayData& ray, const Block& block, const Distances<Block::kWidth>& d, float tnear, float tfar) {
+    for (unsigned rest = d.candidates & d.certain; rest; rest &= rest - 1) {
+      const int i = __builtin_ctz(rest);
+      if (d.low[i] >= tnear && d.high[i] <= tfar) return true;
+    }
+    for (unsigned rest = d.candidates; rest; rest &= rest - 1) {
+      DistanceInterval t;
+      if (meets_exactly({ray.origin, tnear, ray.direction, tfar}, corners(block, __builtin_ctz(rest)), t)) return true;
+    }
+    return false;
+  }
+
+  /// Width of an interval, relative to t, above which doubles narrow it: a wide one lets boxes through that lie behind the hit.
+  static constexpr float kWide = 0x1p-14f;
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,285 @@
+// The intersector `exact`: hit or miss, primitive and rounded t against rational arithmetic, on rays that are aimed to be hard.
+//
+// ARBORETUM_EXACT_EFFORT=100 takes a hundred times as many rays.
+//
+// What these tests see, tried by breaking intersectors/exact.h: the bound's 12.5 (14.5) made 1 gives wrong primitives and misses; so
+// do a pad of 1 u for 20 u about t, best.t left at the low end of its interval, and equal distances given to the last that comes.
+#include <cstdlib>
+#include <functional>
+#include <sstream>
+
+#include "core/exact/hit_arithmetic.h"
+#include "oracle/oracle.h"
+#include "tests/catch.h"
+#include "tests/hard_cases.h"
+#include "tests/kernel_runner.h"
+#include "tests/kernel_scenes.h"
+#include "tests/rational_brute_force.h"
+#include "tests/small_meshes.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+namespace {
+
+std::size_t effort() {
+  const char* text = std::getenv("ARBORETUM_EXACT_EFFORT");
+  const long value = text ? std::strtol(text, nullptr, 10) : 1;
+  return value > 0 ? std::size_t(value) : 1;
+}
+
+/// The rows with boxes that keep their promise.
+std::vector<KernelRow> exact_rows() {
+  std::vector<KernelRow> rows;
+  for (const KernelRow& row : runnable_rows())
+    if (row.intersector == "exact" && row.box == "padded") rows.push_back(row);
+  return rows;
+}
+
+/// Of them, single rays through some structures.
+std::vector<KernelRow> single_rows(std::initializer_list<std::string_view> structures) {
+  std::vector<KernelRow> rows;
+  for (const KernelRow& row : exact_rows())
+    if (row.traversal == "single" && std::ranges::find(structures, row.structure) != structures.end()) rows.push_back(row);
+  return rows;
+}
+
+/// What a kernel must answer: the lowest id of those at the nearest t, and t as a float. u and v are near the oracle's, within an ulp.
+struct Truth {
+  std::vector<Hit> hits;
+
+  static Truth by_oracle(const TriangleMesh& mesh, std::span<const Ray> rays) {
+    Truth truth;
+    for (const ExactHit& hit : Oracle(mesh).closest_hit(rays)) truth.hits.push_back(hit.hit);
+    return truth;
+  }
+  /// Shares nothing with core/exact.
+  static Truth by_rationals(const TriangleMesh& mesh, std::span<const Ray> rays) {
+    Truth truth;
+    for (const Ray& ray : rays) {
+      const rational::Answer answer = rational::closest_hit(mesh, ray);
+      Hit hit;
+      if (!answer.nearest.empty()) {
+        hit = {nearest_float(answer.t), answer.u.convert_to<float>(), answer.v.convert_to<float>(), answer.nearest.front()};
+      }
+      truth.hits.push_back(hit);
+    }
+    return truth;
+  }
+  static float nearest_float(const rational::Number& x) {
+    if (abs(x) >= rational::Number("340282356779733661637539395458142568448")) return x > 0 ? kInfinity : -kInfinity;
+    float f = static_cast<float>(x.convert_to<double>());  // the right one or its neighbour
+    for (const float candidate : {f, std::nextafter(f, -kInfinity), std::nextafter(f, kInfinity)})
+      if (std::isfinite(candidate) && rational::is_rounded(x, candidate)) return candidate;
+    return std::numeric_limits<float>::quiet_NaN();
+  }
+};
+
+std::string literal(const Ray& ray) {
+  std::ostringstream s;
+  s << std::hexfloat << "{{" << ray.origin.x << ", " << ray.origin.y << ", " << ray.origin.z << "}, " << ray.tnear << ", {" << ray.direction.x
+    << ", " << ray.direction.y << ", " << ray.direction.z << "}, " << ray.tfar << "}";
+  return s.str();
+}
+
+std::string literal(const Hit& hit) {
+  std::ostringstream s;
+  s << std::hexfloat << (hit.is_hit() ? std::to_string(hit.primitive) : "miss") << " at " << hit.t << ", " << hit.u << ", " << hit.v;
+  return s.str();
+}
+
+bool right(const Hit& answer, const Hit& truth) {
+  if (answer.primitive != truth.primitive) return false;
+  return !truth.is_hit() || (answer.t == truth.t && std::abs(answer.u - truth.u) <= 0x1p-23f && std::abs(answer.v - truth.v) <= 0x1p-23f);
+}
+
+/// Every row on all rays, closest hit and any hit.
+void check(const TriangleMesh& mesh, std::span<const Ray> rays, const Truth& truth, const std::vector<KernelRow>& rows) {
+  Structures structures(mesh);
+  for (const KernelRow& row : rows) {
+    const std::vector<Hit> hits = closest_hit(row, structures.get(row), rays);
+    const std::vector<std::uint8_t> occluded = any_hit(row, structures.get(row), rays);
+    std::size_t wrong = 0;
+    std::string first;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (right(hits[i], truth.hits[i]) && (occluded[i] == 1) == truth.hits[i].is_hit()) continue;
+      if (wrong++ == 0) {
+        first = "ray " + std::to_string(i) + " " + literal(rays[i]) + ": " + literal(hits[i]) + (occluded[i] ? ", occluded" : "") + " for " +
+                literal(truth.hits[i]);
+      }
+    }
+    INFO(name_of(row) << ": " << first);
+    CHECK(wrong == 0);
+  }
+}
+
+/// A kind of mesh: where its points are. Triangles are any three of a few points, so that edges and vertices are shared, some
+/// triangles lie upon each other and some have no area.
+struct Kind {
+  std::string_view name;
+  std::function<Vec3f(Dice&)> point;
+  bool within_range = true;  ///< coordinates stay below kMaxCoordinate, and products of two of them finite
+};
+
+const std::vector<Kind>& kinds() {
+  static const std::vector<Kind> all = {
+      {"cube", [](Dice& d) { return d.point(); }},
+      {"slivers", [](Dice& d) { return d.point() * Vec3f{0x1p-12f, 1, 0x1p-6f}; }},
+      {"needles", [](Dice& d) { return Vec3f{1, 2, 3} * d.uniform() + d.point() * 0x1p-18f; }},
+      {"exponential", [](Dice& d) { return Vec3f{d.exponential(-20, 20), d.exponential(-20, 20), d.exponential(-20, 20)}; }},
+      {"lattice", [](Dice& d) { return Vec3f{float(d.integer(7) - 3), float(d.integer(7) - 3), float(d.integer(7) - 3)}; }},
+      {"layers", [](Dice& d) { return Vec3f{d.uniform(), d.uniform(), 1 + float(d.integer(3)) * 0x1p-22f}; }},
+      {"far", [](Dice& d) { return d.point() + Vec3f{100000, -30000, 4096}; }},
+      {"a wide floor", [](Dice& d) { return d.integer(3) ? d.point() : d.point() * Vec3f{4000, 4000, 0x1p-4f}; }},
+      {"small", [](Dice& d) { return d.point() * 0x1p-60f; }},
+      {"large", [](Dice& d) { return d.point() * 0x1p30f; }},
+      {"beyond range", [](Dice& d) { return d.point() * 0x1p60f; }, false},
+  };
+  return all;
+}
+
+struct Scene {
+  TriangleMesh mesh;
+  std::vector<Ray> rays;
+};
+
+/// Rays at vertices, at edges, at interiors and anywhere; from near, from far, from a vertex; directions of all lengths.
+Scene make_scene(const Kind& kind, std::uint64_t seed, std::size_t rays) {
+  Dice dice(seed);
+  Scene scene;
+  constexpr int kPoints = 12;
+  std::vector<Vec3f>& p = scene.mesh.vertices;
+  for (int i = 0; i < kPoints; ++i) p.push_back(kind.point(dice));
+  const auto any = [&] { return p[std::size_t(dice.integer(kPoints))]; };
+  for (int i = 0; i < 20; ++i) {
+    scene.mesh.triangles.push_back(
+        {std::uint32_t(dice.integer(kPoints)), std::uint32_t(dice.integer(kPoints)), std::uint32_t(dice.integer(kPoints))});
+  }
+  while (scene.rays.size() < rays) {
+    const Vec3f a = any(), b = any(), c = any();
+    Vec3f from = kind.point(dice);
+    if (dice.integer(3) == 0) from = from + (from - a) * dice.exponential(0, 14);
+    if (dice.integer(9) == 0) from = any();
+    const float v = dice.uniform(0, 1), w = dice.uniform(0, 1);
+    const int aim = dice.integer(4);
+    const Vec3f to = aim == 0 ? a : aim == 1 ? a * (1 - v) + b * v : aim == 2 ? (a * (1 - v) + b * v) * (1 - w) + c * w : kind.point(dice);
+    Ray ray{from, 0.0f, to - from, kInfinity};
+    const float largest = std::max({std::abs(ray.direction.x), std::abs(ray.direction.y), std::abs(ray.direction.z)});
+    if (dice.integer(2) == 0) ray.direction = ray.direction / largest;
+    if (dice.integer(4) == 0) ray.direction = ray.direction * dice.exponential(-60, 60);
+    if (dice.integer(5) == 0) ray.tfar = dice.uniform(0.9f, 1.1f);
+    if (dice.integer(7) == 0) ray.tnear = dice.integer(2) ? 1.0f : dice.uniform(0.5f, 1.2f);
+    if (is_valid(ray)) scene.rays.push_back(ray);
+  }
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("exact goes with every structure and instruction set that watertight goes with") {
+  const auto rows = runnable_rows();
+  for (const KernelRow& watertight : rows) {
+    if (watertight.intersector != "watertight") continue;
+    INFO(name_of(watertight));
+    CHECK(std::ranges::any_of(rows, [&](const KernelRow& row) {
+      return row.intersector == "exact" && row.structure == watertight.structure && row.leaf == watertight.leaf && row.box == watertight.box &&
+             row.traversal == watertight.traversal && row.isa == watertight.isa;
+    }));
+  }
+}
+
+TEST_CASE("exact kernels on the hard cases, every structure") {
+  for (const HardCase& c : load_hard_cases()) {
+    TriangleMesh mesh{c.mesh.vertices, {}, {}};
+    for (std::size_t i = 0; i < c.mesh.size(); ++i) {
+      const auto corners = c.mesh.corners(i);
+      if (is_finite(corners[0]) && is_finite(corners[1]) && is_finite(corners[2])) mesh.triangles.push_back(c.mesh.triangles[i]);
+    }
+    INFO(c.id << ": " << c.why);
+    const std::span rays(&c.ray, 1);
+    check(mesh, rays, Truth::by_rationals(mesh, rays), exact_rows());
+  }
+}
+
+TEST_CASE("exact kernels against rational arithmetic: aimed rays, every kind of mesh, every structure") {
+  for (const Kind& kind : kinds()) {
+    const auto rows = kind.within_range ? exact_rows() : single_rows({"brute_force", "bvh8"});
+    for (std::uint64_t seed = 0; seed < effort(); ++seed) {
+      INFO(kind.name << ", seed " << seed);
+      const Scene scene = make_scene(kind, seed, 32);
+      check(scene.mesh, scene.rays, Truth::by_rationals(scene.mesh, scene.rays), rows);
+    }
+  }
+}
+
+TEST_CASE("exact kernels against the oracle: aimed rays, every kind of mesh") {
+  const auto rows = single_rows({"brute_force", "bvh8"});
+  for (const Kind& kind : kinds()) {
+    for (std::uint64_t seed = 0; seed < 4 * effort(); ++seed) {
+      INFO(kind.name << ", seed " << seed);
+      const Scene scene = make_scene(kind, 1000 + seed, 250);
+      check(scene.mesh, scene.rays, Truth::by_oracle(scene.mesh, scene.rays), rows);
+    }
+  }
+}
+
+TEST_CASE("exact kernels against the oracle: closed meshes, edges and vertices, at home and far away") {
+  const auto rows = single_rows({"bvh8", "kdtree"});
+  for (const float offset : {0.0f, 100.0f, 10000.0f, 1e6f}) {
+    for (const float scale : {1.0f, 0x1p-60f, 0x1p40f}) {
+      const TriangleMesh mesh = moved(moved(test::sphere(24), 1.0f, {offset, -offset, 0.5f * offset}), scale);
+      std::vector<Ray> rays;
+      for (const Vec3f from : {Vec3f{0.01f, 0.02f, 0.03f}, Vec3f{3, 1, -2}}) {
+        const Vec3f at = (from + Vec3f{offset, -offset, 0.5f * offset}) * scale;
+        for (const Ray& ray : aimed_rays(mesh, at, 200 * effort(), 7)) rays.push_back(ray);
+      }
+      INFO("offset " << offset << ", scale " << scale);
+      check(mesh, rays, Truth::by_oracle(mesh, rays), rows);
+    }
+  }
+}
+
+TEST_CASE("exact kernels on inputs that once failed") {
+  // The edge functions are finite, their sum is not: weights of 0 made a distance of 0 that looked certain.
+  TriangleMesh mesh;
+  add_triangle(mesh, {0x1.29ae1cp+46f, 0x1.8653b8p+63f, 0x1.d27b06p+53f}, {0x1.9da016p+50f, -0x1.fabce8p+62f, 0x1.69da9ep+35f},
+               {0x1.bc697p+43f, 0x1.d6e566p+61f, -0x1.7b8ea4p+36f});
+  add_triangle(mesh, {0x1.29ae1cp+46f, 0x1.8653b8p+63f, 0x1.d27b06p+53f}, {0x1.9da016p+50f, -0x1.fabce8p+62f, 0x1.69da9ep+35f},
+               {0x1.c92c12p+63f, -0x1.4dc51p+25f, 0x1.299404p+61f});
+  const Ray ray{{0x1.4dda2ap+53f, 0x1.68436cp+49f, 0x1.c75788p+54f},
+                0x1.a727e4p-1f,
+                {-0x1.6acffap+49f, -0x1.20ad7ap+45f, -0x1.ef1cfap+50f},
+                kInfinity};
+  check(mesh, std::span(&ray, 1), Truth::by_rationals(mesh, std::span(&ray, 1)), exact_rows());
+}
+
+TEST_CASE("hit arithmetic against rational arithmetic") {
+  for (const Kind& kind : kinds()) {
+    INFO(kind.name);
+    const Scene scene = make_scene(kind, 5, 60 * effort());
+    std::size_t hits = 0;
+    for (const Ray& ray : scene.rays) {
+      std::vector<std::pair<rational::Number, std::uint32_t>> found;
+      for (std::uint32_t i = 0; i < scene.mesh.size(); ++i) {
+        const TriangleMesh one{scene.mesh.vertices, {scene.mesh.triangles[i]}, {}};
+        const auto corners = one.corners(0);
+        const rational::Answer answer = rational::closest_hit(one, ray);
+        DistanceInterval t{};
+        REQUIRE(meets_exactly(ray, corners, t) == (answer.hits == 1));
+        if (answer.hits == 0) continue;
+        ++hits;
+        for (const DistanceInterval& interval : {t, distance_in_double(ray, corners)}) {
+          CHECK((std::isinf(interval.low) || rational::number(interval.low) <= answer.t));
+          CHECK((std::isinf(interval.high) || rational::number(interval.high) >= answer.t));
+        }
+        CHECK(round_exactly(ray, corners).t == Truth::nearest_float(answer.t));
+        found.emplace_back(answer.t, i);
+      }
+      for (std::size_t k = 1; k < found.size(); ++k) {
+        const int order = found[0].first < found[k].first ? -1 : found[0].first > found[k].first ? 1 : 0;
+        CHECK(compare_distances_exactly(ray, scene.mesh.corners(found[0].second), scene.mesh.corners(found[k].second)) == order);
+      }
+    }
+    CHECK(hits > 20);
+  }
+}
