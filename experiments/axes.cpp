@@ -4,6 +4,7 @@
 #include <cctype>
 #include <utility>
 
+#include "intersectors/promises.h"
 #include "rendering/workload.h"
 
 namespace arboretum {
@@ -177,11 +178,7 @@ std::string resolve_traversal(std::string_view traversal, Isa isa) {
   return std::string(traversal) + std::to_string(native_width(isa));
 }
 
-std::string_view default_box(std::string_view intersector) noexcept {
-  constexpr std::string_view kLoseNoHit[] = {"watertight", "watertight_refined", "pluecker",
-                                             "pluecker_double", "exact"};
-  return std::ranges::find(kLoseNoHit, intersector) != std::end(kLoseNoHit) ? "padded" : "fast";
-}
+std::string_view default_box(std::string_view intersector) noexcept { return box_called_for(intersector); }
 
 std::string summary_of(Axis axis, std::string_view value, const Registry& registry) {
   switch (axis) {

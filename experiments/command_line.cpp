@@ -20,6 +20,7 @@ namespace {
 
 struct Arguments {
   RunCommand run;
+  VerifyCommand verify;
   std::string axis, scene;
   bool json = false;
   std::filesystem::path results;
@@ -49,10 +50,28 @@ void declare_run(CLI::App& app, RunCommand& run) {
   c->footer("Google Benchmark's --benchmark_* flags pass through.");
 }
 
+void declare_verify(CLI::App& app, VerifyCommand& verify) {
+  CLI::App* c = app.add_subcommand("verify", "Combinations against exact arithmetic, ray by ray, on hard rays");
+  c->add_option("SUBJECT", verify.subject, "A scene as for `info`, a cases file (.json), or `random`: random small meshes")->required();
+  c->add_option("AXIS", verify.axes, "axis=value,value: which combinations (isa=avx2,avx512); axis=all");
+  c->add_option("--rays", verify.rays, "Rays in all (default 100000; a cases file: each case once, and mutations of them beyond that)");
+  c->add_option("--seed", verify.seed, "Seed of the rays (default 1)");
+  c->add_option("--offset", verify.offsets, "Moves the scene by these distances along (1, -3/4, 1/2)")->delimiter(',');
+  c->add_option("--scale", verify.scales, "Scales the moved scene by these powers of two: -60,0,60")->delimiter(',');
+  c->add_option("--kinds", verify.kinds, "Kinds of rays: vertex, edge, border, interior, grazing, axis, plane, surface, far, interval, invalid")
+      ->delimiter(',');
+  c->add_option("--out", verify.out, "Folder for verify.csv and the cases found");
+  c->add_option("--threads", verify.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
+  c->add_flag("--spread", verify.spread, "Share the rays among the combinations instead of giving each all of them");
+  c->add_option("--filter", verify.filter, "Only combinations whose name this regular expression finds");
+  c->add_option("--skip", verify.skip, "No combinations whose name this regular expression finds");
+}
+
 void declare(CLI::App& app, Arguments& a) {
   app.require_subcommand(0, 1);
   app.set_version_flag("--version", std::string(build_info::kVersion));
   declare_run(app, a.run);
+  declare_verify(app, a.verify);
   CLI::App* list = app.add_subcommand("list", "What can be swept");
   list->add_option(
       "AXIS", a.axis,
@@ -121,6 +140,7 @@ ExitStatus dispatch(std::vector<std::string> words) {
   refuse_extras(*used.front());
   const std::string name = used.front()->get_name();
   if (name == "run") return command_run(std::move(a.run));
+  if (name == "verify") return command_verify(a.verify);
   if (name == "list") return command_list(a.axis, a.json);
   if (name == "info") return command_info(a.scene, a.json);
   if (name == "plot") return command_plot(a.results, a.figures);

@@ -1,7 +1,9 @@
 // The commands of the command line. Each returns the exit status; errors come out as UserError.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +23,22 @@ struct RunCommand {
   std::string command_line;  ///< as typed, for the results
 };
 
+struct VerifyCommand {
+  std::string subject;             ///< a scene word, a cases file (.json), or `random`
+  std::vector<std::string> axes;   ///< `isa=avx2,avx512`, as typed
+  std::optional<std::uint64_t> rays;  ///< in all; empty: 100 000, or each case of a file once
+  std::uint64_t seed = 1;
+  std::vector<double> offsets;
+  std::vector<int> scales;         ///< exponents of two
+  std::vector<std::string> kinds;  ///< of rays; empty: all that the scene has
+  std::filesystem::path out;       ///< empty: nothing is written
+  std::optional<unsigned> threads;
+  bool spread = false;             ///< each batch of rays goes to one cell instead of all
+  std::string filter, skip;
+};
+
 ExitStatus command_run(RunCommand command);
+ExitStatus command_verify(const VerifyCommand& command);
 /// `axis` empty: all of them.
 ExitStatus command_list(const std::string& axis, bool json);
 ExitStatus command_info(const std::string& scene, bool json);

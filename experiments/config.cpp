@@ -3,43 +3,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <set>
 #include <thread>
 
 #include "core/error.h"
 #include "core/names.h"
+#include "experiments/axis_words.h"
 #include "experiments/config_scenes.h"
 #include "experiments/yaml_reader.h"
 
 namespace arboretum {
 namespace {
 
-constexpr unsigned kMaxThreads = 4096;
 constexpr std::string_view kPlots[] = {"rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time",
                                        "sah_vs_time", "accuracy_vs_time"};
 
 std::vector<std::string> strings(std::span<const std::string_view> views) {
   return {views.begin(), views.end()};
-}
-
-/// Checks one value of an axis and brings it to its one spelling. Returns why not, or empty.
-std::string check_value(Axis axis, std::string& value, const Registry& registry) {
-  if (axis == Axis::threads) {
-    unsigned n = 0;
-    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), n);
-    if (error != std::errc{} || end != value.data() + value.size() || n < 1 || n > kMaxThreads) {
-      return fmt::format("threads must be an integer from 1 to {}, not '{}'", kMaxThreads, value);
-    }
-    value = std::to_string(n);
-    return {};
-  }
-  if (axis == Axis::isa) {
-    if (const auto isa = parse_isa(value)) return value = to_string(*isa), std::string();
-  }
-  const std::vector<std::string> known = known_values(axis, registry);
-  if (std::ranges::find(known, value) != known.end()) return {};
-  return unknown_name_message(to_string(axis), value, known);
 }
 
 class ConfigReader {
@@ -107,7 +87,7 @@ class ConfigReader {
       const Axis a = *parse_axis(key);
       for (const YAML::Node& node : nodes) {
         std::string value = node.Scalar();
-        if (const std::string wrong = check_value(a, value, registry_); !wrong.empty())
+        if (const std::string wrong = check_axis_value(a, value, registry_); !wrong.empty())
           yaml_.fail(node, wrong);
         auto& list = lists[index_of(a)];
         if (std::ranges::find(list, value) != list.end())
@@ -247,32 +227,7 @@ class ConfigReader {
   }
 
   void apply_axis(const std::string& word) {
-    const std::size_t equals = word.find('=');
-    if (equals == std::string::npos) {
-      throw UserError(
-          fmt::format("command line: '{}' is no axis=value,value; for example isa=avx2,avx512", word));
-    }
-    const std::string key = word.substr(0, equals);
-    std::vector<std::string> names = strings(kAxisNames);
-    names.emplace_back("scene");
-    if (std::ranges::find(names, key) == names.end())
-      throw UserError("command line: " + unknown_name_message("axis", key, names));
-    std::vector<std::string> values;
-    for (std::size_t begin = equals + 1; begin <= word.size();) {
-      const std::size_t comma = std::min(word.find(',', begin), word.size());
-      std::string value = word.substr(begin, comma - begin);
-      begin = comma + 1;
-      if (value.empty())
-        throw UserError(
-            fmt::format("command line: '{}' holds an empty value; give {}=value,value", word, key));
-      if (key != "scene") {
-        if (const std::string wrong = check_value(*parse_axis(key), value, registry_); !wrong.empty())
-          throw UserError("command line: " + wrong);
-      }
-      if (std::ranges::find(values, value) != values.end())
-        throw UserError(fmt::format("command line: {}: '{}' is given twice; keep one", key, value));
-      values.push_back(value);
-    }
+    auto [key, values] = read_axis_word(word, registry_, {"scene"});
     experiment_.overridden = true;
     if (key == "scene")
       choose_scenes(values);

@@ -9,29 +9,12 @@
 #include <thread>
 
 #include "experiments/sampling.h"
+#include "experiments/table_text.h"
 
 namespace arboretum {
 namespace {
 
-using Row = std::vector<std::string>;
-
-/// Columns as wide as their widest cell; figures right-aligned from column `figures` on.
-std::string format_table(const std::vector<Row>& rows, std::size_t figures) {
-  std::vector<std::size_t> widths(rows.front().size());
-  for (const Row& row : rows)
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  std::string text;
-  for (const Row& row : rows) {
-    std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      line += i < figures ? fmt::format("{:<{}}  ", row[i], widths[i])
-                          : fmt::format("{:>{}}  ", row[i], widths[i]);
-    }
-    line.erase(line.find_last_not_of(' ') + 1);
-    text += line + "\n";
-  }
-  return text;
-}
+using Row = TableRow;
 
 /// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
 double ratio_rate(const CellResult& r) {

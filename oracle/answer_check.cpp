@@ -42,36 +42,6 @@ double ulp_of(float x) {
   return double(next) - double(x);
 }
 
-void check_one(const TriangleMesh& mesh, const Ray& ray, FrameTime at, const ExactHit& truth, const Hit& answer,
-               const std::function<const SurfaceAdjacency&()>& adjacency, Tally& tally) {
-  AnswerCheck& check = tally.check;
-  if (answer.is_hit()) ++check.hits;
-  if (!truth.hit.is_hit()) {
-    if (answer.is_hit()) ++check.false_hits;
-    return;
-  }
-  bool something_behind = false;
-  if (!answer.is_hit()) {
-    ++check.missed_hits;
-    something_behind = true;
-  } else {
-    const double difference = double(answer.t) - truth.t, tolerance = kSurfaceTolerance * std::fabs(truth.t);
-    const bool right_surface = std::fabs(difference) <= tolerance;  // false for a NaN
-    const bool right_primitive = is_at_nearest_t(mesh, ray, at, truth, answer.primitive);
-    if (!right_surface) ++check.wrong_surface;
-    if (!right_primitive) ++check.wrong_primitive;
-    something_behind = difference > tolerance && !right_primitive;
-    if ((right_surface || right_primitive) && std::isfinite(truth.hit.t)) {
-      const double error = std::fabs(difference) / ulp_of(truth.hit.t);
-      tally.t_errors.push_back(std::isnan(error) ? std::numeric_limits<float>::infinity()
-                                                 : static_cast<float>(error));
-    }
-  }
-  if (something_behind && adjacency().passes_through(ray, at, truth.hit.primitive, truth.hit.u, truth.hit.v)) {
-    ++check.cracks;
-  }
-}
-
 /// The smallest value that at least a share `p` of them does not exceed.
 double quantile(std::vector<float>& values, double p) {
   const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size())));
@@ -82,6 +52,31 @@ double quantile(std::vector<float>& values, double p) {
 
 }  // namespace
 
+Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth, const Hit& answer,
+                            const std::function<const SurfaceAdjacency&()>& adjacency) {
+  Judgement j;
+  if (!truth.hit.is_hit()) {
+    j.false_hit = answer.is_hit();
+    return j;
+  }
+  const FrameTime at = frame_at(time, mesh.frames());
+  bool something_behind = true;
+  if (!answer.is_hit()) {
+    j.missed = true;
+  } else {
+    const double difference = double(answer.t) - truth.t, tolerance = kSurfaceTolerance * std::fabs(truth.t);
+    j.wrong_surface = !(std::fabs(difference) <= tolerance);  // true for a NaN
+    j.wrong_primitive = !is_at_nearest_t(mesh, ray, at, truth, answer.primitive);
+    something_behind = difference > tolerance && j.wrong_primitive;
+    if ((!j.wrong_surface || !j.wrong_primitive) && std::isfinite(truth.hit.t)) {
+      const double error = std::fabs(difference) / ulp_of(truth.hit.t);
+      j.t_error_ulp = std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
+    }
+  }
+  j.crack = something_behind && adjacency().passes_through(ray, at, truth.hit.primitive, truth.hit.u, truth.hit.v, answer.primitive);
+  return j;
+}
+
 AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
                                std::span<const ExactHit> truth, std::span<const Hit> answers,
                                const std::function<const SurfaceAdjacency&()>& adjacency) {
@@ -90,7 +85,11 @@ AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), 4096), [&](const auto& range) {
     Tally& tally = tallies.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      check_one(mesh, rays[i], frame_at(rays.time(i), mesh.frames()), truth[i], answers[i], adjacency, tally);
+      const Judgement j = judge_closest_hit(mesh, rays[i], rays.time(i), truth[i], answers[i], adjacency);
+      AnswerCheck& check = tally.check;
+      check.hits += answers[i].is_hit(), check.missed_hits += j.missed, check.false_hits += j.false_hit;
+      check.wrong_surface += j.wrong_surface, check.wrong_primitive += j.wrong_primitive, check.cracks += j.crack;
+      if (j.t_error_ulp >= 0) tally.t_errors.push_back(static_cast<float>(j.t_error_ulp));
     }
   });
   AnswerCheck sum;

@@ -13,6 +13,10 @@ namespace arboretum {
 /// Relative difference of t beyond which a hit is on the wrong surface.
 inline constexpr double kSurfaceTolerance = 0x1p-12;
 
+/// One ray of a batch; `adjacency` as below.
+[[nodiscard]] Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth, const Hit& answer,
+                                          const std::function<const SurfaceAdjacency&()>& adjacency);
+
 /// `adjacency` is called, from any thread, only when an answer could be a crack.
 [[nodiscard]] AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
                                              std::span<const ExactHit> truth, std::span<const Hit> answers,

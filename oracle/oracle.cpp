@@ -143,6 +143,11 @@ AnswerCheck Oracle::check_closest_hit(RayBatch rays, std::span<const ExactHit> t
                             [this]() -> const SurfaceAdjacency& { return implementation_->surface(); });
 }
 
+Judgement Oracle::judge(const Ray& ray, float time, const ExactHit& truth, const Hit& answer) const {
+  return judge_closest_hit(implementation_->mesh, ray, time, truth, answer,
+                           [this]() -> const SurfaceAdjacency& { return implementation_->surface(); });
+}
+
 AnswerCheck Oracle::check_any_hit(RayBatch rays, std::span<const std::uint8_t> truth,
                                   std::span<const std::uint8_t> answers) const {
   return check_any_hits(rays, truth, answers);

@@ -49,6 +49,13 @@ struct AnswerCheck {
   }
 };
 
+/// What is wrong with the answer to one closest-hit ray, in AnswerCheck's words.
+struct Judgement {
+  bool missed = false, false_hit = false, wrong_surface = false, wrong_primitive = false, crack = false;
+  double t_error_ulp = -1;  ///< negative: nothing to compare
+  [[nodiscard]] bool wrong() const noexcept { return missed || false_hit || wrong_surface; }
+};
+
 class Oracle {
  public:
   /// Builds the search tree with all TBB threads allowed to the caller. The mesh must outlive the oracle.
@@ -69,6 +76,9 @@ class Oracle {
                                               std::span<const Hit> answers) const;
   [[nodiscard]] AnswerCheck check_any_hit(RayBatch rays, std::span<const std::uint8_t> truth,
                                           std::span<const std::uint8_t> answers) const;
+
+  /// The same for one ray, from any thread.
+  [[nodiscard]] Judgement judge(const Ray& ray, float time, const ExactHit& truth, const Hit& answer) const;
 
  private:
   struct Implementation;

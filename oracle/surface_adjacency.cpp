@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <tuple>
 
 #include "core/exact/determinant.h"
@@ -25,6 +26,48 @@ int side(const Ray& ray, Vec3f a, Vec3f b, Vec3f p) {
   const double value = determinant(edge, third, d),
                bound = 0x1p-47 * size_of(edge) * size_of(third) * size_of(d);
   return value > bound ? 1 : value < -bound ? -1 : 0;
+}
+
+/// A point as seen along the ray: sheared so that the ray is the origin, along its main axis.
+struct Seen {
+  double x, y;
+  double size;  ///< largest coordinate, the depth among them
+};
+
+class Sheared {
+ public:
+  explicit Sheared(const Ray& ray) : origin_(ray.origin) {
+    const Vec3f d = ray.direction;
+    z_ = std::fabs(d.x) > std::fabs(d.y) ? (std::fabs(d.x) > std::fabs(d.z) ? 0 : 2) : (std::fabs(d.y) > std::fabs(d.z) ? 1 : 2);
+    x_ = (z_ + 1) % 3, y_ = (z_ + 2) % 3;
+    slope_x_ = double(d[x_]) / d[z_], slope_y_ = double(d[y_]) / d[z_];
+  }
+  [[nodiscard]] Seen operator()(Vec3f p) const {
+    const Triple<double> v = from(origin_, p);
+    const double x = v[x_] - slope_x_ * v[z_], y = v[y_] - slope_y_ * v[z_];
+    return {x, y, std::max({std::fabs(x), std::fabs(y), std::fabs(v[z_])})};
+  }
+
+ private:
+  Vec3f origin_;
+  std::size_t x_, y_, z_;
+  double slope_x_, slope_y_;
+};
+
+/// Of the segment to the ray.
+double distance(const Seen& a, const Seen& b) {
+  const double x = b.x - a.x, y = b.y - a.y, square = x * x + y * y;
+  const double s = square > 0 ? std::clamp(-(a.x * x + a.y * y) / square, 0.0, 1.0) : 0.0;
+  return std::hypot(a.x + s * x, a.y + s * y);
+}
+
+/// Whether rounding could move the triangle's vertices by as much as its own size.
+bool is_far_off(const Ray& ray, const std::array<Vec3f, 3>& corners) {
+  const Sheared sheared(ray);
+  const Seen p[3] = {sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
+  for (std::size_t k = 0; k < 3; ++k)
+    if (distance(p[k], p[(k + 1) % 3]) <= SurfaceAdjacency::kRounding * std::max(p[k].size, p[(k + 1) % 3].size)) return true;
+  return false;
 }
 
 }  // namespace
@@ -56,7 +99,6 @@ SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
   }
 
   edges_.reserve(3 * mesh.size());
-  spokes_.reserve(6 * mesh.size());
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const Triangle& t = mesh.triangles[i];
     const std::uint32_t v[3] = {welded_[t.a], welded_[t.b], welded_[t.c]};
@@ -65,46 +107,68 @@ SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t a = v[k], b = v[(k + 1) % 3];
       edges_.push_back({std::min(a, b), std::max(a, b), v[(k + 2) % 3]});
-      spokes_.push_back({a, b});
-      spokes_.push_back({b, a});
     }
   }
   std::sort(edges_.begin(), edges_.end());
-  std::sort(spokes_.begin(), spokes_.end());
-  spokes_.erase(std::unique(spokes_.begin(), spokes_.end()), spokes_.end());
 }
 
-bool SurfaceAdjacency::is_crossed(const Ray& ray, FrameTime at, std::uint32_t a, std::uint32_t b) const {
-  const auto [first, last] =
-      std::equal_range(edges_.begin(), edges_.end(), Edge{std::min(a, b), std::max(a, b), 0});
-  if (last - first != 2) return false;
-  const Vec3f p = mesh_.position(a, at), q = mesh_.position(b, at);
-  return side(ray, p, q, mesh_.position(first->third, at)) * side(ray, p, q, mesh_.position((first + 1)->third, at)) < 0;
+std::pair<const SurfaceAdjacency::Edge*, const SurfaceAdjacency::Edge*> SurfaceAdjacency::at_edge(std::uint32_t a, std::uint32_t b) const {
+  const auto [first, last] = std::equal_range(edges_.begin(), edges_.end(), Edge{std::min(a, b), std::max(a, b), 0});
+  return {edges_.data() + (first - edges_.begin()), edges_.data() + (last - edges_.begin())};
 }
 
-bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, double u, double v) const {
+std::size_t SurfaceAdjacency::triangles_at_edge(std::uint32_t triangle, std::size_t k) const {
   const Triangle& t = mesh_.triangles[triangle];
-  const std::uint32_t corner[3] = {welded_[t.a], welded_[t.b], welded_[t.c]};
-  const double weight[3] = {1.0 - u - v, u, v};
-  int small = 0, last_small = 0, large = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (weight[k] <= kNear) {
-      ++small, last_small = k;
-    } else {
-      large = k;
+  const Corner3 v{welded_[t.a], welded_[t.b], welded_[t.c]};
+  if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) return 0;
+  const auto [first, last] = at_edge(v[k], v[(k + 1) % 3]);
+  return static_cast<std::size_t>(last - first);
+}
+
+std::optional<std::uint32_t> SurfaceAdjacency::across(const Ray& ray, FrameTime at, std::uint32_t a, std::uint32_t b,
+                                                      std::uint32_t third) const {
+  const auto [first, last] = at_edge(a, b);
+  if (last - first != 2) return std::nullopt;
+  const std::uint32_t other = first->third == third ? first[1].third : first->third;
+  const Vec3f p = mesh_.position(a, at), q = mesh_.position(b, at);
+  if (side(ray, p, q, mesh_.position(third, at)) * side(ray, p, q, mesh_.position(other, at)) >= 0) return std::nullopt;
+  return other;
+}
+
+SurfaceAdjacency::Corner3 SurfaceAdjacency::corners(std::uint32_t triangle) const {
+  const Triangle& t = mesh_.triangles[triangle];
+  Corner3 c{welded_[t.a], welded_[t.b], welded_[t.c]};
+  std::sort(c.begin(), c.end());
+  return c;
+}
+
+bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, double u, double v,
+                                      std::uint32_t answer) const {
+  if (std::min({u, v, 1.0 - u - v}) > kNear && !is_far_off(ray, mesh_.corners(triangle, at))) return true;
+  constexpr std::size_t kMostTriangles = 4096;  // a larger patch is taken for one that the ray passes through
+  std::set<Corner3> seen{corners(triangle)};
+  std::vector<Corner3> waiting(seen.begin(), seen.end());
+  const Sheared sheared(ray);
+  while (!waiting.empty()) {
+    const Corner3 c = waiting.back();
+    waiting.pop_back();
+    if (c[0] == c[1] || c[1] == c[2]) return false;
+    const Seen p[3] = {sheared(mesh_.position(c[0], at)), sheared(mesh_.position(c[1], at)), sheared(mesh_.position(c[2], at))};
+    const double area = std::fabs((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Seen &a = p[k], &b = p[(k + 1) % 3];
+      const double width = std::hypot(b.x - a.x, b.y - a.y);
+      const double near = std::max(kRounding * std::max(a.size, b.size), width > 0 ? kNear * area / width : 0.0);
+      if (distance(a, b) > near) continue;
+      const auto other = across(ray, at, c[k], c[(k + 1) % 3], c[(k + 2) % 3]);
+      if (!other) return false;
+      Corner3 next{c[k], c[(k + 1) % 3], *other};
+      std::sort(next.begin(), next.end());
+      if (seen.insert(next).second) waiting.push_back(next);
+      if (seen.size() > kMostTriangles) return true;
     }
   }
-  if (small == 0) return true;
-  if (small == 1) return is_crossed(ray, at, corner[(last_small + 1) % 3], corner[(last_small + 2) % 3]);
-  const std::uint32_t vertex = corner[large];
-  const auto first =
-      std::lower_bound(spokes_.begin(), spokes_.end(), std::array<std::uint32_t, 2>{vertex, 0});
-  bool any = false;
-  for (auto spoke = first; spoke != spokes_.end() && (*spoke)[0] == vertex; ++spoke) {
-    if (!is_crossed(ray, at, vertex, (*spoke)[1])) return false;
-    any = true;
-  }
-  return any;
+  return answer >= mesh_.size() || !seen.contains(corners(answer));
 }
 
 }  // namespace arboretum

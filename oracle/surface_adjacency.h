@@ -5,6 +5,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/mesh.h"
@@ -19,11 +21,20 @@ class SurfaceAdjacency {
   explicit SurfaceAdjacency(const TriangleMesh& mesh);
 
   /// Whether the ray of that time, which meets `triangle` at the weights u (second corner) and v (third), passes through
-  /// the surface there: inside the triangle; or within kNear of an edge that exactly two triangles share, one
-  /// on either side as seen along the ray; or within kNear of two edges, at a vertex all of whose edges are
-  /// such.
-  [[nodiscard]] bool passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, double u, double v) const;
+  /// the surface there, however the vertices are rounded: the triangles about the ray, connected by edges that come near it,
+  /// form a patch of one facing whose border is not near. An edge is near within kNear of a triangle's height over it, and
+  /// within kRounding of its vertices' distance; a near edge that not exactly two triangles share, one on either side as seen
+  /// along the ray, is a border or a silhouette. (Moving the patch's vertices by less than that moves its border not across
+  /// the ray, so the patch, covering the ray once, goes on covering it.)
+  /// False where `answer`, a triangle or kNoPrimitive, is one of the patch: the surface was met, if at another depth.
+  [[nodiscard]] bool passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, double u, double v,
+                                    std::uint32_t answer = kNoPrimitive) const;
 
+  /// How many triangles share the edge between corners k and (k + 1) % 3; 0 where the triangle takes no part.
+  [[nodiscard]] std::size_t triangles_at_edge(std::uint32_t triangle, std::size_t k) const;
+
+  /// The watertight test displaces a vertex by at most 5 * 2^-24 of its distance, seen along the ray's main axis.
+  static constexpr double kRounding = 0x1p-21;
   static constexpr double kNear = 1e-3;
 
  private:
@@ -32,12 +43,16 @@ class SurfaceAdjacency {
     std::uint32_t third;  // the welded vertex across
     friend bool operator<(const Edge& p, const Edge& q) { return p.a != q.a ? p.a < q.a : p.b < q.b; }
   };
-  [[nodiscard]] bool is_crossed(const Ray& ray, FrameTime at, std::uint32_t a, std::uint32_t b) const;
+  using Corner3 = std::array<std::uint32_t, 3>;  // welded vertices, ascending
+  [[nodiscard]] Corner3 corners(std::uint32_t triangle) const;
+  /// The range of edges_ between two vertices.
+  [[nodiscard]] std::pair<const Edge*, const Edge*> at_edge(std::uint32_t a, std::uint32_t b) const;
+  /// The third vertex of the triangle across the edge a-b from `third`; nothing where the edge is no crossing.
+  [[nodiscard]] std::optional<std::uint32_t> across(const Ray& ray, FrameTime at, std::uint32_t a, std::uint32_t b, std::uint32_t third) const;
 
   const TriangleMesh& mesh_;
   std::vector<std::uint32_t> welded_;                 // of each vertex: the lowest vertex at its position in all frames
   std::vector<Edge> edges_;                           // sorted, one a triangle and edge
-  std::vector<std::array<std::uint32_t, 2>> spokes_;  // sorted: vertex, the other end of an edge at it
 };
 
 }  // namespace arboretum

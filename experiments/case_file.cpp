@@ -1,0 +1,155 @@
+#include "experiments/case_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/exact/exact_predicate.h"
+
+namespace arboretum {
+namespace {
+
+using Json = nlohmann::json;
+
+/// Reads one case; every error names the file and the case.
+class CaseReader {
+ public:
+  CaseReader(const std::filesystem::path& file, std::size_t number, const Json& entry) : entry_(entry) {
+    where_ = fmt::format("{}: case {}", file.string(), number);
+    if (!entry.is_object()) fail("is no object; a case is {\"id\": …, \"triangles\": […], \"origin\": …, \"direction\": …}");
+    id_ = entry.contains("id") && entry["id"].is_string() ? entry["id"].get<std::string>() : std::to_string(number);
+    where_ = fmt::format("{}: case {}", file.string(), id_);
+  }
+
+  VerifyCase read() {
+    VerifyCase c;
+    c.id = id_;
+    if (entry_.contains("why") && entry_["why"].is_string()) c.why = entry_["why"];
+    const Json& triangles = member("triangles");
+    if (!triangles.is_array() || triangles.empty()) fail("triangles must be a list of [[x, y, z], [x, y, z], [x, y, z]]");
+    for (std::uint32_t i = 0; i < triangles.size(); ++i) add_triangle(c, i, triangles[i]);
+    c.ray.origin = point(member("origin"), "origin"), c.ray.direction = point(member("direction"), "direction");
+    if (entry_.contains("tnear")) c.ray.tnear = number(entry_["tnear"], "tnear");
+    if (entry_.contains("tfar")) c.ray.tfar = number(entry_["tfar"], "tfar");
+    expect_truth(c);
+    return c;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const { throw UserError(fmt::format("{}: {}", where_, what)); }
+
+  const Json& member(const char* name) const {
+    if (!entry_.contains(name)) fail(fmt::format("has no {}; add it", name));
+    return entry_[name];
+  }
+  float number(const Json& value, std::string_view what) const {
+    if (value.is_number()) {
+      const double x = value.get<double>();
+      if (std::fabs(x) > std::numeric_limits<float>::max()) fail(fmt::format("{}: {} is beyond float32", what, value.dump()));
+      return static_cast<float>(x);
+    }
+    if (value == "inf") return std::numeric_limits<float>::infinity();
+    if (value == "-inf") return -std::numeric_limits<float>::infinity();
+    if (value == "nan") return std::numeric_limits<float>::quiet_NaN();
+    fail(fmt::format("{}: {} is no number, \"inf\", \"-inf\" or \"nan\"", what, value.dump()));
+  }
+  Vec3f point(const Json& value, std::string_view what) const {
+    if (!value.is_array() || value.size() != 3) fail(fmt::format("{} must be [x, y, z], not {}", what, value.dump()));
+    return {number(value[0], what), number(value[1], what), number(value[2], what)};
+  }
+  void add_triangle(VerifyCase& c, std::uint32_t id, const Json& corners) const {
+    if (!corners.is_array() || corners.size() != 3) fail(fmt::format("triangle {} must have three corners [x, y, z]", id));
+    const Vec3f p[3] = {point(corners[0], "triangles"), point(corners[1], "triangles"), point(corners[2], "triangles")};
+    if (!is_finite(p[0]) || !is_finite(p[1]) || !is_finite(p[2])) return;
+    const auto first = static_cast<std::uint32_t>(c.mesh.vertices.size());
+    c.mesh.vertices.insert(c.mesh.vertices.end(), p, p + 3);
+    c.mesh.triangles.push_back({first, first + 1, first + 2});
+    c.ids.push_back(id);
+  }
+  void expect_truth(const VerifyCase& c) const {
+    const ExactHit truth = Oracle(c.mesh).closest_hit({&c.ray, 1}).front();
+    const bool hit = truth.hit.is_hit();
+    if (entry_.contains("hit") && entry_["hit"].is_boolean() && entry_["hit"] != hit)
+      fail(fmt::format("hit is {}, but exact arithmetic finds a {}; correct the file", entry_["hit"].dump(), hit ? "hit" : "miss"));
+    if (!hit) return;
+    if (entry_.contains("nearest_ids") && entry_["nearest_ids"].is_array()) {
+      const std::uint32_t lowest = c.ids[truth.hit.primitive];
+      if (entry_["nearest_ids"].empty() || entry_["nearest_ids"][0] != lowest)
+        fail(fmt::format("nearest_ids begins not with {}, which exact arithmetic finds; correct the file", lowest));
+    }
+    if (entry_.contains("t") && entry_["t"].is_number()) {
+      const double t = entry_["t"];
+      if (!(std::fabs(t - truth.t) <= std::fabs(truth.t) * 0x1p-48))
+        fail(fmt::format("t is {}, but exact arithmetic finds {}; correct the file", t, truth.t));
+    }
+  }
+
+  const Json& entry_;
+  std::string id_, where_;
+};
+
+/// The shortest decimal that is read back as the same float32.
+std::string decimal(float x) {
+  if (std::isnan(x)) return "\"nan\"";
+  if (std::isinf(x)) return x > 0 ? "\"inf\"" : "\"-inf\"";
+  return fmt::format("{}", x);
+}
+std::string decimal(Vec3f p) {
+  return fmt::format("[{},{},{}]", decimal(p.x), decimal(p.y), decimal(p.z));
+}
+
+}  // namespace
+
+std::vector<VerifyCase> read_case_file(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream) throw UserError(fmt::format("{}: no such file, or it cannot be read", file.string()));
+  Json document;
+  try {
+    document = Json::parse(stream);
+  } catch (const Json::parse_error& e) {
+    throw UserError(fmt::format("{}: no JSON: {}", file.string(), e.what()));
+  }
+  if (!document.is_object() || !document.contains("cases") || !document["cases"].is_array() || document["cases"].empty())
+    throw UserError(fmt::format("{}: holds no {{\"cases\": [...]}}; docs/command-line.md shows the format", file.string()));
+  std::vector<VerifyCase> cases;
+  std::set<std::string> ids;
+  for (const Json& entry : document["cases"]) {
+    cases.push_back(CaseReader(file, cases.size() + 1, entry).read());
+    if (!ids.insert(cases.back().id).second)
+      throw UserError(fmt::format("{}: two cases have the id {}; rename one", file.string(), cases.back().id));
+  }
+  return cases;
+}
+
+std::string case_json(const std::string& id, const std::string& why, const TriangleMesh& mesh, const Ray& ray) {
+  std::vector<std::string> triangles;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const auto c = mesh.corners(i);
+    triangles.push_back(fmt::format("[{},{},{}]", decimal(c[0]), decimal(c[1]), decimal(c[2])));
+  }
+  const ExactHit truth = Oracle(mesh).closest_hit({&ray, 1}).front();
+  std::vector<std::uint32_t> nearest;
+  std::size_t closed_hits = 0;
+  if (is_valid(ray)) {
+    ExactPredicate predicate(ray);
+    for (std::uint32_t i = 0; i < mesh.size(); ++i) {
+      Enclosure t;
+      if (!predicate.meets(mesh.corners(i), t)) continue;
+      ++closed_hits;
+      if (predicate.compare_t(mesh.corners(i), mesh.corners(truth.hit.primitive)) == 0) nearest.push_back(i);
+    }
+  }
+  return fmt::format(
+      R"({{"id":{},"triangles":[{}],"origin":{},"direction":{},"tnear":{},"tfar":{},"hit":{},"t":{},"nearest_ids":[{}],"closed_hits":{},"why":{},"source":"arboretum verify"}})",
+      Json(id).dump(), fmt::join(triangles, ","), decimal(ray.origin), decimal(ray.direction), decimal(ray.tnear), decimal(ray.tfar),
+      truth.hit.is_hit(), truth.hit.is_hit() ? fmt::format("{}", truth.t) : "null", fmt::join(nearest, ","), closed_hits, Json(why).dump());
+}
+
+}  // namespace arboretum

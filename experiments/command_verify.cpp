@@ -1,0 +1,305 @@
+// `verify`: cells against exact arithmetic, on a scene, on a cases file, or on random small meshes.
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include "core/names.h"
+#include "core/timer.h"
+#include "experiments/append_file.h"
+#include "experiments/axis_words.h"
+#include "experiments/case_file.h"
+#include "experiments/commands.h"
+#include "experiments/config_scenes.h"
+#include "experiments/plan.h"
+#include "experiments/progress.h"
+#include "experiments/summary.h"
+#include "experiments/verify_reduce.h"
+#include "experiments/verify_report.h"
+#include "oracle/random_cases.h"
+
+namespace arboretum {
+namespace {
+
+constexpr std::size_t kBatch = std::size_t{1} << 17;     // rays made, answered and traced at a time
+constexpr std::size_t kSpreadBatch = std::size_t{1} << 14;
+constexpr std::size_t kSubjectRays = 64;                 // of one random mesh
+constexpr std::size_t kBruteForceTriangles = 2000;       // left out above it, unless it is asked for
+constexpr std::size_t kMostCases = 20;                   // breaches that are told
+
+enum class Subject { scene, cases, random };
+
+class Verify {
+ public:
+  Verify(const VerifyCommand& command, const Registry& registry)
+      : command_(command), registry_(registry), threads_(command.threads.value_or(std::max(1u, std::thread::hardware_concurrency()))) {
+    if (command.subject == "random")
+      subject_ = Subject::random;
+    else if (std::filesystem::path(command.subject).extension() == ".json")
+      subject_ = Subject::cases;
+    if (subject_ != Subject::scene && (!command.offsets.empty() || !command.scales.empty()))
+      throw UserError("verify: --offset and --scale move and scale a scene; leave them out for cases files and random meshes");
+    if (subject_ != Subject::scene && (!command.kinds.empty() || command.spread))
+      throw UserError("verify: --kinds and --spread are for scenes; leave them out for cases files and random meshes");
+    if (command.rays && *command.rays == 0) throw UserError("verify: --rays must be 1 or more");
+    for (double offset : command.offsets)
+      if (!(std::fabs(offset) <= 1e30)) throw UserError(fmt::format("verify: --offset {} is not within 1e30", offset));
+    for (int exponent : command.scales)
+      if (std::abs(exponent) > 120) throw UserError(fmt::format("verify: --scale {} is an exponent of two, -120 to 120", exponent));
+    for (const std::string& kind : command.kinds) (void)kind_of(kind);
+  }
+
+  ExitStatus run() {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_);
+    if (!command_.out.empty()) make_output_folder(command_.out);
+    if (subject_ == Subject::scene) scene();
+    if (subject_ == Subject::cases) cases();
+    if (subject_ == Subject::random) random(nullptr, command_.rays.value_or(100'000));
+    if (cells_.empty()) return nothing();
+    return report();
+  }
+
+ private:
+  static HardKind kind_of(const std::string& name) {
+    std::vector<std::string> known(kHardKindNames.begin(), kHardKindNames.begin() + kMadeKinds);
+    const auto found = std::ranges::find(known, name);
+    if (found == known.end()) throw UserError("verify: --kinds: " + unknown_name_message("kind of ray", name, known));
+    return static_cast<HardKind>(found - known.begin());
+  }
+
+  // Cells.
+
+  std::vector<std::string> all_values(Axis axis, std::size_t triangles) const {
+    std::vector<std::string> values = known_values(axis, registry_);
+    std::erase_if(values, [&](const std::string& v) { return v == kAuto || v == kAll || v == "packet" || v == "hybrid"; });
+    if (axis == Axis::isa) {
+      values.clear();
+      for (Isa isa : registry_.isas) values.emplace_back(to_string(isa));
+    }
+    if (axis == Axis::structure)
+      std::erase_if(values, [&](const std::string& v) {
+        return v == "embree" || (v == "brute_force" && subject_ == Subject::scene && triangles > kBruteForceTriangles);
+      });
+    return values;
+  }
+
+  void make_cells(const SceneChoice& scene, std::size_t triangles) {
+    Experiment experiment;
+    experiment.name = "verify", experiment.scenes = {scene};
+    experiment.metrics = {.trace = true, .build = false, .quality = false, .accuracy = true};
+    for (const std::string& word : command_.axes) {
+      // `all` of any axis; the builder has one of its own.
+      const std::size_t equals = word.find('=');
+      const auto axis = parse_axis(word.substr(0, equals));
+      if (axis && axis != Axis::builder && equals != std::string::npos && word.substr(equals + 1) == kAll) {
+        experiment.axes[index_of(*axis)] = all_values(*axis, triangles);
+        continue;
+      }
+      AxisWord read = read_axis_word(word, registry_, {});
+      if (read.key == "workload" || read.key == "threads")
+        throw UserError(fmt::format("command line: verify has rays of its own and no {} axis; see --kinds, --threads", read.key));
+      experiment.axes[index_of(*parse_axis(read.key))] = std::move(read.values);
+    }
+    const auto fill = [&](Axis a, std::vector<std::string> values) {
+      if (experiment.axes[index_of(a)].empty()) experiment.axes[index_of(a)] = std::move(values);
+    };
+    for (Axis a : {Axis::structure, Axis::intersector, Axis::isa}) fill(a, all_values(a, triangles));
+    for (Axis a : {Axis::builder, Axis::leaf, Axis::box}) fill(a, {std::string(kAuto)});
+    fill(Axis::traversal, {"single"});
+    fill(Axis::workload, {"verify"}), fill(Axis::threads, {"1"});
+    plan_ = make_plan(experiment, registry_);
+    apply_filter(plan_, command_.filter, command_.skip);
+    for (const Cell& cell : plan_.cells) cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box), {}, {}});
+    // The plan names cells after a workload, which they have not here.
+    for (SkippedCell& cell : plan_.skipped) cell.name.clear();
+  }
+
+  ExitStatus nothing() const {
+    fmt::print("{}", skipped_lines(plan_, {}));
+    std::fflush(stdout);
+    fmt::print(stderr, "arboretum: nothing to verify: {} combinations skipped, {} filtered out\n", plan_.skipped.size(), plan_.filtered);
+    return ExitStatus::kNothingMeasured;
+  }
+
+  // Subjects.
+
+  void scene() {
+    const SceneChoice choice = scene_of_word(command_.subject);
+    const Scene loaded = load_scene(choice.spec);
+    const TriangleMesh& mesh = loaded.mesh;
+    make_cells(choice, mesh.size());
+    if (cells_.empty()) return;
+    variants_.clear();
+    for (double offset : command_.offsets.empty() ? std::vector<double>{0.0} : command_.offsets)
+      for (int exponent : command_.scales.empty() ? std::vector<int>{0} : command_.scales) variants_.push_back({offset, exponent});
+    const std::uint64_t rays = command_.rays.value_or(100'000), each = (rays + variants_.size() - 1) / variants_.size();
+    title_ = fmt::format("{}: {} triangles", choice.name, mesh.size());
+    Progress progress(variants_.size(), variants_.size() * each);
+    for (std::size_t v = 0; v < variants_.size(); ++v) {
+      const VerifyVariant& variant = variants_[v];
+      const std::string name = fmt::format("{}, offset {}, scaled by 2^{}", choice.name, variant.offset, variant.exponent);
+      const TriangleMesh placed = moved_and_scaled(mesh, variant.offset, variant.exponent);
+      const Bounds3f box = placed.bounds();
+      if (!is_finite(box.lower) || !is_finite(box.upper))
+        throw UserError(fmt::format("verify: {}: coordinates beyond float32; choose a smaller --offset or --scale", name));
+      const double begin = wall_seconds();
+      trace(placed, v, each, progress, name);
+      progress.cell_done(name, fmt::format("{} rays on {} cells in {}", each, cells_.size(), format_duration(wall_seconds() - begin)));
+    }
+  }
+
+  void trace(const TriangleMesh& mesh, std::size_t variant, std::uint64_t rays, Progress& progress, const std::string& name) {
+    const Oracle oracle(mesh);
+    const HardRayMaker maker(mesh);
+    std::vector<HardKind> kinds;
+    for (std::size_t k = 0; k < kMadeKinds; ++k) {
+      const bool wanted = command_.kinds.empty() || std::ranges::find(command_.kinds, kHardKindNames[k]) != command_.kinds.end();
+      if (!wanted) continue;
+      if (maker.has(static_cast<HardKind>(k)))
+        kinds.push_back(static_cast<HardKind>(k));
+      else if (!command_.kinds.empty())
+        progress.note(fmt::format("{}: has no {} to aim at", name, kHardKindNames[k]));
+    }
+    if (kinds.empty()) throw UserError(fmt::format("verify: {}: has nothing that rays of these --kinds are aimed at", name));
+    StructureShelf shelf(mesh, registry_, threads_);
+    const std::size_t batch_size = command_.spread ? kSpreadBatch : kBatch;
+    for (std::uint64_t begin = 0; begin < rays; begin += batch_size) {
+      const std::size_t count = std::min<std::uint64_t>(batch_size, rays - begin);
+      const HardRays made = maker.make(command_.seed, begin, count, kinds);
+      const VerifyBatch batch{mesh, oracle, made, oracle.closest_hit(made.batch()), begin};
+      if (command_.spread) {
+        VerifiedCell& cell = cells_[next_cell_++ % cells_.size()];
+        std::vector<Hit> hits;
+        cell.add(variant, verify_cell(cell.cell, shelf.get(cell.cell), batch, hits, {}));
+      } else {
+        verify_all(cells_, variant, shelf, batch);
+      }
+      keep_breaches(mesh, name);
+      progress.step(name, count);
+    }
+  }
+
+  void cases() {
+    const std::vector<VerifyCase> given = read_case_file(command_.subject);
+    make_cells({.spec = {}, .name = std::filesystem::path(command_.subject).stem().string()}, 0);
+    if (cells_.empty()) return;
+    title_ = fmt::format("{}: {} cases", command_.subject, given.size());
+    for (const VerifyCase& c : given) {
+      HardRays ray;
+      ray.rays = {c.ray}, ray.kinds = {HardKind::given}, ray.sources = {kNoPrimitive};
+      std::vector<std::uint64_t> wrong_before;
+      for (const VerifiedCell& v : cells_) wrong_before.push_back(faults(v));
+      small_subject(c.mesh, ray, total_rays_++, c.id);
+      for (std::size_t i = 0; i < cells_.size(); ++i)
+        if (faults(cells_[i]) > wrong_before[i]) cells_[i].wrong_cases.push_back(c.id);
+    }
+    if (command_.rays && *command_.rays > given.size()) random(&given, *command_.rays - given.size());
+  }
+
+  static std::uint64_t faults(const VerifiedCell& cell) {
+    if (cell.tallies.empty()) return 0;
+    const VerifyTally& t = cell.tallies[0][static_cast<std::size_t>(HardKind::given)];
+    return t.wrong() + t.wrong_primitive + t.any_missed + t.any_false;
+  }
+
+  /// Random meshes, or mutations of the cases given.
+  void random(const std::vector<VerifyCase>* given, std::uint64_t rays) {
+    if (!given) {
+      make_cells({.spec = {}, .name = "random"}, 0);
+      if (cells_.empty()) return;
+    }
+    const std::uint64_t subjects = (rays + kSubjectRays - 1) / kSubjectRays;
+    title_ += fmt::format("{}{} random meshes", title_.empty() ? "" : " and ", subjects);
+    Progress progress(1, subjects);
+    for (std::uint64_t i = 0; i < subjects; ++i) {
+      const std::size_t count = std::min<std::uint64_t>(kSubjectRays, rays - i * kSubjectRays);
+      const VerifyCase* base = given ? &(*given)[i % given->size()] : nullptr;
+      if (base && base->mesh.size() == 0) continue;
+      const RandomSubject subject =
+          base ? mutated_subject(base->mesh, base->ray, command_.seed, i, count) : random_subject(command_.seed, i, count);
+      small_subject(subject.mesh, subject.rays, total_rays_, fmt::format("{}-seed{}-{}", base ? base->id : "random", command_.seed, i));
+      total_rays_ += count;
+      progress.step("random meshes", 1);
+    }
+    progress.cell_done("random meshes", fmt::format("{} rays", rays));
+  }
+
+  void small_subject(const TriangleMesh& mesh, const HardRays& rays, std::uint64_t first, const std::string& name) {
+    const Oracle oracle(mesh);
+    StructureShelf shelf(mesh, registry_, 1);
+    verify_all(cells_, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch()), first});
+    keep_breaches(mesh, name);
+  }
+
+  // What was found.
+
+  /// Of cells that break their promise for the first time: what happened, and a case of it.
+  void keep_breaches(const TriangleMesh& mesh, const std::string& name) {
+    breached_.resize(cells_.size(), false);
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      if (breached_[i]) continue;
+      const VerifyTally sum = cells_[i].sum();
+      if (sum.broken == 0) continue;
+      breached_[i] = true;
+      if (cases_.size() >= kMostCases) continue;
+      if (const auto part = reduce(cells_[i], registry_, mesh, sum.first)) {
+        cases_.push_back(case_json(fmt::format("{}-{}", name, cases_.size() + 1),
+                                   fmt::format("{}: {}", cell_label(cells_[i].cell), sum.first.what), *part, sum.first.given));
+      }
+    }
+  }
+
+  ExitStatus report() {
+    const std::uint64_t rays = cells_.front().sum().rays;
+    fmt::print("{}, {} rays{}, {} cells\n{}", title_, rays, command_.spread ? " a cell" : "", cells_.size(),
+               verify_tables(cells_, subject_ != Subject::cases || command_.rays));
+    fmt::print("{}", skipped_lines(plan_, {}));
+    std::size_t broken = 0, promising = 0;
+    std::string lines;
+    for (const VerifiedCell& cell : cells_) {
+      const VerifyTally sum = cell.sum();
+      promising += cell.promise.any();
+      if (sum.broken == 0) continue;
+      if (++broken <= kMostCases) lines += describe_breach(cell, sum) + "\n";
+    }
+    if (!lines.empty()) fmt::print("\n{}", lines);
+    const std::string document = fmt::format("{{\"cases\": [\n{}\n]}}\n", fmt::join(cases_, ",\n"));
+    if (!cases_.empty()) fmt::print("\n{}", document);
+    if (!command_.out.empty()) {
+      write_whole(command_.out / "verify.csv", verify_csv(cells_, variants_));
+      if (!cases_.empty()) write_whole(command_.out / "cases.json", document);
+      fmt::print("\n{}\n", (command_.out / "verify.csv").string());
+    }
+    if (broken > 0) {
+      fmt::print("{} of {} cells that promise something break it\n", broken, promising);
+      return ExitStatus::kWrongAnswers;
+    }
+    fmt::print("all {} cells that promise something keep it; {} promise nothing\n", promising, cells_.size() - promising);
+    return ExitStatus::kDone;
+  }
+
+  const VerifyCommand& command_;
+  const Registry& registry_;
+  unsigned threads_;
+  Subject subject_ = Subject::scene;
+  Plan plan_;
+  std::vector<VerifiedCell> cells_;
+  std::vector<VerifyVariant> variants_{{}};
+  std::string title_;
+  std::size_t next_cell_ = 0;
+  std::uint64_t total_rays_ = 0;
+  std::vector<bool> breached_;
+  std::vector<std::string> cases_;
+};
+
+}  // namespace
+
+ExitStatus command_verify(const VerifyCommand& command) {
+  const Registry registry = this_registry();
+  return Verify(command, registry).run();
+}
+
+}  // namespace arboretum

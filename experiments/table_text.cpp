@@ -1,0 +1,26 @@
+#include "experiments/table_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace arboretum {
+
+std::string format_table(const std::vector<TableRow>& rows, std::size_t figures) {
+  std::vector<std::size_t> widths(rows.front().size());
+  for (const TableRow& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  std::string text;
+  for (const TableRow& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      line += i < figures ? fmt::format("{:<{}}  ", row[i], widths[i])
+                          : fmt::format("{:>{}}  ", row[i], widths[i]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,160 @@
+#include "experiments/verification.h"
+
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "oracle/answer_check.h"
+
+namespace arboretum {
+namespace {
+
+constexpr std::size_t kBlock = 4096;  // rays of one call
+
+float largest(Vec3f v) {
+  return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
+}
+
+/// Whether the exact hit lies at an end of the ray's interval, or so close that a rounded t decides between hit and miss.
+bool ends_at_hit(const Ray& ray, const ExactHit& truth, float reach) {
+  const double room = std::max(kSurfaceTolerance * std::fabs(truth.t), 0x1p-16 * double(reach) / largest(ray.direction));
+  return truth.t - ray.tnear <= room || ray.tfar - truth.t <= room;
+}
+
+/// A kernel leaves none of its answers unwritten: what stood there before is none.
+constexpr Hit kUnwritten{.t = -1.0f, .u = 0.0f, .v = 0.0f, .primitive = 0xdeadbeefu};
+
+/// What of the promise an answer breaks; empty: nothing.
+std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j, bool any_crack, bool at_end, const ExactHit& truth,
+                      const Hit& answer, bool any) {
+  const bool is_hit = truth.hit.is_hit(), representable = !is_hit || std::isfinite(truth.hit.t);
+  if (promise.coverage == Coverage::exact && representable) {
+    if (j.missed) return "an exact hit is missed";
+    if (j.false_hit) return "an exact miss is hit";
+    if (is_hit && answer.primitive != truth.hit.primitive) return "not the lowest primitive at the exact nearest t";
+    if (is_hit && answer.t != truth.hit.t) return "t is not the exact t rounded";
+    if (any != is_hit) return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
+  }
+  const bool aimed_at_edges = kind == HardKind::edge || kind == HardKind::border || kind == HardKind::interior;
+  if ((promise.coverage == Coverage::closed || (promise.coverage == Coverage::edges && aimed_at_edges)) && !at_end) {
+    if (j.crack) return "lost through a closed surface";
+    if (any_crack) return "any hit: lost through a closed surface";
+  }
+  if (promise.t_ulp > 0 && j.t_error_ulp > promise.t_ulp && !j.wrong_primitive) return "t is off by more than is promised";
+  return {};
+}
+
+class Judge {
+ public:
+  Judge(const Cell& cell, const VerifyBatch& batch)
+      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box)) {
+    const Bounds3f box = batch.mesh.bounds();
+    largest_ = box.empty() ? 0.0f : std::max(largest(box.lower), largest(box.upper));
+  }
+
+  void operator()(std::size_t i, const Hit& answer, bool any, const Hit* reference, std::vector<VerifyTally>& tallies) const {
+    const Ray& ray = batch_.rays.rays[i];
+    const ExactHit& truth = batch_.truth[i];
+    const float time = batch_.rays.times.empty() ? 0.0f : batch_.rays.times[i];
+    const HardKind kind = batch_.rays.kinds[i];
+    VerifyTally& tally = tallies[static_cast<std::size_t>(kind)];
+    const Judgement j = batch_.oracle.judge(ray, time, truth, answer);
+    ++tally.rays;
+    tally.exact_hits += truth.hit.is_hit();
+    tally.missed += j.missed, tally.false_hits += j.false_hit, tally.wrong_surface += j.wrong_surface;
+    tally.wrong_primitive += j.wrong_primitive, tally.cracks += j.crack;
+    const bool any_missed = truth.hit.is_hit() && !any;
+    tally.any_missed += any_missed, tally.any_false += !truth.hit.is_hit() && any;
+    const std::uint32_t source = batch_.rays.sources[i];
+    tally.self_hits += source != kNoPrimitive && answer.primitive == source && truth.hit.primitive != source;
+    tally.differs += reference && (reference->primitive != answer.primitive || reference->t != answer.t);
+    if (j.t_error_ulp >= 0) tally.t_ulp.add(j.t_error_ulp);
+    if (answer.is_hit() && answer.primitive == truth.hit.primitive)
+      tally.uv.add(std::max(std::fabs(double(answer.u) - truth.hit.u), std::fabs(double(answer.v) - truth.hit.v)));
+
+    if (!promise_.any() || !is_within(promise_, ray, largest_)) return;
+    const bool any_crack = any_missed && batch_.oracle.judge(ray, time, truth, Hit{}).crack;
+    const bool at_end = truth.hit.is_hit() && (kind == HardKind::surface || ends_at_hit(ray, truth, largest_ + largest(ray.origin)));
+    std::string what = breach_of(promise_, kind, j, any_crack, at_end, truth, answer, any);
+    if (what.empty()) return;
+    ++tally.broken;
+    if (!tally.first.what.empty() && tally.first.ray < batch_.first + i) return;
+    tally.first = {batch_.first + i, std::move(what), ray, time, kind, truth, answer, any};
+  }
+
+ private:
+  const VerifyBatch& batch_;
+  Promise promise_;
+  float largest_;
+};
+
+}  // namespace
+
+bool is_within(const Promise& promise, const Ray& ray, float largest_coordinate) noexcept {
+  if (promise.exponent == 0) return true;
+  const float high = std::ldexp(1.0f, promise.exponent), low = 1.0f / high;
+  const float size = std::max(largest_coordinate, largest(ray.origin)), direction = largest(ray.direction);
+  // A ray that is none must miss at whatever numbers: NaN and infinity are within.
+  return !is_valid(ray) || (size >= low && size <= high && direction >= low && direction <= high);
+}
+
+const Accel& StructureShelf::get(const Cell& cell) {
+  const StructureEntry* entry = registry_.structure(cell.structure);
+  BuildSettings settings{cell.builder, cell.leaf, entry->info.build_depends_on_isa ? cell.isa : registry_.isas.back(), threads_,
+                         cell.parameters};
+  std::unique_ptr<Accel>& accel = built_[{cell.structure, cell.builder_name(), cell.leaf, settings.isa}];
+  if (accel) return *accel;
+  BuildReport report;
+  std::unique_ptr<Accel> fresh = registry_.build(cell.structure, mesh_, settings, report);
+  if (bytes_ + fresh->bytes() > kMostBytes) built_.clear(), bytes_ = 0;
+  bytes_ += fresh->bytes();
+  return *(built_[{cell.structure, cell.builder_name(), cell.leaf, settings.isa}] = std::move(fresh));
+}
+
+std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const VerifyBatch& batch, std::vector<Hit>& hits,
+                                     std::span<const Hit> reference) {
+  const std::size_t count = batch.rays.rays.size();
+  hits.assign(count, kUnwritten);
+  const Judge judge(cell, batch);
+  tbb::enumerable_thread_specific<std::vector<VerifyTally>> local(kHardKindNames.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kBlock), [&](const tbb::blocked_range<std::size_t>& r) {
+    const RayBatch rays = batch.rays.batch().part(r.begin(), r.size());
+    std::vector<std::uint8_t> occluded(r.size(), 0xee);
+    cell.kernel->closest_hit(accel, rays, std::span(hits).subspan(r.begin(), r.size()), nullptr);
+    cell.kernel->any_hit(accel, rays, occluded, nullptr);
+    for (std::size_t i = r.begin(); i != r.end(); ++i)
+      judge(i, hits[i], occluded[i - r.begin()] != 0, reference.empty() ? nullptr : &reference[i], local.local());
+  });
+  std::vector<VerifyTally> sum(kHardKindNames.size());
+  for (const auto& tallies : local)
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += tallies[k];
+  return sum;
+}
+
+VerifyTally VerifiedCell::sum() const {
+  VerifyTally all;
+  for (const auto& variant : tallies)
+    for (const VerifyTally& tally : variant) all += tally;
+  return all;
+}
+
+void VerifiedCell::add(std::size_t variant, const std::vector<VerifyTally>& by_kind) {
+  if (tallies.size() <= variant) tallies.resize(variant + 1, std::vector<VerifyTally>(kHardKindNames.size()));
+  for (std::size_t k = 0; k < by_kind.size(); ++k) tallies[variant][k] += by_kind[k];
+}
+
+void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf, const VerifyBatch& batch) {
+  std::map<std::tuple<std::string, std::string, Isa>, std::vector<Hit>> references;
+  std::vector<Hit> hits;
+  for (VerifiedCell& verified : cells) {
+    const Cell& cell = verified.cell;
+    auto [reference, fresh] = references.try_emplace({cell.intersector, cell.box, cell.isa});
+    verified.add(variant, verify_cell(cell, shelf.get(cell), batch, hits, reference->second));
+    if (fresh) reference->second = hits;
+  }
+}
+
+}  // namespace arboretum

@@ -1,0 +1,95 @@
+// What each combination of intersector and box test promises: the one table that `list promises`, `verify` and
+// docs/numerics.md share. A new intersector or box test has a line here; a test holds it.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace arboretum {
+
+/// What of the exact answers is promised, each with what stands above it.
+enum class Coverage : unsigned char {
+  none,
+  edges,   ///< no ray is lost at an edge that two triangles share; at a vertex it may be
+  closed,  ///< no ray is lost through a closed surface; past its silhouette it may be, by the rounding of the vertices
+  exact    ///< hit or miss, primitive (the lowest id at the nearest t) and t rounded to float are those of exact arithmetic
+};
+
+/// `coverage` stands on boxes that lose nothing. `t_ulp`: |t - exact t| at most, in units of the last place, where the
+/// primitive is right; 0: no bound. `exponent`: the promise holds where the largest |coordinate| of scene and ray origin and the
+/// largest |direction component| are within 2^-exponent .. 2^exponent; 0: for every finite float32.
+struct IntersectorPromise {
+  std::string_view intersector;
+  Coverage coverage;
+  double t_ulp;
+  int exponent;
+  std::string_view remark;
+};
+
+inline constexpr IntersectorPromise kIntersectorPromises[] = {
+    {"moller_trumbore", Coverage::none, 0, 40, "the two sides of an edge compute different sums"},
+    {"moller_trumbore_double", Coverage::none, 0, 40, "as moller_trumbore, with fewer rays lost and t nearly always to the last bit"},
+    {"pluecker", Coverage::edges, 0, 40, "the two sides of an edge compute values of exactly opposite sign"},
+    {"pluecker_double", Coverage::edges, 0, 40, "as pluecker, with t nearly always to the last bit"},
+    {"watertight", Coverage::closed, 0, 40, "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
+    {"watertight_refined", Coverage::closed, 0, 40, "as watertight, the nearest hit's t, u, v computed again in double"},
+    {"baldwin_weber", Coverage::none, 0, 40, "stored transformation: accurate near the origin alone"},
+    {"havel_herout", Coverage::none, 0, 40, "stored planes: accurate near the origin alone"},
+    {"wald_projection", Coverage::none, 0, 40, "neighbours are projected along different axes"},
+    {"exact", Coverage::exact, 0.5, 0, "filtered, and exact arithmetic where the filter cannot decide"},
+};
+
+/// `loses_nothing`: no box that the exact ray touches is missed, and none whose triangle is an ulp nearer than the best hit culled.
+struct BoxPromise {
+  std::string_view box;
+  bool loses_nothing;
+  std::string_view remark;
+};
+
+inline constexpr BoxPromise kBoxPromises[] = {
+    {"fast", false, "rounding can lose a box that the ray touches at a face, edge or corner"},
+    {"ize", false, "no touched box is missed, but one an ulp nearer than the best hit may be culled"},
+    {"padded", true, "never misses a box that the exact ray touches"},
+};
+
+/// The promise of a cell.
+struct Promise {
+  Coverage coverage = Coverage::none;
+  double t_ulp = 0;
+  int exponent = 0;
+  [[nodiscard]] bool any() const noexcept { return coverage != Coverage::none || t_ulp > 0; }
+};
+
+/// Combinations that the tables do not name promise nothing; nor does Embree, whose kernels are not ours.
+[[nodiscard]] constexpr Promise promise_of(std::string_view structure, std::string_view intersector, std::string_view box) noexcept {
+  if (structure == "embree") return {};
+  for (const IntersectorPromise& i : kIntersectorPromises) {
+    if (i.intersector != intersector) continue;
+    for (const BoxPromise& b : kBoxPromises)
+      if (b.box == box) return {b.loses_nothing ? i.coverage : Coverage::none, i.t_ulp, i.exponent};
+  }
+  return {};
+}
+
+/// `padded` for the tests that promise to lose no hit, `fast` for the others.
+[[nodiscard]] constexpr std::string_view box_called_for(std::string_view intersector) noexcept {
+  return promise_of("", intersector, "padded").coverage == Coverage::none ? "fast" : "padded";
+}
+
+/// In words: "crack-free on closed meshes, |coordinates| within 2^-40 .. 2^40".
+[[nodiscard]] inline std::string to_words(const Promise& promise) {
+  if (!promise.any()) return "nothing";
+  std::string words;
+  if (promise.coverage == Coverage::edges) words = "crack-free at shared edges";
+  if (promise.coverage == Coverage::closed) words = "crack-free on closed meshes";
+  if (promise.coverage == Coverage::exact) words = "exact: hit or miss, nearest primitive, rounded t";
+  if (promise.t_ulp > 0 && promise.coverage != Coverage::exact) {
+    const int tenths = static_cast<int>(promise.t_ulp * 10 + 0.5);
+    words += (words.empty() ? "t within " : ", t within ") + std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ulp";
+  }
+  return words + (promise.exponent == 0
+                      ? ", every finite float32"
+                      : ", |coordinates| within 2^-" + std::to_string(promise.exponent) + " .. 2^" + std::to_string(promise.exponent));
+}
+
+}  // namespace arboretum
