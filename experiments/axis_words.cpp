@@ -38,7 +38,7 @@ AxisWord read_axis_word(const std::string& word, const Registry& registry, const
   std::vector<std::string> names{kAxisNames.begin(), kAxisNames.end()};
   names.insert(names.end(), further.begin(), further.end());
   if (std::ranges::find(names, key) == names.end())
-    throw UserError("command line: " + unknown_name_message("axis", key, names));
+    throw UserError(fmt::format("command line: {}", unknown_name_message("axis", key, names)));
   std::vector<std::string> values;
   for (std::size_t begin = equals + 1; begin <= word.size();) {
     const std::size_t comma = std::min(word.find(',', begin), word.size());
@@ -49,7 +49,7 @@ AxisWord read_axis_word(const std::string& word, const Registry& registry, const
           fmt::format("command line: '{}' holds an empty value; give {}=value,value", word, key));
     if (const auto axis = parse_axis(key)) {
       if (const std::string wrong = check_axis_value(*axis, value, registry); !wrong.empty())
-        throw UserError("command line: " + wrong);
+        throw UserError(fmt::format("command line: {}", wrong));
     }
     if (std::ranges::find(values, value) != values.end())
       throw UserError(fmt::format("command line: {}: '{}' is given twice; keep one", key, value));

@@ -6,6 +6,7 @@
 #include "experiments/axes.h"
 #include "experiments/commands.h"
 #include "experiments/result.h"
+#include "intersectors/promises.h"
 #include "scenes/catalogue.h"
 #include "scenes/effects.h"
 
@@ -77,6 +78,24 @@ Json effect_entries() {
   return entries;
 }
 
+Json promise_entries(const Registry& registry) {
+  Json entries = Json::array();
+  for (const std::string& intersector : known_values(Axis::intersector, registry)) {
+    for (const std::string& box : known_values(Axis::box, registry)) {
+      if (box == kAuto) continue;
+      const Promise promise = promise_of("", intersector, box);
+      Json entry = {{"name", intersector + "/" + box}, {"summary", to_words(promise)}, {"intersector", intersector}, {"box", box}};
+      entry["crack_free_at_edges"] = promise.coverage != Coverage::none;
+      entry["crack_free"] = promise.coverage == Coverage::closed || promise.coverage == Coverage::exact;
+      entry["exact"] = promise.coverage == Coverage::exact;
+      entry["t_error_ulp"] = promise.t_ulp > 0 ? Json(promise.t_ulp) : Json(nullptr);
+      entry["range_exponent"] = promise.exponent > 0 ? Json(promise.exponent) : Json(nullptr);
+      entries.push_back(std::move(entry));
+    }
+  }
+  return entries;
+}
+
 /// What a person sees after the name.
 std::string remark(const Json& entry) {
   std::string line = entry["summary"].get<std::string>();
@@ -105,8 +124,9 @@ ExitStatus command_list(const std::string& wanted, bool json) {
     titles.push_back(plural(static_cast<Axis>(i)));  // threads are no list
   titles.emplace_back("scenes");
   titles.emplace_back("effects");
+  titles.emplace_back("promises");
   const bool known = std::ranges::any_of(titles, [&](const std::string& t) { return t == wanted; }) ||
-                     wanted == "scene" || wanted == "effect" || (parse_axis(wanted) && wanted != "threads");
+                     wanted == "scene" || wanted == "effect" || wanted == "promise" || (parse_axis(wanted) && wanted != "threads");
   if (!wanted.empty() && !known) throw UserError(unknown_name_message("axis", wanted, titles));
 
   Json document = Json::object();
@@ -117,6 +137,7 @@ ExitStatus command_list(const std::string& wanted, bool json) {
   }
   if (wanted.empty() || wanted == "scenes" || wanted == "scene") document["scenes"] = scene_entries();
   if (wanted.empty() || wanted == "effects" || wanted == "effect") document["effects"] = effect_entries();
+  if (wanted.empty() || wanted == "promises" || wanted == "promise") document["promises"] = promise_entries(registry);
 
   if (json) {
     // One axis: its list alone.

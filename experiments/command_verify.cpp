@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <set>
 #include <thread>
 
 #include "core/names.h"
@@ -66,7 +67,7 @@ class Verify {
   static HardKind kind_of(const std::string& name) {
     std::vector<std::string> known(kHardKindNames.begin(), kHardKindNames.begin() + kMadeKinds);
     const auto found = std::ranges::find(known, name);
-    if (found == known.end()) throw UserError("verify: --kinds: " + unknown_name_message("kind of ray", name, known));
+    if (found == known.end()) throw UserError(fmt::format("verify: --kinds: {}", unknown_name_message("kind of ray", name, known)));
     return static_cast<HardKind>(found - known.begin());
   }
 
@@ -140,7 +141,7 @@ class Verify {
     Progress progress(variants_.size(), variants_.size() * each);
     for (std::size_t v = 0; v < variants_.size(); ++v) {
       const VerifyVariant& variant = variants_[v];
-      const std::string name = fmt::format("{}, offset {}, scaled by 2^{}", choice.name, variant.offset, variant.exponent);
+      const std::string name = fmt::format("{}-offset{}-scale{}", choice.name, variant.offset, variant.exponent);
       const TriangleMesh placed = moved_and_scaled(mesh, variant.offset, variant.exponent);
       const Bounds3f box = placed.bounds();
       if (!is_finite(box.lower) || !is_finite(box.upper))
@@ -244,9 +245,10 @@ class Verify {
       const VerifyTally sum = cells_[i].sum();
       if (sum.broken == 0) continue;
       breached_[i] = true;
-      if (cases_.size() >= kMostCases) continue;
+      // One case for a ray, however many cells it defeats.
+      if (cases_.size() >= kMostCases || !case_rays_.insert(sum.first.ray).second) continue;
       if (const auto part = reduce(cells_[i], registry_, mesh, sum.first)) {
-        cases_.push_back(case_json(fmt::format("{}-{}", name, cases_.size() + 1),
+        cases_.push_back(case_json(fmt::format("{}-ray{}", name, sum.first.ray),
                                    fmt::format("{}: {}", cell_label(cells_[i].cell), sum.first.what), *part, sum.first.given));
       }
     }
@@ -292,6 +294,7 @@ class Verify {
   std::size_t next_cell_ = 0;
   std::uint64_t total_rays_ = 0;
   std::vector<bool> breached_;
+  std::set<std::uint64_t> case_rays_;
   std::vector<std::string> cases_;
 };
 

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "oracle/answer_check.h"
 
 namespace arboretum {
 namespace {
@@ -18,17 +17,11 @@ float largest(Vec3f v) {
   return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
 }
 
-/// Whether the exact hit lies at an end of the ray's interval, or so close that a rounded t decides between hit and miss.
-bool ends_at_hit(const Ray& ray, const ExactHit& truth, float reach) {
-  const double room = std::max(kSurfaceTolerance * std::fabs(truth.t), 0x1p-16 * double(reach) / largest(ray.direction));
-  return truth.t - ray.tnear <= room || ray.tfar - truth.t <= room;
-}
-
 /// A kernel leaves none of its answers unwritten: what stood there before is none.
 constexpr Hit kUnwritten{.t = -1.0f, .u = 0.0f, .v = 0.0f, .primitive = 0xdeadbeefu};
 
 /// What of the promise an answer breaks; empty: nothing.
-std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j, bool any_crack, bool at_end, const ExactHit& truth,
+std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j, bool any_crack, const ExactHit& truth,
                       const Hit& answer, bool any) {
   const bool is_hit = truth.hit.is_hit(), representable = !is_hit || std::isfinite(truth.hit.t);
   if (promise.coverage == Coverage::exact && representable) {
@@ -39,7 +32,7 @@ std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j,
     if (any != is_hit) return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
   }
   const bool aimed_at_edges = kind == HardKind::edge || kind == HardKind::border || kind == HardKind::interior;
-  if ((promise.coverage == Coverage::closed || (promise.coverage == Coverage::edges && aimed_at_edges)) && !at_end) {
+  if (promise.coverage == Coverage::closed || (promise.coverage == Coverage::edges && aimed_at_edges)) {
     if (j.crack) return "lost through a closed surface";
     if (any_crack) return "any hit: lost through a closed surface";
   }
@@ -77,8 +70,7 @@ class Judge {
 
     if (!promise_.any() || !is_within(promise_, ray, largest_)) return;
     const bool any_crack = any_missed && batch_.oracle.judge(ray, time, truth, Hit{}).crack;
-    const bool at_end = truth.hit.is_hit() && (kind == HardKind::surface || ends_at_hit(ray, truth, largest_ + largest(ray.origin)));
-    std::string what = breach_of(promise_, kind, j, any_crack, at_end, truth, answer, any);
+    std::string what = breach_of(promise_, kind, j, any_crack, truth, answer, any);
     if (what.empty()) return;
     ++tally.broken;
     if (!tally.first.what.empty() && tally.first.ray < batch_.first + i) return;

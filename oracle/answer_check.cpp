@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/exact/exact_predicate.h"
+#include "oracle/sheared.h"
 
 namespace arboretum {
 namespace {
@@ -35,6 +36,17 @@ bool is_at_nearest_t(const TriangleMesh& mesh, const Ray& ray, FrameTime at, con
   ExactPredicate predicate(ray);
   Enclosure t;
   return predicate.meets(given, t) && predicate.compare_t(given, mesh.corners(truth.hit.primitive, at)) == 0;
+}
+
+/// Whether an answer farther away is not only the next triangle, taken for the nearest because both distances are rounded.
+bool is_behind(const TriangleMesh& mesh, const Ray& ray, FrameTime at, const ExactHit& truth, const Hit& answer) {
+  if (answer.primitive >= mesh.size()) return true;
+  const Sheared sheared(ray);
+  const auto distance = [&](std::uint32_t id) {
+    const auto c = mesh.corners(id, at);
+    return rounded_distance(sheared, sheared(c[0]), sheared(c[1]), sheared(c[2]));
+  };
+  return distance(truth.hit.primitive).upper < distance(answer.primitive).lower;
 }
 
 double ulp_of(float x) {
@@ -67,13 +79,13 @@ Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time
     const double difference = double(answer.t) - truth.t, tolerance = kSurfaceTolerance * std::fabs(truth.t);
     j.wrong_surface = !(std::fabs(difference) <= tolerance);  // true for a NaN
     j.wrong_primitive = !is_at_nearest_t(mesh, ray, at, truth, answer.primitive);
-    something_behind = difference > tolerance && j.wrong_primitive;
+    something_behind = difference > tolerance && j.wrong_primitive && is_behind(mesh, ray, at, truth, answer);
     if ((!j.wrong_surface || !j.wrong_primitive) && std::isfinite(truth.hit.t)) {
       const double error = std::fabs(difference) / ulp_of(truth.hit.t);
       j.t_error_ulp = std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
     }
   }
-  j.crack = something_behind && adjacency().passes_through(ray, at, truth.hit.primitive, truth.hit.u, truth.hit.v, answer.primitive);
+  j.crack = something_behind && adjacency().passes_through(ray, at, truth.hit.primitive, answer.primitive);
   return j;
 }
 

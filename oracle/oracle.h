@@ -38,8 +38,8 @@ struct AnswerCheck {
   /// Both hit, but the primitive is not one of those at the exact nearest t, be the surface right or wrong;
   /// no part of wrong_answers().
   std::uint64_t wrong_primitive = 0;
-  /// Misses, or hits of something behind, through a closed surface and not past its silhouette. 0 for any
-  /// hit.
+  /// Misses, or hits of something behind (by more than rounding may move t), through a closed surface and not past its
+  /// silhouette, as SurfaceAdjacency::passes_through() has it. 0 for any hit.
   std::uint64_t cracks = 0;
   /// |t - exact t| in units of the last place of the exact t's float32, over the rays with the right surface
   /// or primitive.

@@ -6,14 +6,10 @@
 #include <set>
 #include <tuple>
 
-#include "core/exact/determinant.h"
+#include "oracle/sheared.h"
 
 namespace arboretum {
 namespace {
-
-Triple<double> from(Vec3f origin, Vec3f p) {
-  return {double(p.x) - origin.x, double(p.y) - origin.y, double(p.z) - origin.z};
-}
 
 double size_of(const Triple<double>& a) {
   return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])});
@@ -21,53 +17,18 @@ double size_of(const Triple<double>& a) {
 
 /// Side of `p` of the plane through the edge along the ray; 0 where doubles cannot tell.
 int side(const Ray& ray, Vec3f a, Vec3f b, Vec3f p) {
-  const Triple<double> edge = from(a, b), third = from(a, p),
+  const Triple<double> edge = difference_from(a, b), third = difference_from(a, p),
                        d{ray.direction.x, ray.direction.y, ray.direction.z};
   const double value = determinant(edge, third, d),
                bound = 0x1p-47 * size_of(edge) * size_of(third) * size_of(d);
   return value > bound ? 1 : value < -bound ? -1 : 0;
 }
 
-/// A point as seen along the ray: sheared so that the ray is the origin, along its main axis.
-struct Seen {
-  double x, y;
-  double size;  ///< largest coordinate, the depth among them
-};
-
-class Sheared {
- public:
-  explicit Sheared(const Ray& ray) : origin_(ray.origin) {
-    const Vec3f d = ray.direction;
-    z_ = std::fabs(d.x) > std::fabs(d.y) ? (std::fabs(d.x) > std::fabs(d.z) ? 0 : 2) : (std::fabs(d.y) > std::fabs(d.z) ? 1 : 2);
-    x_ = (z_ + 1) % 3, y_ = (z_ + 2) % 3;
-    slope_x_ = double(d[x_]) / d[z_], slope_y_ = double(d[y_]) / d[z_];
-  }
-  [[nodiscard]] Seen operator()(Vec3f p) const {
-    const Triple<double> v = from(origin_, p);
-    const double x = v[x_] - slope_x_ * v[z_], y = v[y_] - slope_y_ * v[z_];
-    return {x, y, std::max({std::fabs(x), std::fabs(y), std::fabs(v[z_])})};
-  }
-
- private:
-  Vec3f origin_;
-  std::size_t x_, y_, z_;
-  double slope_x_, slope_y_;
-};
-
 /// Of the segment to the ray.
 double distance(const Seen& a, const Seen& b) {
   const double x = b.x - a.x, y = b.y - a.y, square = x * x + y * y;
   const double s = square > 0 ? std::clamp(-(a.x * x + a.y * y) / square, 0.0, 1.0) : 0.0;
   return std::hypot(a.x + s * x, a.y + s * y);
-}
-
-/// Whether rounding could move the triangle's vertices by as much as its own size.
-bool is_far_off(const Ray& ray, const std::array<Vec3f, 3>& corners) {
-  const Sheared sheared(ray);
-  const Seen p[3] = {sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
-  for (std::size_t k = 0; k < 3; ++k)
-    if (distance(p[k], p[(k + 1) % 3]) <= SurfaceAdjacency::kRounding * std::max(p[k].size, p[(k + 1) % 3].size)) return true;
-  return false;
 }
 
 }  // namespace
@@ -142,9 +103,7 @@ SurfaceAdjacency::Corner3 SurfaceAdjacency::corners(std::uint32_t triangle) cons
   return c;
 }
 
-bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, double u, double v,
-                                      std::uint32_t answer) const {
-  if (std::min({u, v, 1.0 - u - v}) > kNear && !is_far_off(ray, mesh_.corners(triangle, at))) return true;
+bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, std::uint32_t answer) const {
   constexpr std::size_t kMostTriangles = 4096;  // a larger patch is taken for one that the ray passes through
   std::set<Corner3> seen{corners(triangle)};
   std::vector<Corner3> waiting(seen.begin(), seen.end());
@@ -154,6 +113,8 @@ bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_
     waiting.pop_back();
     if (c[0] == c[1] || c[1] == c[2]) return false;
     const Seen p[3] = {sheared(mesh_.position(c[0], at)), sheared(mesh_.position(c[1], at)), sheared(mesh_.position(c[2], at))};
+    const RoundedDistance t = rounded_distance(sheared, p[0], p[1], p[2]);
+    if (t.lower < ray.tnear || t.upper > ray.tfar) return false;
     const double area = std::fabs((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x));
     for (std::size_t k = 0; k < 3; ++k) {
       const Seen &a = p[k], &b = p[(k + 1) % 3];

@@ -20,21 +20,20 @@ class SurfaceAdjacency {
   /// no part.
   explicit SurfaceAdjacency(const TriangleMesh& mesh);
 
-  /// Whether the ray of that time, which meets `triangle` at the weights u (second corner) and v (third), passes through
-  /// the surface there, however the vertices are rounded: the triangles about the ray, connected by edges that come near it,
+  /// Whether the ray of that time, which meets `triangle`, passes through the surface there, however the vertices are rounded: the triangles about the ray, connected by edges that come near it,
   /// form a patch of one facing whose border is not near. An edge is near within kNear of a triangle's height over it, and
   /// within kRounding of its vertices' distance; a near edge that not exactly two triangles share, one on either side as seen
   /// along the ray, is a border or a silhouette. (Moving the patch's vertices by less than that moves its border not across
-  /// the ray, so the patch, covering the ray once, goes on covering it.)
+  /// the ray, so the patch, covering the ray once, goes on covering it.) A patch that rounding may put outside the ray's
+  /// interval, in part, is none either.
   /// False where `answer`, a triangle or kNoPrimitive, is one of the patch: the surface was met, if at another depth.
-  [[nodiscard]] bool passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, double u, double v,
-                                    std::uint32_t answer = kNoPrimitive) const;
+  [[nodiscard]] bool passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, std::uint32_t answer = kNoPrimitive) const;
 
   /// How many triangles share the edge between corners k and (k + 1) % 3; 0 where the triangle takes no part.
   [[nodiscard]] std::size_t triangles_at_edge(std::uint32_t triangle, std::size_t k) const;
 
-  /// The watertight test displaces a vertex by at most 5 * 2^-24 of its distance, seen along the ray's main axis.
-  static constexpr double kRounding = 0x1p-21;
+  /// The watertight test displaces a sheared coordinate by at most 6 * 2^-24 of the vertex's largest.
+  static constexpr double kRounding = 0x1p-20;
   static constexpr double kNear = 1e-3;
 
  private:

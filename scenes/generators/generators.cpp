@@ -24,13 +24,14 @@ constexpr GeneratorInfo kInfos[] = {
     {"cornell_box", "a box with a lamp, a glass sphere, a mirror sphere, a metal and a matt block", kExact,
      false},
     {"sphere", "a closed sphere of latitude and longitude lines, poles as fans", kEven, false},
+    {"fan", "two fans base to base: closed, half of the triangles at each of two vertices", kEven, false},
     {"forest", "about a thousand instances of four trees on a ground; for two_level", kExact, true},
     {"waving_cloth", "a curtain that waves and a ball that flies past, in five key frames; for bvh4_motion", kExact, false, true},
 };
 constexpr Generate kFunctions[] = {
     generate_sphere_flake, generate_fractal_terrain,   generate_random_triangles, generate_needles,
     generate_city,         generate_teapot_in_stadium, generate_cornell_box,      generate_sphere,
-    generate_forest,       generate_waving_cloth};
+    generate_fan,          generate_forest,            generate_waving_cloth};
 static_assert(std::size(kInfos) == std::size(kFunctions));
 
 }  // namespace

@@ -32,6 +32,7 @@ inline constexpr std::size_t kMaxGeneratedTriangles = 500'000'000;
 // One function a generator; `triangles` is at least 1. The scene has a camera and materials; its name is left
 // empty.
 [[nodiscard]] Scene generate_sphere(std::size_t triangles, std::uint64_t seed);
+[[nodiscard]] Scene generate_fan(std::size_t triangles, std::uint64_t seed);
 [[nodiscard]] Scene generate_sphere_flake(std::size_t triangles, std::uint64_t seed);
 [[nodiscard]] Scene generate_fractal_terrain(std::size_t triangles, std::uint64_t seed);
 [[nodiscard]] Scene generate_random_triangles(std::size_t triangles, std::uint64_t seed);

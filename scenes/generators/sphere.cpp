@@ -1,4 +1,4 @@
-// sphere, sphere_flake. The flake follows the one of Haines' Standard Procedural Databases (1987): on each
+// sphere, fan, sphere_flake. The flake follows the one of Haines' Standard Procedural Databases (1987): on each
 // sphere nine of a third of its radius, six around its equator and three above.
 #include <deque>
 
@@ -48,6 +48,22 @@ Scene generate_sphere(std::size_t triangles, std::uint64_t) {
   scene.mesh = builder.take();
   scene.materials.push_back(Material{.name = "matt", .diffuse = {0.7f, 0.6f, 0.5f}});
   scene.camera = Camera{.position = {1.2f, 1.4f, 2.6f}, .look_at = {0, 0, 0}};
+  scene.lights.push_back(Light{.position = {3, 4, 3}, .intensity = {20, 20, 20}});
+  return scene;
+}
+
+Scene generate_fan(std::size_t triangles, std::uint64_t) {
+  MeshBuilder builder;
+  // So squat that a single ring stands between the poles.
+  builder.add_closed(MeshBuilder::closed_count(triangles), 1e-9, 0, [](double v, double turns) {
+    const UnitCircle longitude(turns);
+    const double radius = v > 0.0 && v < 1.0 ? 1.0 : 0.0;
+    return Vec3d{radius * longitude.sine, v - 0.5, radius * longitude.cosine};
+  });
+  Scene scene;
+  scene.mesh = builder.take();
+  scene.materials.push_back(Material{.name = "matt", .diffuse = {0.6f, 0.7f, 0.5f}});
+  scene.camera = Camera{.position = {1.2f, 1.9f, 2.6f}, .look_at = {0, 0, 0}};
   scene.lights.push_back(Light{.position = {3, 4, 3}, .intensity = {20, 20, 20}});
   return scene;
 }
