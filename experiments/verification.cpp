@@ -115,8 +115,8 @@ std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kBlock), [&](const tbb::blocked_range<std::size_t>& r) {
     const RayBatch rays = batch.rays.batch().part(r.begin(), r.size());
     std::vector<std::uint8_t> occluded(r.size(), 0xee);
-    cell.kernel->closest_hit(accel, rays, std::span(hits).subspan(r.begin(), r.size()), nullptr);
-    cell.kernel->any_hit(accel, rays, occluded, nullptr);
+    cell.kernel->closest_hit(accel, rays, std::span(hits).subspan(r.begin(), r.size()));
+    cell.kernel->any_hit(accel, rays, occluded);
     for (std::size_t i = r.begin(); i != r.end(); ++i)
       judge(i, hits[i], occluded[i - r.begin()] != 0, reference.empty() ? nullptr : &reference[i], local.local());
   });

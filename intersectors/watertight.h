@@ -12,8 +12,9 @@
 // that starts on it could meet it again. With L = max |x|, |y| and Z = max |z| of the sheared vertices, t is off by less than
 // some 164 u Z |1/dz| L (Z + L) / |det| (the edge functions by 12.5 u L (Z + L)); in tests by no more than a third of that.
 // Where that, with 64 u for 164 u, could turn t across tnear, and where t is below 2^-10 of the depth and so inaccurate
-// itself, t is computed again from the triangle's plane, in double. What lies clearly before tnear, as the triangle that a ray has just
-// left, is not.
+// itself, t is computed again from the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle
+// that is met only because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the surface all
+// the same. What lies clearly before tnear, as the triangle that a ray has just left, is not.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -113,14 +114,21 @@ struct Watertight {
     const double o[3] = {ray.ox, ray.oy, ray.oz}, d[3] = {ray.dx, ray.dy, ray.dz};
     for (unsigned rest = lanes.bits(); rest; rest &= rest - 1) {
       const int i = __builtin_ctz(rest);
-      double a[3], e1[3], e2[3];
+      double a[3], e1[3], e2[3], least = __builtin_inf(), most = -least;
       for (int j = 0; j < 3; ++j) {
         const double v0 = block.v0[k[j]][i];
         a[j] = v0 - o[j], e1[j] = block.v1[k[j]][i] - v0, e2[j] = block.v2[k[j]][i] - v0;
       }
+      const double depths[3] = {a[2], a[2] + e1[2], a[2] + e2[2]};
+      for (const double depth : depths) {
+        const double at = depth / d[2];
+        least = at < least ? at : least, most = at > most ? at : most;
+      }
       const double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
       const double along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
-      if (along != 0) t[i] = float((n[0] * a[0] + n[1] * a[1] + n[2] * a[2]) / along);
+      if (along == 0) continue;
+      const double plane = (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]) / along;
+      t[i] = float(plane < least ? least : plane > most ? most : plane);
     }
     hits.t = vf<W>::load(t);
   }
