@@ -85,11 +85,12 @@ struct Promise {
   if (promise.coverage == Coverage::exact) words = "exact: hit or miss, nearest primitive, rounded t";
   if (promise.t_ulp > 0 && promise.coverage != Coverage::exact) {
     const int tenths = static_cast<int>(promise.t_ulp * 10 + 0.5);
-    words += (words.empty() ? "t within " : ", t within ") + std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " ulp";
+    words.append(words.empty() ? "t within " : ", t within ").append(std::to_string(tenths / 10)).append(".");
+    words.append(std::to_string(tenths % 10)).append(" ulp");
   }
-  return words + (promise.exponent == 0
-                      ? ", every finite float32"
-                      : ", |coordinates| within 2^-" + std::to_string(promise.exponent) + " .. 2^" + std::to_string(promise.exponent));
+  if (promise.exponent == 0) return words.append(", every finite float32");
+  const std::string exponent = std::to_string(promise.exponent);
+  return words.append(", |coordinates| within 2^-").append(exponent).append(" .. 2^").append(exponent);
 }
 
 }  // namespace arboretum
