@@ -76,7 +76,7 @@ struct Promise {
   return promise_of("", intersector, "padded").coverage == Coverage::none ? "fast" : "padded";
 }
 
-/// In words: "crack-free on closed meshes, |coordinates| within 2^-40 .. 2^40".
+/// In words: "crack-free on closed meshes, coordinates within 2^-40 .. 2^40".
 [[nodiscard]] inline std::string to_words(const Promise& promise) {
   if (!promise.any()) return "nothing";
   std::string words;
@@ -90,7 +90,7 @@ struct Promise {
   }
   if (promise.exponent == 0) return words.append(", every finite float32");
   const std::string exponent = std::to_string(promise.exponent);
-  return words.append(", |coordinates| within 2^-").append(exponent).append(" .. 2^").append(exponent);
+  return words.append(", coordinates within 2^-").append(exponent).append(" .. 2^").append(exponent);
 }
 
 }  // namespace arboretum
