@@ -93,51 +93,82 @@ class BvhPackets {
 
   typename Leaves::RayData& data(int i) { return *reinterpret_cast<typename Leaves::RayData*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData)); }
 
+  /// The rays as structures of arrays and their constants of BoxRay, W at a time: the same operations, so the same bits.
   void prepare(int count, std::uint64_t (&octants)[8]) {
-    valid_ = 0;
     for (int i = 0; i < count; ++i) {
-      best_[i] = NearestHit{rays_[i].tfar};
-      if (!is_valid_in_lanes(rays_[i])) {
-        set(i, 0.0f, 0.0f, BoxRay<N, false>(Ray{}, 0.0f));
-        continue;
+      const Ray& ray = rays_[i];
+      origin_[0][i] = ray.origin.x, origin_[1][i] = ray.origin.y, origin_[2][i] = ray.origin.z;
+      direction_[0][i] = ray.direction.x, direction_[1][i] = ray.direction.y, direction_[2][i] = ray.direction.z;
+      tnear_[i] = ray.tnear, t_[i] = ray.tfar;
+      best_[i] = NearestHit{ray.tfar};
+    }
+    for (int i = count; i < chunks_ * W; ++i) {
+      for (int a = 0; a < 3; ++a) origin_[a][i] = direction_[a][i] = 0.0f;
+      tnear_[i] = t_[i] = 0.0f;
+    }
+    valid_ = 0;
+    std::uint64_t negative[3] = {};
+    for (int c = 0; c < chunks_; ++c) {
+      const int k = c * W;
+      const F o[3] = {F::load(origin_[0] + k), F::load(origin_[1] + k), F::load(origin_[2] + k)};
+      const F d[3] = {F::load(direction_[0] + k), F::load(direction_[1] + k), F::load(direction_[2] + k)};
+      const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
+      const F infinity(std::numeric_limits<float>::infinity()), tnear = F::load(tnear_ + k);
+      vm<W> valid = (tnear <= F::load(t_ + k)) & (largest > F(0.0f));
+      for (int a = 0; a < 3; ++a) valid = valid & (abs(o[a]) < infinity) & (abs(d[a]) < infinity);
+      valid_ |= std::uint64_t(valid.bits()) << k;
+      max_x86(tnear, F(0.0f)).store(tnear_ + k);
+      const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest, M(max_coordinate_);
+      for (int a = 0; a < 3; ++a) {
+        F r, f, g;
+        if constexpr (kHasFma) {
+          r = select(abs(d[a]) > tiny, F(1.0f) / d[a], xor_sign(limit, sign_bits(d[a])));
+          f = g = o[a] * r;
+          if (padded_) {
+            const F e = F(0x1p-21f) * (M + abs(o[a])) * abs(r) + F(0x1p-100f);
+            f = f + e, g = g - e;
+          }
+        } else {
+          r = F(1.0f) / d[a];
+          f = g = o[a];
+          if (padded_) {
+            const F e = xor_sign(F(0x1p-21f) * (M + abs(o[a])) + F(0x1p-100f), sign_bits(r));
+            f = f + e, g = g - e;
+          }
+        }
+        r.store(r_[a] + k), f.store(near_[a] + k), g.store(far_[a] + k);
+        negative[a] |= std::uint64_t((sign_bits(r) < vi<W>(0)).bits()) << k;
       }
-      if (padded_) {
-        set(i, first_distance(rays_[i]), rays_[i].tfar, BoxRay<N, true>(rays_[i], max_coordinate_));
-      } else {
-        set(i, first_distance(rays_[i]), rays_[i].tfar, BoxRay<N, false>(rays_[i], max_coordinate_));
-      }
-      const auto negative = [&](int axis) { return unsigned(__builtin_signbit(r_[axis][i]) != 0); };
-      octants[negative(0) | negative(1) << 1 | negative(2) << 2] |= std::uint64_t{1} << i;
-      valid_ |= std::uint64_t{1} << i;
+    }
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      std::uint64_t mask = valid_;
+      for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? negative[a] : ~negative[a];
+      octants[octant] = mask;
+    }
+    for (std::uint64_t rest = valid_; rest; rest &= rest - 1) {
+      const int i = __builtin_ctzll(rest);
       new (static_cast<void*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(rays_[i]));
     }
-    for (int i = count; i < chunks_ * W; ++i) set(i, 0.0f, 0.0f, BoxRay<N, false>(Ray{}, 0.0f));
   }
-  template <class Box>
-  ARBORETUM_INLINE void set(int i, float tnear, float tfar, const Box& b) {
-    tnear_[i] = tnear, t_[i] = tfar;
-    r_[0][i] = b.rx, r_[1][i] = b.ry, r_[2][i] = b.rz;
-    near_[0][i] = b.fx, near_[1][i] = b.fy, near_[2][i] = b.fz;
-    far_[0][i] = b.gx, far_[1][i] = b.gy, far_[2][i] = b.gz;
+
+  /// The smallest and the largest value of the lanes of `mask`.
+  void range(const float* values, std::uint64_t mask, float& low, float& high) const {
+    const F infinity(std::numeric_limits<float>::infinity());
+    F least = infinity, most = -infinity;
+    for (int c = 0; c < chunks_; ++c) {
+      const vm<W> in = vm<W>::from_bits(unsigned(mask >> (c * W)) & ((1u << W) - 1u));
+      const F v = F::load(values + c * W);
+      least = min_x86(least, select(in, v, infinity)), most = max_x86(most, select(in, v, -infinity));
+    }
+    low = reduce_min(least), high = -reduce_min(-most);
   }
 
   Interval interval_of(std::uint64_t mask) const {
     Interval v;
     v.usable = true;
-    v.tnear = std::numeric_limits<float>::infinity();
-    float o_low[3], o_high[3];
-    for (int a = 0; a < 3; ++a)
-      v.r_low[a] = o_low[a] = std::numeric_limits<float>::infinity(), v.r_high[a] = o_high[a] = -std::numeric_limits<float>::infinity();
-    for (std::uint64_t rest = mask; rest; rest &= rest - 1) {
-      const int i = __builtin_ctzll(rest);
-      const float* o = &rays_[i].origin.x;
-      v.tnear = tnear_[i] < v.tnear ? tnear_[i] : v.tnear;
-      for (int a = 0; a < 3; ++a) {
-        const float r = r_[a][i];
-        v.r_low[a] = r < v.r_low[a] ? r : v.r_low[a], v.r_high[a] = r > v.r_high[a] ? r : v.r_high[a];
-        o_low[a] = o[a] < o_low[a] ? o[a] : o_low[a], o_high[a] = o[a] > o_high[a] ? o[a] : o_high[a];
-      }
-    }
+    float o_low[3], o_high[3], unused;
+    range(tnear_, mask, v.tnear, unused);
+    for (int a = 0; a < 3; ++a) range(r_[a], mask, v.r_low[a], v.r_high[a]), range(origin_[a], mask, o_low[a], o_high[a]);
     for (int a = 0; a < 3; ++a) {
       const bool negative = __builtin_signbit(v.r_low[a]) != 0;
       const float r = negative ? -v.r_low[a] : v.r_high[a];
@@ -195,16 +226,9 @@ class BvhPackets {
   }
 
   [[nodiscard]] float farthest(std::uint64_t mask) const {
-    F most(-std::numeric_limits<float>::infinity());
-    for (int c = 0; c < chunks_; ++c) {
-      const unsigned in = unsigned(mask >> (c * W)) & ((1u << W) - 1u);
-      most = max_x86(most, select(vm<W>::from_bits(in), F::load(t_ + c * W), most));
-    }
-    alignas(64) float lanes[W];
-    most.store(lanes);
-    float t = lanes[0];
-    for (int i = 1; i < W; ++i) t = lanes[i] > t ? lanes[i] : t;
-    return t;
+    float low, high;
+    range(t_, mask, low, high);
+    return high;
   }
 
   void traverse(std::uint64_t group) {
@@ -304,6 +328,7 @@ class BvhPackets {
   const Ray* rays_ = nullptr;
   int threshold_ = 0, chunks_ = 0;
   std::uint64_t active_ = 0, valid_ = 0;
+  alignas(64) float origin_[3][kMostPacketRays], direction_[3][kMostPacketRays];
   alignas(64) float r_[3][kMostPacketRays], near_[3][kMostPacketRays], far_[3][kMostPacketRays], tnear_[kMostPacketRays], t_[kMostPacketRays];
   NearestHit best_[kMostPacketRays];
   alignas(64) std::byte data_[kMostPacketRays * sizeof(typename Leaves::RayData)];
