@@ -33,8 +33,42 @@ struct MollerTrumbore {
       e1 = v0 - vf3<W>{F::load(block.v1[0]), F::load(block.v1[1]), F::load(block.v1[2])};
       e2 = vf3<W>{F::load(block.v2[0]), F::load(block.v2[1]), F::load(block.v2[2])} - v0;
     }
-    const vf3<W> o{F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)};
-    const vf3<W> d{F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)};
+    return core<W>({F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)}, {F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)}, v0, e1, e2, hits);
+  }
+
+  /// What a packet keeps beside its rays: nothing.
+  struct PacketData {
+    static constexpr int kGroups = 1;
+    void clear() {}
+    template <int W>
+    void prepare(const PacketRays&, int /*k*/) {}
+    [[nodiscard]] std::uint64_t group(int) const { return ~std::uint64_t{0}; }
+    /// RayData of ray i.
+    [[nodiscard]] ARBORETUM_INLINE RayData alone(const Ray& ray, int /*i*/) const { return RayData(ray); }
+  };
+
+  /// Lanes are the W rays from k on, all against triangle `i` of the block: what intersect() computes, bit for bit. `again`: rays that must be
+  /// tested one by one instead; here none.
+  template <int W, class Block>
+  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData&, int /*group*/, int k, const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
+    using F = vf<W>;
+    const auto all = [i](const float(&p)[3][Block::kWidth]) { return vf3<W>{F(p[0][i]), F(p[1][i]), F(p[2][i])}; };
+    const auto load = [k](const float(&p)[3][PacketRays::kMost]) { return vf3<W>{F::load(p[0] + k), F::load(p[1] + k), F::load(p[2] + k)}; };
+    const vf3<W> v0 = all(block.v0);
+    vf3<W> e1, e2;
+    if constexpr (Block::kForm == TriangleForm::edges) {
+      e1 = all(block.e1), e2 = all(block.e2);
+    } else {
+      e1 = v0 - all(block.v1), e2 = all(block.v2) - v0;
+    }
+    again = vm<W>(false);
+    return core<W>(load(rays.origin), load(rays.direction), v0, e1, e2, hits);
+  }
+
+ private:
+  template <int W>
+  static ARBORETUM_INLINE vm<W> core(vf3<W> o, vf3<W> d, vf3<W> v0, vf3<W> e1, vf3<W> e2, TriangleHits<W>& hits) {
+    using F = vf<W>;
     const vf3<W> n = cross(e2, e1);
     const vf3<W> c = v0 - o;
     const vf3<W> r = cross(c, d);

@@ -13,5 +13,11 @@ struct TriangleHits {
   vf<W> u_numerator, v_numerator, denominator;
 };
 
+/// Rays of a packet as structures of arrays.
+struct PacketRays {
+  static constexpr int kMost = 64;
+  alignas(64) float origin[3][kMost], direction[3][kMost], tnear[kMost];
+};
+
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

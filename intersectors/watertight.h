@@ -32,16 +32,22 @@ struct Watertight {
     float ox, oy, oz, sx, sy, sz;
     float dx, dy, dz, tnear;
     int kx, ky, kz;
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) : tnear(ray.tnear) {
-      const float ax = __builtin_fabsf(ray.direction.x), ay = __builtin_fabsf(ray.direction.y), az = __builtin_fabsf(ray.direction.z);
-      kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) : RayData(ray, largest_axis(ray.direction)) { sx = dx / dz, sy = dy / dz, sz = 1.0f / dz; }
+    /// With shear constants known.
+    ARBORETUM_INLINE RayData(const Ray& ray, int axis, float shear_x, float shear_y, float shear_z) : RayData(ray, axis) { sx = shear_x, sy = shear_y, sz = shear_z; }
+
+   private:
+    ARBORETUM_INLINE RayData(const Ray& ray, int axis) : tnear(ray.tnear), kz(axis) {
       kx = kz == 2 ? 0 : kz + 1;
       ky = kx == 2 ? 0 : kx + 1;
       const float* o = &ray.origin.x;
       const float* d = &ray.direction.x;
       ox = o[kx], oy = o[ky], oz = o[kz];
       dx = d[kx], dy = d[ky], dz = d[kz];
-      sx = dx / dz, sy = dy / dz, sz = 1.0f / dz;
+    }
+    static ARBORETUM_INLINE int largest_axis(Vec3f d) {
+      const float ax = __builtin_fabsf(d.x), ay = __builtin_fabsf(d.y), az = __builtin_fabsf(d.z);
+      return ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
     }
   };
 
@@ -49,35 +55,105 @@ struct Watertight {
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
     constexpr int W = Block::kWidth;
     using F = vf<W>;
-    const F ox(ray.ox), oy(ray.oy), oz(ray.oz), sx(ray.sx), sy(ray.sy);
-    const F az = F::load(block.v0[ray.kz]) - oz, bz = F::load(block.v1[ray.kz]) - oz, cz = F::load(block.v2[ray.kz]) - oz;
-    const F ax = nmadd(sx, az, F::load(block.v0[ray.kx]) - ox), ay = nmadd(sy, az, F::load(block.v0[ray.ky]) - oy);
-    const F bx = nmadd(sx, bz, F::load(block.v1[ray.kx]) - ox), by = nmadd(sy, bz, F::load(block.v1[ray.ky]) - oy);
-    const F cx = nmadd(sx, cz, F::load(block.v2[ray.kx]) - ox), cy = nmadd(sy, cz, F::load(block.v2[ray.ky]) - oy);
-    const F u0 = cx * by, u1 = cy * bx, v0 = ax * cy, v1 = ay * cx, w0 = bx * ay, w1 = by * ax;
-    vm<W> inside = ((u0 >= u1) & (v0 >= v1) & (w0 >= w1)) | ((u0 <= u1) & (v0 <= v1) & (w0 <= w1));
+    const auto load = [&](const float(&p)[3][W]) { return vf3<W>{F::load(p[ray.kx]), F::load(p[ray.ky]), F::load(p[ray.kz])}; };
+    const Sheared<W> s({F(ray.ox), F(ray.oy), F(ray.oz)}, F(ray.sx), F(ray.sy), load(block.v0), load(block.v1), load(block.v2));
+    vm<W> inside = s.inside();
     if (any(inside)) {
-      const F u = u0 - u1, v = v0 - v1, w = w0 - w1;
-      const F det = u + v + w;
-      const F sz(ray.sz);
-      hits.t = (u * (sz * az) + v * (sz * bz) + w * (sz * cz)) / det;
-      hits.u_numerator = v, hits.v_numerator = w, hits.denominator = det;
-      const vm<W> undecided = inside & ((u == F(0.0f)) | (v == F(0.0f)) | (w == F(0.0f)));
+      const vm<W> undecided = s.hits(inside, F(ray.sz), hits);
       if (__builtin_expect(any(undecided), 0)) {
         inside = inside & ~undecided;
-        inside = inside | decide_in_double<W>(undecided, ray.sz, {ax, ay, az}, {bx, by, bz}, {cx, cy, cz}, hits);
+        inside = inside | decide_in_double<W>(undecided, ray.sz, s.a, s.b, s.c, hits);
       }
-      const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz));
-      const F width = max_x86(max_x86(max_x86(abs(ax), abs(ay)), max_x86(abs(bx), abs(by))), max_x86(abs(cx), abs(cy)));
-      const F reach = depth * F(__builtin_fabsf(ray.sz));
-      const F beyond = (hits.t - F(ray.tnear)) * abs(det), error = F(0x1p-18f) * reach * (width * (depth + width));
-      const vm<W> near = inside & (beyond >= -error) & ((hits.t <= F(0x1p-10f) * reach) | (beyond <= error));
+      const vm<W> near = inside & s.near(F(ray.tnear), F(ray.sz), hits.t);
       if (__builtin_expect(any(near), 0)) plane_distance_in_double(near, ray, block, hits);
     }
     return inside;
   }
 
+  /// What a packet keeps beside its rays: their shears. Those of a group have the same kz.
+  struct PacketData {
+    static constexpr int kGroups = 3;
+    alignas(64) float sx[PacketRays::kMost], sy[PacketRays::kMost], sz[PacketRays::kMost];
+    std::uint64_t of_axis[3];
+
+    void clear() { of_axis[0] = of_axis[1] = of_axis[2] = 0; }
+    /// The W rays from k on: what RayData computes for one.
+    template <int W>
+    ARBORETUM_INLINE void prepare(const PacketRays& rays, int k) {
+      using F = vf<W>;
+      const F x = F::load(rays.direction[0] + k), y = F::load(rays.direction[1] + k), z = F::load(rays.direction[2] + k);
+      const F ax = abs(x), ay = abs(y), az = abs(z);
+      const vm<W> by_x = (ax > ay) & (ax > az), by_y = ~(ax > ay) & (ay > az);
+      const F dz = select(by_x, x, select(by_y, y, z));
+      (select(by_x, y, select(by_y, z, x)) / dz).store(sx + k);
+      (select(by_x, z, select(by_y, x, y)) / dz).store(sy + k);
+      (F(1.0f) / dz).store(sz + k);
+      of_axis[0] |= std::uint64_t(by_x.bits()) << k, of_axis[1] |= std::uint64_t(by_y.bits()) << k, of_axis[2] |= std::uint64_t((~(by_x | by_y)).bits()) << k;
+    }
+    [[nodiscard]] std::uint64_t group(int kz) const { return of_axis[kz]; }
+    /// RayData of ray i.
+    [[nodiscard]] ARBORETUM_INLINE RayData alone(const Ray& ray, int i) const {
+      return RayData(ray, of_axis[0] >> i & 1u ? 0 : of_axis[1] >> i & 1u ? 1 : 2, sx[i], sy[i], sz[i]);
+    }
+  };
+
+  /// Lanes are the W rays from k on, all against triangle `i` of the block: what intersect() computes, bit for bit. `again`: rays for which
+  /// doubles must decide, to be tested one by one.
+  template <int W, class Block>
+  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData& shears, int kz, int k, const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
+    using F = vf<W>;
+    const int kx = kz == 2 ? 0 : kz + 1, ky = kx == 2 ? 0 : kx + 1;
+    const auto all = [&](const float(&p)[3][Block::kWidth]) { return vf3<W>{F(p[kx][i]), F(p[ky][i]), F(p[kz][i])}; };
+    const auto origin = [&](int axis) { return F::load(rays.origin[axis] + k); };
+    const Sheared<W> s({origin(kx), origin(ky), origin(kz)}, F::load(shears.sx + k), F::load(shears.sy + k), all(block.v0), all(block.v1), all(block.v2));
+    const vm<W> inside = s.inside();
+    again = vm<W>(false);
+    if (any(inside)) {
+      const F sz = F::load(shears.sz + k);
+      const vm<W> undecided = s.hits(inside, sz, hits);
+      again = undecided | (inside & s.near(F::load(rays.tnear + k), sz, hits.t));
+    }
+    return inside & ~again;
+  }
+
  private:
+  /// Triangles in the frame of their rays: x and y sheared so that the ray is the z axis, z along it.
+  template <int W>
+  struct Sheared {
+    using F = vf<W>;
+    vf3<W> a, b, c;
+    F u0, u1, v0, v1, w0, w1;
+
+    ARBORETUM_INLINE Sheared(vf3<W> o, F sx, F sy, vf3<W> p0, vf3<W> p1, vf3<W> p2) {
+      const auto shear = [&](vf3<W> p) {
+        const F z = p.z - o.z;
+        return vf3<W>{nmadd(sx, z, p.x - o.x), nmadd(sy, z, p.y - o.y), z};
+      };
+      a = shear(p0), b = shear(p1), c = shear(p2);
+      u0 = c.x * b.y, u1 = c.y * b.x, v0 = a.x * c.y, v1 = a.y * c.x, w0 = b.x * a.y, w1 = b.y * a.x;
+    }
+    ARBORETUM_INLINE vm<W> inside() const { return ((u0 >= u1) & (v0 >= v1) & (w0 >= w1)) | ((u0 <= u1) & (v0 <= v1) & (w0 <= w1)); }
+
+    /// Sets the hits; returns those of `inside` in which a tie must be decided in double.
+    ARBORETUM_INLINE vm<W> hits(vm<W> inside, F sz, TriangleHits<W>& out) const {
+      const F u = u0 - u1, v = v0 - v1, w = w0 - w1;
+      const F det = u + v + w;
+      out.t = (u * (sz * a.z) + v * (sz * b.z) + w * (sz * c.z)) / det;
+      out.u_numerator = v, out.v_numerator = w, out.denominator = det;
+      return inside & ((u == F(0.0f)) | (v == F(0.0f)) | (w == F(0.0f)));
+    }
+
+    /// Lanes whose t must be computed again in double.
+    ARBORETUM_INLINE vm<W> near(F tnear, F sz, F t) const {
+      const F det = (u0 - u1) + (v0 - v1) + (w0 - w1);
+      const F depth = max_x86(max_x86(abs(a.z), abs(b.z)), abs(c.z));
+      const F width = max_x86(max_x86(max_x86(abs(a.x), abs(a.y)), max_x86(abs(b.x), abs(b.y))), max_x86(abs(c.x), abs(c.y)));
+      const F reach = depth * abs(sz);
+      const F beyond = (t - tnear) * abs(det), error = F(0x1p-18f) * reach * (width * (depth + width));
+      return (beyond >= -error) & ((t <= F(0x1p-10f) * reach) | (beyond <= error));
+    }
+  };
+
   /// The lanes of `undecided` that are hit when the edge functions are computed in double; sets their hits.
   template <int W>
   static __attribute__((noinline)) vm<W> decide_in_double(vm<W> undecided, float sz, const vf3<W>& a, const vf3<W>& b,

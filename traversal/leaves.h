@@ -31,6 +31,7 @@ struct CalledLeaves {
     if (tests->finish && best.primitive != NearestHit::kNone) tests->finish(data, best);
   }
   ARBORETUM_INLINE std::size_t block_bytes() const { return tests->form->bytes; }
+  static constexpr bool kRaysInLanes = false;
   static constexpr std::size_t kBytesAhead = sizeof(EdgeBlock<8>);  ///< what of a leaf is worth asking for in advance
 };
 
@@ -57,6 +58,8 @@ struct CompiledLeaves {
     }
   }
   static constexpr std::size_t block_bytes() { return sizeof(Block); }
+  /// The intersector can test many rays against one triangle as well (packets).
+  static constexpr bool kRaysInLanes = requires { typename Intersector::PacketData; };
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
 

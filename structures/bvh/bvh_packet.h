@@ -15,6 +15,7 @@
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
+#include "traversal/packet_interval.h"
 #include "traversal/kernel_rows.h"
 #include "traversal/usual_leaves.h"
 
@@ -22,7 +23,7 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// Rays of a packet at most.
-inline constexpr int kMostPacketRays = 64;
+inline constexpr int kMostPacketRays = PacketRays::kMost;
 
 /// What large packets have compiled in.
 using PacketLeaves = std::conditional_t<
@@ -66,7 +67,8 @@ class BvhPackets {
     if constexpr (!AnyHit) {
       for (std::uint64_t valid = valid_; valid; valid &= valid - 1) {
         const int i = __builtin_ctzll(valid);
-        leaves_.finish(data(i), best_[i]);
+        auto&& ray = data(i);
+        leaves_.finish(ray, best_[i]);
       }
     }
   }
@@ -83,6 +85,8 @@ class BvhPackets {
     float t;
     std::uint64_t mask;
   };
+  /// From so many rays on the triangles of a leaf are looked at together.
+  static constexpr int kWorthLanes = 16;
   /// Bounds of a group of rays by axis: of 1/d, of the origin at the near and at the far planes, and what they are widened by.
   struct Interval {
     float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
@@ -91,33 +95,42 @@ class BvhPackets {
     unsigned near[3];  ///< byte offsets of the near planes
   };
 
-  typename Leaves::RayData& data(int i) { return *reinterpret_cast<typename Leaves::RayData*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData)); }
+  /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever it is asked for.
+  ARBORETUM_INLINE decltype(auto) data(int i) {
+    if constexpr (Leaves::kRaysInLanes) {
+      return packet_.alone(rays_[i], i);
+    } else {
+      return (*reinterpret_cast<typename Leaves::RayData*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData)));
+    }
+  }
 
   /// The rays as structures of arrays and their constants of BoxRay, W at a time: the same operations, so the same bits.
   void prepare(int count, std::uint64_t (&octants)[8]) {
     for (int i = 0; i < count; ++i) {
       const Ray& ray = rays_[i];
-      origin_[0][i] = ray.origin.x, origin_[1][i] = ray.origin.y, origin_[2][i] = ray.origin.z;
-      direction_[0][i] = ray.direction.x, direction_[1][i] = ray.direction.y, direction_[2][i] = ray.direction.z;
-      tnear_[i] = ray.tnear, t_[i] = ray.tfar;
+      soa_.origin[0][i] = ray.origin.x, soa_.origin[1][i] = ray.origin.y, soa_.origin[2][i] = ray.origin.z;
+      soa_.direction[0][i] = ray.direction.x, soa_.direction[1][i] = ray.direction.y, soa_.direction[2][i] = ray.direction.z;
+      soa_.tnear[i] = ray.tnear, t_[i] = ray.tfar;
       best_[i] = NearestHit{ray.tfar};
     }
     for (int i = count; i < chunks_ * W; ++i) {
-      for (int a = 0; a < 3; ++a) origin_[a][i] = direction_[a][i] = 0.0f;
-      tnear_[i] = t_[i] = 0.0f;
+      for (int a = 0; a < 3; ++a) soa_.origin[a][i] = soa_.direction[a][i] = 0.0f;
+      soa_.tnear[i] = t_[i] = 0.0f;
     }
     valid_ = 0;
+    if constexpr (Leaves::kRaysInLanes) packet_.clear();
     std::uint64_t negative[3] = {};
     for (int c = 0; c < chunks_; ++c) {
       const int k = c * W;
-      const F o[3] = {F::load(origin_[0] + k), F::load(origin_[1] + k), F::load(origin_[2] + k)};
-      const F d[3] = {F::load(direction_[0] + k), F::load(direction_[1] + k), F::load(direction_[2] + k)};
+      const F o[3] = {F::load(soa_.origin[0] + k), F::load(soa_.origin[1] + k), F::load(soa_.origin[2] + k)};
+      const F d[3] = {F::load(soa_.direction[0] + k), F::load(soa_.direction[1] + k), F::load(soa_.direction[2] + k)};
       const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-      const F infinity(std::numeric_limits<float>::infinity()), tnear = F::load(tnear_ + k);
+      const F infinity(std::numeric_limits<float>::infinity()), tnear = F::load(soa_.tnear + k);
       vm<W> valid = (tnear <= F::load(t_ + k)) & (largest > F(0.0f));
       for (int a = 0; a < 3; ++a) valid = valid & (abs(o[a]) < infinity) & (abs(d[a]) < infinity);
       valid_ |= std::uint64_t(valid.bits()) << k;
       max_x86(tnear, F(0.0f)).store(tnear_ + k);
+      if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(soa_, k);
       const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest, M(max_coordinate_);
       for (int a = 0; a < 3; ++a) {
         F r, f, g;
@@ -145,9 +158,11 @@ class BvhPackets {
       for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? negative[a] : ~negative[a];
       octants[octant] = mask;
     }
-    for (std::uint64_t rest = valid_; rest; rest &= rest - 1) {
-      const int i = __builtin_ctzll(rest);
-      new (static_cast<void*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(rays_[i]));
+    if constexpr (!Leaves::kRaysInLanes) {
+      for (std::uint64_t rest = valid_; rest; rest &= rest - 1) {
+        const int i = __builtin_ctzll(rest);
+        new (static_cast<void*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(rays_[i]));
+      }
     }
   }
 
@@ -163,12 +178,12 @@ class BvhPackets {
     low = reduce_min(least), high = -reduce_min(-most);
   }
 
-  Interval interval_of(std::uint64_t mask) const {
+  Interval interval_of(std::uint64_t mask) {
     Interval v;
     v.usable = true;
-    float o_low[3], o_high[3], unused;
+    float o_low[3], o_high[3], d_low[3], d_high[3], unused;
     range(tnear_, mask, v.tnear, unused);
-    for (int a = 0; a < 3; ++a) range(r_[a], mask, v.r_low[a], v.r_high[a]), range(origin_[a], mask, o_low[a], o_high[a]);
+    for (int a = 0; a < 3; ++a) range(r_[a], mask, v.r_low[a], v.r_high[a]), range(soa_.origin[a], mask, o_low[a], o_high[a]), range(soa_.direction[a], mask, d_low[a], d_high[a]);
     for (int a = 0; a < 3; ++a) {
       const bool negative = __builtin_signbit(v.r_low[a]) != 0;
       const float r = negative ? -v.r_low[a] : v.r_high[a];
@@ -177,6 +192,7 @@ class BvhPackets {
       v.pad[a] = 0x1p-20f * (max_coordinate_ + o) * r + 0x1p-99f;
       v.near[a] = unsigned(2 * a + negative) * kPlane;
       v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
+      if constexpr (Leaves::kRaysInLanes) spread_.set_axis(a, o_low[a], o_high[a], d_low[a], d_high[a]);
     }
     return v;
   }
@@ -287,7 +303,8 @@ class BvhPackets {
 
   void alone(int i, bvh::NodeReference reference) {
     const auto below = padded_ ? &trace_below<N, Leaves, true, AnyHit, Counting> : &trace_below<N, Leaves, false, AnyHit, Counting>;
-    const bool hit = below(base_, reference, max_coordinate_, leaves_, form_, counting_, single_stack_.data(), rays_[i], data(i), best_[i]);
+    auto&& ray = data(i);
+    const bool hit = below(base_, reference, max_coordinate_, leaves_, form_, counting_, single_stack_.data(), rays_[i], ray, best_[i]);
     if constexpr (AnyHit) {
       if (hit) occluded(i);
     }
@@ -301,13 +318,77 @@ class BvhPackets {
   void leaf(const Entry& e) {
     const std::byte* const blocks = base_ + bvh::offset_of(e.reference);
     const unsigned count = bvh::block_count(e.reference);
-    for (std::uint64_t rest = e.mask; rest; rest &= rest - 1) {
-      const int i = __builtin_ctzll(rest);
+    if constexpr (Leaves::kRaysInLanes) {
+      if (__builtin_popcountll(e.mask) >= kWorthLanes) {
+        const auto* block = reinterpret_cast<const typename Leaves::Block*>(blocks);
+        for (const auto* const end = block + count; block != end; ++block) test_block(*block, e.mask);
+        return;
+      }
+    }
+    test_one_by_one(blocks, count, e.mask);
+  }
+
+  void test_one_by_one(const std::byte* blocks, unsigned count, std::uint64_t mask) {
+    for (; mask; mask &= mask - 1) {
+      const int i = __builtin_ctzll(mask);
       if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
+      auto&& ray = data(i);
       if constexpr (AnyHit) {
-        if (leaves_.any_hit(data(i), blocks, count, rays_[i].tnear, rays_[i].tfar)) occluded(i);
+        if (leaves_.any_hit(ray, blocks, count, rays_[i].tnear, rays_[i].tfar)) occluded(i);
       } else {
-        if (leaves_.closest_hit(data(i), blocks, count, rays_[i].tnear, best_[i])) t_[i] = best_[i].t;
+        if (leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) t_[i] = best_[i].t;
+      }
+    }
+  }
+
+  /// One block against the rays of `mask`: its triangles in lanes for each ray, or rays in lanes for each triangle that is left by the packet's
+  /// interval, whichever is less work.
+  template <class Block>
+  void test_block(const Block& block, std::uint64_t mask) {
+    const auto* const bytes = reinterpret_cast<const std::byte*>(&block);
+    if constexpr (AnyHit) mask &= active_;
+    unsigned triangles = interval_triangles(spread_, block);
+    if (triangles == 0) return;
+    int chunks = 0;
+    for (int c = 0; c < chunks_; ++c) chunks += (mask >> (c * W) & ((1u << W) - 1u)) != 0;
+    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth))
+      return test_one_by_one(bytes, 1, mask);
+    std::uint64_t again = 0;
+    for (; triangles; triangles &= triangles - 1) {
+      const int i = __builtin_ctz(triangles);
+      for (int g = 0; g < Packet::kGroups; ++g) {
+        const std::uint64_t group = mask & packet_.group(g);
+        if (group != 0) test_triangle(block, i, g, group, again);
+      }
+      if constexpr (AnyHit) mask &= active_;
+    }
+    if (__builtin_expect(again != 0, 0)) test_one_by_one(bytes, 1, again);
+  }
+
+  template <class Block>
+  ARBORETUM_INLINE void test_triangle(const Block& block, int triangle, int group, std::uint64_t mask, std::uint64_t& again) {
+    const auto id = std::int32_t(block.id[triangle]);
+    for (int c = 0; c < chunks_; ++c) {
+      const int k = c * W;
+      const unsigned in = unsigned(mask >> k) & ((1u << W) - 1u);
+      if (in == 0) continue;
+      TriangleHits<W> hits;
+      vm<W> redo;
+      const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(soa_, packet_, group, k, block, triangle, hits, redo);
+      again |= std::uint64_t(redo.bits() & in) << k;
+      if ((inside.bits() & in) == 0) continue;
+      unsigned hit = in & (inside & (hits.t <= F::load(t_ + k)) & (hits.t >= F::load(soa_.tnear + k))).bits();
+      if (hit == 0) continue;
+      alignas(64) float t[W], u[W], v[W], denominator[W];
+      hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
+      for (; hit; hit &= hit - 1) {
+        const int lane = __builtin_ctz(hit), i = k + lane;
+        if constexpr (AnyHit) {
+          occluded(i);
+        } else {
+          NearestHit& best = best_[i];
+          if (t[lane] < best.t || id < best.primitive) best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, t_[i] = t[lane];
+        }
       }
     }
   }
@@ -328,10 +409,18 @@ class BvhPackets {
   const Ray* rays_ = nullptr;
   int threshold_ = 0, chunks_ = 0;
   std::uint64_t active_ = 0, valid_ = 0;
-  alignas(64) float origin_[3][kMostPacketRays], direction_[3][kMostPacketRays];
+  PacketRays soa_;
   alignas(64) float r_[3][kMostPacketRays], near_[3][kMostPacketRays], far_[3][kMostPacketRays], tnear_[kMostPacketRays], t_[kMostPacketRays];
   NearestHit best_[kMostPacketRays];
-  alignas(64) std::byte data_[kMostPacketRays * sizeof(typename Leaves::RayData)];
+  alignas(64) std::byte data_[Leaves::kRaysInLanes ? 1 : kMostPacketRays * sizeof(typename Leaves::RayData)];
+  struct NoPacket {};
+  template <class L>
+  struct PacketOf {
+    using type = typename L::Intersector::PacketData;
+  };
+  using Packet = typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
+  Packet packet_;
+  PacketInterval spread_;
   BatchStack<Entry, 512> stack_;
   TraversalStack single_stack_;
 };
