@@ -56,10 +56,10 @@ void declare_verify(CLI::App& app, VerifyCommand& verify) {
   c->add_option("AXIS", verify.axes, "axis=value,value: which combinations (isa=avx2,avx512); axis=all");
   c->add_option("--rays", verify.rays, "Rays in all (default 100000; a cases file: each case once, and mutations of them beyond that)");
   c->add_option("--seed", verify.seed, "Seed of the rays (default 1)");
-  c->add_option("--offset", verify.offsets, "Moves the scene by these distances along (1, -3/4, 1/2)")->delimiter(',');
-  c->add_option("--scale", verify.scales, "Scales the moved scene by these powers of two: -60,0,60")->delimiter(',');
+  c->add_option("--offset", verify.offsets, "Moves the scene by these distances along (1, -3/4, 1/2)")->delimiter(',')->allow_extra_args(false);
+  c->add_option("--scale", verify.scales, "Scales the moved scene by these powers of two: -60,0,60")->delimiter(',')->allow_extra_args(false);
   c->add_option("--kinds", verify.kinds, "Kinds of rays: vertex, edge, border, interior, grazing, axis, plane, surface, far, interval, invalid")
-      ->delimiter(',');
+      ->delimiter(',')->allow_extra_args(false);
   c->add_option("--out", verify.out, "Folder for verify.csv and the cases found");
   c->add_option("--threads", verify.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
   c->add_flag("--spread", verify.spread, "Share the rays among the combinations instead of giving each all of them");
