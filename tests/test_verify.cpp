@@ -220,11 +220,11 @@ TEST_CASE("cells keep their promises on spheres, fans and boxes, near and far fr
     std::size_t triangles;
     double offset;
     int exponent;
-  } scenes[] = {{"sphere", 300, 0, 0}, {"sphere", 300, 1e4, 0}, {"fan", 64, 0, 0}, {"fan", 1024, 100, 0}, {"sphere", 300, 0, -20}, {"fan", 64, 1e5, 10}};
+  } scenes[] = {{"sphere", 300, 0, 0}, {"sphere", 300, 1e4, 0}, {"fan", 64, 0, 0}, {"fan", 256, 100, 0}, {"sphere", 300, 0, -20}, {"fan", 64, 1e5, 10}};
   for (const auto& s : scenes) {
     INFO(s.generator << " of " << s.triangles << ", offset " << s.offset << ", scaled by 2^" << s.exponent);
     const TriangleMesh mesh = moved_and_scaled(generate_scene(s.generator, s.triangles, 1).mesh, s.offset, s.exponent);
-    check_promises(cells, registry, mesh, HardRayMaker(mesh).make(3, 0, 1500, kinds));
+    check_promises(cells, registry, mesh, HardRayMaker(mesh).make(3, 0, 400, kinds));
   }
 }
 
@@ -232,7 +232,7 @@ TEST_CASE("a search through random meshes and mutated hard cases finds no broken
   // By hand at any length: arboretum verify random --rays N; arboretum verify tests/hard_cases.json --rays N.
   const Registry registry = this_registry();
   std::vector<VerifiedCell> cells = promising_cells(registry);
-  for (std::uint64_t i = 0; i < 150; ++i) {
+  for (std::uint64_t i = 0; i < 100; ++i) {
     INFO("random subject " << i << " of seed 11");
     const RandomSubject subject = random_subject(11, i, 32);
     check_promises(cells, registry, subject.mesh, subject.rays);
