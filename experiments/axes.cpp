@@ -38,8 +38,12 @@ constexpr Summary kIntersectors[] = {
     {"moller_trumbore", "Moeller and Trumbore 1997, on precomputed edges; may miss along edges"},
     {"pluecker", "edge functions relative to the ray's origin, edge times sum of vertices"},
     {"watertight", "Woop, Benthin, Wald 2013: no cracks on closed meshes with padded boxes"},
-    {"baldwin_weber", "Baldwin and Weber 2016: precomputed transformation to the unit triangle"},
-    {"havel_herout", "Havel and Herout 2010: precomputed planes"},
+    {"baldwin_weber", "Baldwin and Weber 2016: precomputed map to the unit triangle; may miss along edges"},
+    {"havel_herout", "Havel and Herout 2010: three precomputed planes; may miss along edges"},
+    {"wald_projection", "Wald 2004: precomputed projection along an axis; may miss along edges"},
+    {"moller_trumbore_double", "moller_trumbore in double: t to half an ulp, may miss along edges"},
+    {"pluecker_double", "pluecker in double: t to half an ulp, may miss at vertices"},
+    {"watertight_refined", "watertight, and t, u, v of the nearest hit again in double"},
     {"exact", "filtered, then exact arithmetic: hit or miss, nearest and t proved right"},
 };
 constexpr Summary kBoxes[] = {
@@ -84,12 +88,18 @@ std::pair<std::string_view, std::string_view> split_number(std::string_view name
 std::string leaf_summary(std::string_view leaf) {
   if (leaf == kAuto) return "the block that suits structure, intersector and instruction set";
   if (!leaf.starts_with("triangle")) return {};
+  constexpr std::pair<char, std::string_view> kForms[] = {{'v', "three vertices"},
+                                                          {'i', "indices of vertices"},
+                                                          {'w', "the map to the unit triangle (baldwin_weber)"},
+                                                          {'h', "three planes (havel_herout)"},
+                                                          {'p', "a plane and two projected edges (wald_projection)"}};
   std::string_view rest = leaf.substr(8);
   std::string_view what = "a vertex and precomputed edges";
-  if (rest.ends_with('v'))
-    what = "three vertices", rest.remove_suffix(1);
-  else if (rest.ends_with('i'))
-    what = "indices of vertices", rest.remove_suffix(1);
+  for (const auto& [suffix, form] : kForms) {
+    if (!rest.ends_with(suffix)) continue;
+    what = form, rest.remove_suffix(1);
+    break;
+  }
   if (rest.empty() || split_number(rest).second != rest) return {};
   return "blocks of " + std::string(rest) + (rest == "1" ? " triangle: " : " triangles: ") +
          std::string(what);

@@ -33,7 +33,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 struct Exact {
   static constexpr std::string_view kName = "exact";
-  static constexpr bool kNeedsVertices = true;
+  static constexpr bool reads(TriangleForm form) { return form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = true;
 
   /// The ray's constants as in watertight.h, and the search's state: the best hit's corners and the low end of its interval.

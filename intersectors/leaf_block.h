@@ -2,7 +2,8 @@
 // lowest primitive id wins.
 //
 // An intersector is a struct with
-//   kName; kNeedsVertices: cannot read blocks of edges; kEveryLeaf: compiled for every block that it can read, else for the usual ones;
+//   kName; reads(TriangleForm): whether it can read blocks of that form (indices are given to it as vertices);
+//   kEveryLeaf: compiled for every block that it can read, else for the usual ones;
 //   RayData(ray): what it keeps for one ray, PreparedRay::kBytes at most;
 //   intersect(const RayData&, const Block&, TriangleHits<W>&): the lanes whose closed triangle the ray's line meets.
 // It may have

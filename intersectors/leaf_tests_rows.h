@@ -5,9 +5,9 @@
 
 namespace arboretum {
 
-/// An intersector can read a block's form.
+/// An intersector can read a block's form, or that which readable() makes of it.
 template <class Intersector, class Block>
-concept CanRead = !Intersector::kNeedsVertices || Block::kForm != TriangleForm::edges;
+inline constexpr bool kCanRead = Intersector::reads(Block::kForm == TriangleForm::indices ? TriangleForm::vertices : Block::kForm);
 
 namespace ARBORETUM_ISA_NAMESPACE {
 
@@ -33,14 +33,15 @@ struct CalledTests {
 template <class Intersector>
 using BlocksOf = std::conditional_t<
     Intersector::kEveryLeaf,
-    ConcatLists<BlocksOfWidth<EdgeBlock, kRegisterWidth>, BlocksOfWidth<VertexBlock, kRegisterWidth>, BlocksOfWidth<IndexBlock, kRegisterWidth>>,
+    ConcatLists<BlocksOfWidth<EdgeBlock, kRegisterWidth>, BlocksOfWidth<VertexBlock, kRegisterWidth>, BlocksOfWidth<IndexBlock, kRegisterWidth>,
+                BlocksOfWidth<TransformBlock, kRegisterWidth>, BlocksOfWidth<PlaneBlock, kRegisterWidth>, BlocksOfWidth<ProjectionBlock, kRegisterWidth>>,
     std::conditional_t<(kRegisterWidth >= 8), TypeList<VertexBlock<1>, VertexBlock<4>, VertexBlock<8>, IndexBlock<4>>,
                        TypeList<VertexBlock<1>, VertexBlock<4>, IndexBlock<4>>>>;
 
 template <class Intersector>
 void add_leaf_tests(std::vector<LeafTests>& list) {
   for_each_type(BlocksOf<Intersector>{}, [&]<class Block>(std::type_identity<Block>) {
-    if constexpr (CanRead<Intersector, Block>) {
+    if constexpr (kCanRead<Intersector, Block>) {
       using T = CalledTests<Intersector, Block>;
       list.push_back({Block::kName, Intersector::kName, kIsa, nullptr, &T::prepare, &T::closest_hit, &T::any_hit, kFinishes<Intersector> ? &T::finish : nullptr});
     }

@@ -8,9 +8,20 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// What the test needs of a triangle and a line, in float or double: N, C, N.d, and u and v times N.d.
+template <class F>
+struct MollerTrumboreTerms {
+  vec3<F> n, c;
+  F det, u, v;
+  ARBORETUM_INLINE MollerTrumboreTerms(vec3<F> v0, vec3<F> e1, vec3<F> e2, vec3<F> o, vec3<F> d) : n(cross(e2, e1)), c(v0 - o) {
+    const vec3<F> r = cross(c, d);
+    det = dot(n, d), u = dot(r, e2), v = dot(r, e1);
+  }
+};
+
 struct MollerTrumbore {
   static constexpr std::string_view kName = "moller_trumbore";
-  static constexpr bool kNeedsVertices = false;
+  static constexpr bool reads(TriangleForm form) { return form == TriangleForm::edges || form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = true;
 
   /// One ray's constants.
@@ -69,17 +80,13 @@ struct MollerTrumbore {
   template <int W>
   static ARBORETUM_INLINE vm<W> core(vf3<W> o, vf3<W> d, vf3<W> v0, vf3<W> e1, vf3<W> e2, TriangleHits<W>& hits) {
     using F = vf<W>;
-    const vf3<W> n = cross(e2, e1);
-    const vf3<W> c = v0 - o;
-    const vf3<W> r = cross(c, d);
-    const F det = dot(n, d);
-    const F abs_det = abs(det);
+    const MollerTrumboreTerms<F> terms(v0, e1, e2, o, d);
+    const F det = terms.det, abs_det = abs(det);
     const vi<W> sign = sign_bits(det);
-    const F u = xor_sign(dot(r, e2), sign);
-    const F v = xor_sign(dot(r, e1), sign);
+    const F u = xor_sign(terms.u, sign), v = xor_sign(terms.v, sign);
     const vm<W> inside = (u >= F(0.0f)) & (v >= F(0.0f)) & (u + v <= abs_det) & (det != F(0.0f));
     if (any(inside)) {
-      hits.t = xor_sign(dot(n, c), sign) / abs_det;
+      hits.t = xor_sign(dot(terms.n, terms.c), sign) / abs_det;
       hits.u_numerator = u, hits.v_numerator = v, hits.denominator = abs_det;
     }
     return inside;

@@ -9,9 +9,22 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// What the test needs of three corners relative to the origin and a direction, in float or double: the edges that face corners 1 and 2, and
+/// the three edge functions.
+template <class F>
+struct PlueckerTerms {
+  vec3<F> edge_u, edge_v;
+  F u, v, w;
+  ARBORETUM_INLINE PlueckerTerms(vec3<F> p0, vec3<F> p1, vec3<F> p2, vec3<F> d) : edge_u(p2 - p0), edge_v(p0 - p1) {
+    u = dot(cross(edge_u, p2 + p0), d);
+    v = dot(cross(edge_v, p0 + p1), d);
+    w = dot(cross(p1 - p2, p1 + p2), d);
+  }
+};
+
 struct Pluecker {
   static constexpr std::string_view kName = "pluecker";
-  static constexpr bool kNeedsVertices = true;
+  static constexpr bool reads(TriangleForm form) { return form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = false;
 
   struct RayData {
@@ -28,15 +41,13 @@ struct Pluecker {
     const vf3<W> p0 = vf3<W>{F::load(block.v0[0]), F::load(block.v0[1]), F::load(block.v0[2])} - o;
     const vf3<W> p1 = vf3<W>{F::load(block.v1[0]), F::load(block.v1[1]), F::load(block.v1[2])} - o;
     const vf3<W> p2 = vf3<W>{F::load(block.v2[0]), F::load(block.v2[1]), F::load(block.v2[2])} - o;
-    const vf3<W> edge_u = p2 - p0, edge_v = p0 - p1, edge_w = p1 - p2;
-    const F u = dot(cross(edge_u, p2 + p0), d);
-    const F v = dot(cross(edge_v, p0 + p1), d);
-    const F w = dot(cross(edge_w, p1 + p2), d);
+    const PlueckerTerms<F> terms(p0, p1, p2, d);
+    const F u = terms.u, v = terms.v, w = terms.w;
     const F smallest = min_x86(min_x86(u, v), w), largest = max_x86(max_x86(u, v), w);
     const F sum = u + v + w;
     vm<W> inside = ((smallest >= F(0.0f)) | (largest <= F(0.0f))) & (sum != F(0.0f));
     if (any(inside)) {
-      const vf3<W> n = cross(edge_u, edge_v);  // (v1 - v0) x (v2 - v0)
+      const vf3<W> n = cross(terms.edge_u, terms.edge_v);  // (v1 - v0) x (v2 - v0)
       const F det = dot(n, d);
       inside = inside & (det != F(0.0f));
       hits.t = dot(n, p0) / det;

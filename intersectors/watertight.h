@@ -24,7 +24,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 struct Watertight {
   static constexpr std::string_view kName = "watertight";
-  static constexpr bool kNeedsVertices = true;
+  static constexpr bool reads(TriangleForm form) { return form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = true;
 
   /// kz: the axis along which the direction is largest. Shear constants dx/dz, dy/dz, 1/dz of the permuted direction.

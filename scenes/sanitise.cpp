@@ -11,35 +11,6 @@
 namespace arboretum {
 namespace {
 
-/// Whether the doubles sum to zero exactly: they are gathered into a non-overlapping expansion (Shewchuk
-/// 1997, GROW-EXPANSION), which is zero only when each of its components is.
-template <std::size_t N>
-bool sums_to_zero(const double (&terms)[N]) noexcept {
-  double expansion[N] = {};
-  for (std::size_t n = 0; n < N; ++n) {
-    double carry = terms[n];
-    for (std::size_t i = 0; i < n; ++i) {
-      const double sum = carry + expansion[i];
-      const double virtual_part = sum - carry;
-      const double error = (carry - (sum - virtual_part)) + (expansion[i] - virtual_part);
-      expansion[i] = error, carry = sum;
-    }
-    expansion[n] = carry;
-  }
-  for (const double component : expansion)
-    if (component != 0.0) return false;
-  return true;
-}
-
-/// Whether three points of the plane, float32 numbers in doubles, are exactly collinear. Products of two
-/// floats are exact in double (48 bits, no underflow), so the determinant is an exact sum of six doubles.
-bool collinear(double ax, double ay, double bx, double by, double cx, double cy) noexcept {
-  const double left = (bx - ax) * (cy - ay), right = (by - ay) * (cx - ax);
-  constexpr double kErrorBound = 4.0 * 0x1p-53;  // Shewchuk's ccwerrboundA is (3 + 16 u) u
-  if (std::abs(left - right) > kErrorBound * (std::abs(left) + std::abs(right))) return false;
-  return sums_to_zero({ax * by, -ay * bx, bx * cy, -by * cx, cx * ay, -cy * ax});
-}
-
 bool is_in_range(Vec3f v) noexcept {
   return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate &&
          std::abs(v.z) <= kMaxCoordinate;
@@ -69,11 +40,6 @@ Faults faults_of(const TriangleMesh& mesh, std::size_t i) {
 }
 
 }  // namespace
-
-bool has_zero_area(Vec3f a, Vec3f b, Vec3f c) noexcept {
-  return collinear(a.x, a.y, b.x, b.y, c.x, c.y) && collinear(a.y, a.z, b.y, b.z, c.y, c.z) &&
-         collinear(a.z, a.x, b.z, b.x, c.z, c.x);
-}
 
 void sanitise(Scene& scene, const std::string& source) {
   TriangleMesh& mesh = scene.mesh;

@@ -1,13 +1,10 @@
 // Sanitising, in one place for loaders and generators: what cannot be traced is dropped and counted.
 #pragma once
 
+#include "core/zero_area.h"
 #include "scenes/scene.h"
 
 namespace arboretum {
-
-/// Whether the triangle's area is exactly zero, the corners taken as exact numbers (|coordinate| <=
-/// kMaxCoordinate).
-[[nodiscard]] bool has_zero_area(Vec3f a, Vec3f b, Vec3f c) noexcept;
 
 /// Drops triangles with a corner that is not finite or beyond kMaxCoordinate and those of exactly zero area,
 /// in any key frame (zero area: in all), keeps the order of the others and the instances in step, and counts into `scene.report`. A scene without materials gets one grey.

@@ -1,4 +1,4 @@
-// What every ISA shares: mask tests, absolute values, sign handling, and three lanes as a vector.
+// What every ISA shares: mask tests, absolute values, sign handling, and three of them as a vector.
 #pragma once
 
 namespace arboretum {
@@ -14,18 +14,20 @@ template <int W> ARBORETUM_INLINE vi<W> sign_bits(vf<W> a) { return a.as_int() &
 template <int W> ARBORETUM_INLINE vf<W> xor_sign(vf<W> a, vi<W> sign) { return vf<W>::from_int_bits(a.as_int() ^ sign); }
 template <int W> ARBORETUM_INLINE vf<W> operator-(vf<W> a) { return xor_sign(a, vi<W>(std::numeric_limits<std::int32_t>::min())); }
 
-/// Three vectors of W lanes: W points or directions.
-template <int W>
-struct vf3 {
-  vf<W> x, y, z;
-  friend ARBORETUM_INLINE vf3 operator-(vf3 a, vf3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-  friend ARBORETUM_INLINE vf3 operator+(vf3 a, vf3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+/// Three vectors of lanes: as many points or directions.
+template <class F>
+struct vec3 {
+  F x, y, z;
+  friend ARBORETUM_INLINE vec3 operator-(vec3 a, vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend ARBORETUM_INLINE vec3 operator+(vec3 a, vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 };
+template <int W>
+using vf3 = vec3<vf<W>>;
 
 /// Fused where the ISA has FMA.
-template <int W> ARBORETUM_INLINE vf<W> dot(vf3<W> a, vf3<W> b) { return madd(a.x, b.x, madd(a.y, b.y, a.z * b.z)); }
+template <class F> ARBORETUM_INLINE F dot(vec3<F> a, vec3<F> b) { return madd(a.x, b.x, madd(a.y, b.y, a.z * b.z)); }
 /// Fused where the ISA has FMA.
-template <int W> ARBORETUM_INLINE vf3<W> cross(vf3<W> a, vf3<W> b) {
+template <class F> ARBORETUM_INLINE vec3<F> cross(vec3<F> a, vec3<F> b) {
   return {msub(a.y, b.z, a.z * b.y), msub(a.z, b.x, a.x * b.z), msub(a.x, b.y, a.y * b.x)};
 }
 

@@ -54,9 +54,10 @@ const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, 
 
 std::string_view default_leaf(std::string_view structure, std::string_view intersector, Isa isa) {
   // Eight triangles a block trace 5 to 7 % faster than four where a register holds eight (docs/performance.md); edges where the
-  // intersector takes them, else vertices.
+  // intersector takes them, else vertices, else the form that was made for it.
   const bool wide = native_width(isa) >= 8;
-  for (std::string_view leaf : {wide ? "triangle8" : "triangle4", wide ? "triangle8v" : "triangle4v", "triangle4", "triangle4v"}) {
+  for (std::string_view leaf : {wide ? "triangle8" : "triangle4", wide ? "triangle8v" : "triangle4v", "triangle4", "triangle4v",
+                                wide ? "triangle8w" : "triangle4w", wide ? "triangle8h" : "triangle4h", wide ? "triangle8p" : "triangle4p"}) {
     if (any_row(structure, leaf, intersector, "", "", &isa)) return leaf;
   }
   for (const KernelRow& r : kernel_table()) {

@@ -1,10 +1,12 @@
-// Leaf blocks: M triangles as structure of arrays, in the three forms that intersectors read.
+// Leaf blocks: M triangles as structure of arrays, in the forms that intersectors read.
 //
 // triangleM  (EdgeBlock):   first vertex, e1 = v0 - v1, e2 = v2 - v0; the edges are rounded, once, to float.
 // triangleMv (VertexBlock): the three vertices as they are, what the crack-free intersectors need.
 // triangleMi (IndexBlock):  the indices of the three vertices in the mesh: 16 bytes a triangle instead of 40, one look-up more.
-// A lane without a triangle holds NaN coordinates (every comparison false: never hit) and kNoPrimitive; among indices it repeats the block's
-// first triangle, id included, which changes no answer.
+// triangleMw (TransformBlock), triangleMh (PlaneBlock), triangleMp (ProjectionBlock): what baldwin_weber, havel_herout and wald_projection
+//   precompute (structures/leaves/precomputed.h), 48, 48 and 40 bytes a triangle beside the id.
+// A lane without a triangle, or with one of exactly zero area, holds NaN coordinates (every comparison false: never hit); without a triangle its
+// id is kNoPrimitive. Among indices an empty lane repeats the block's first triangle, id included, which changes no answer.
 #pragma once
 
 #include <array>
@@ -19,11 +21,13 @@
 #include "core/mesh.h"
 #include "core/ray.h"
 #include "core/type_list.h"
+#include "core/zero_area.h"
+#include "structures/leaves/precomputed.h"
 
 namespace arboretum {
 
 /// How a block keeps its triangles; an intersector says which it can read.
-enum class TriangleForm { edges, vertices, indices };
+enum class TriangleForm { edges, vertices, indices, transform, planes, projection };
 
 template <int M>
 struct alignas(8) EdgeBlock {
@@ -78,9 +82,65 @@ struct alignas(8) IndexBlock {
   std::uint32_t id[M];
 };
 
+/// Twelve numbers a triangle: unit_triangle_transform() or barycentric_planes().
+template <int M, TriangleForm Form>
+struct alignas(8) TwelveNumberBlock {
+  static constexpr int kWidth = M;
+  static constexpr TriangleForm kForm = Form;
+  static constexpr bool kTransform = Form == TriangleForm::transform;
+  static constexpr std::string_view kName = M == 1   ? (kTransform ? "triangle1w" : "triangle1h")
+                                            : M == 4 ? (kTransform ? "triangle4w" : "triangle4h")
+                                            : M == 8 ? (kTransform ? "triangle8w" : "triangle8h")
+                                                     : (kTransform ? "triangle16w" : "triangle16h");
+  float number[12][M];
+  std::uint32_t id[M];
+
+  void set(int lane, const std::array<Vec3f, 3>& corner, std::uint32_t primitive) noexcept {
+    const std::array<float, 12> numbers = kTransform ? unit_triangle_transform(corner) : barycentric_planes(corner);
+    for (std::size_t i = 0; i < numbers.size(); ++i) number[i][lane] = numbers[i];
+    id[lane] = primitive;
+  }
+};
+template <int M>
+using TransformBlock = TwelveNumberBlock<M, TriangleForm::transform>;
+template <int M>
+using PlaneBlock = TwelveNumberBlock<M, TriangleForm::planes>;
+
+/// A ProjectedTriangle in each lane.
+template <int M>
+struct alignas(8) ProjectionBlock {
+  static constexpr int kWidth = M;
+  static constexpr TriangleForm kForm = TriangleForm::projection;
+  static constexpr std::string_view kName =
+      M == 1 ? "triangle1p" : M == 4 ? "triangle4p" : M == 8 ? "triangle8p" : "triangle16p";
+  float number[9][M];
+  std::int32_t axis[M];
+  std::uint32_t id[M];
+
+  void set(int lane, const std::array<Vec3f, 3>& corner, std::uint32_t primitive) noexcept {
+    const ProjectedTriangle projected = projected_triangle(corner);
+    for (std::size_t i = 0; i < projected.number.size(); ++i) number[i][lane] = projected.number[i];
+    axis[lane] = projected.axis;
+    id[lane] = primitive;
+  }
+};
+
+/// A block of each width.
+template <template <int> class Block>
+using EveryWidth = TypeList<Block<1>, Block<4>, Block<8>, Block<16>>;
+
 /// Every leaf block that there is.
-using AllBlocks = TypeList<EdgeBlock<1>, EdgeBlock<4>, EdgeBlock<8>, EdgeBlock<16>, VertexBlock<1>, VertexBlock<4>, VertexBlock<8>,
-                           VertexBlock<16>, IndexBlock<1>, IndexBlock<4>, IndexBlock<8>, IndexBlock<16>>;
+using AllBlocks = ConcatLists<EveryWidth<EdgeBlock>, EveryWidth<VertexBlock>, EveryWidth<IndexBlock>, EveryWidth<TransformBlock>,
+                              EveryWidth<PlaneBlock>, EveryWidth<ProjectionBlock>>;
+
+/// Bytes that hold any of them.
+template <class... Blocks>
+constexpr std::size_t largest_of(TypeList<Blocks...>) {
+  std::size_t most = 0;
+  ((most = sizeof(Blocks) > most ? sizeof(Blocks) : most), ...);
+  return most;
+}
+inline constexpr std::size_t kLargestBlock = largest_of(AllBlocks{});
 
 /// Calls f with the std::type_identity of the block of that key; false where there is none.
 template <class F>
@@ -113,7 +173,15 @@ void fill_block(Block& block, const TriangleMesh& mesh, std::span<const std::uin
   } else {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     constexpr Vec3f none{nan, nan, nan};
-    for (int i = 0; i < count; ++i) block.set(i, mesh.corners(ids[std::size_t(i)]), ids[std::size_t(i)]);
+    for (int i = 0; i < count; ++i) {
+      const std::uint32_t id = ids[std::size_t(i)];
+      const std::array<Vec3f, 3> corner = mesh.corners(id);
+      if (has_zero_area(corner[0], corner[1], corner[2])) {
+        block.set(i, {none, none, none}, id);
+      } else {
+        block.set(i, corner, id);
+      }
+    }
     for (int i = count; i < Block::kWidth; ++i) block.set(i, {none, none, none}, kNoPrimitive);
   }
 }

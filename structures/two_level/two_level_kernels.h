@@ -127,7 +127,7 @@ class TwoLevelKernel {
   Hit in_world(const Ray& ray, const Hit& object, std::uint32_t primitive) const {
     PreparedRay data;
     tests_->prepare(ray, data);
-    alignas(64) std::byte block[sizeof(EdgeBlock<16>)];
+    alignas(64) std::byte block[kLargestBlock];
     tests_->form->fill(block, accel_.mesh(), {&primitive, 1});
     NearestHit flat{std::numeric_limits<float>::infinity()};
     if (tests_->closest_hit(data, block, 1, accel_.mesh().vertices.data(), -std::numeric_limits<float>::infinity(), flat)) {
