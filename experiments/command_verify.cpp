@@ -1,6 +1,7 @@
 // `verify`: cells against exact arithmetic, on a scene, on a cases file, or on random small meshes.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -229,9 +230,11 @@ class Verify {
   }
 
   void small_subject(const TriangleMesh& mesh, const HardRays& rays, std::uint64_t first, const std::string& name) {
-    const Oracle oracle(mesh);
-    StructureShelf shelf(mesh, registry_, 1);
-    verify_all(cells_, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch()), first});
+    tbb::task_arena(1).execute([&] {  // too little work to share out
+      const Oracle oracle(mesh);
+      StructureShelf shelf(mesh, registry_, 1);
+      verify_all(cells_, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch()), first});
+    });
     keep_breaches(mesh, name);
   }
 
