@@ -88,11 +88,11 @@ struct BoxRay {
     return __builtin_fabsf(d) > tiny ? 1.0f / d : __builtin_copysignf(limit, d);
   }
   /// Directions so small, or origins so large, that a constant overflows: a NaN would enter boxes that do not exist. Along such an
-  /// axis every box that exists is entered (padded), or measured wrongly (fast), and those that do not, with infinite planes, never.
+  /// axis every box that exists is entered, and those that do not, with infinite planes, never.
   static ARBORETUM_INLINE void keep_finite(float& r, float& f, float& g) {
     constexpr float kMost = 0x1.fffffep127f;
     if (__builtin_expect(__builtin_fabsf(r) <= kMost && __builtin_fabsf(f) <= kMost && __builtin_fabsf(g) <= kMost, 1)) return;
-    r = __builtin_copysignf(0x1p-60f, r), f = Padded ? kMost : 0.0f, g = -f;
+    r = __builtin_copysignf(0x1p-60f, r), f = kMost, g = -f;
   }
   static ARBORETUM_INLINE float shift(float o, float r, float max_coordinate) {
     return __builtin_copysignf(0x1p-21f * (max_coordinate + __builtin_fabsf(o)) + 0x1p-100f, r);
