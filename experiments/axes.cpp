@@ -56,6 +56,8 @@ constexpr Summary kTraversals[] = {
     {"packet", "rays in the lanes, as many as the instruction set has"},
     {"hybrid", "packets that fall apart into single rays, as wide as the instruction set"},
     {"stream", "a whole batch goes down together"},
+    {"queued", "rays in flight, as many as paid most: their next steps in two queues, prefetched"},
+    {"auto", "looks at the rays, tile by tile: packets of 64 where they are coherent, else rays in flight"},
 };
 constexpr Summary kIsas[] = {
     {"scalar", "no vector instructions: the reference that every machine runs"},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "traversal/usual_leaves.h"
+#include "structures/bvh/bvh_auto.h"
 #include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
@@ -14,7 +15,8 @@ template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_rows<bvh::Bvh<N>, typename BvhSingle<SoaTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
   add_queued_rows<N>(rows);
-  add_packet_rows<N>(rows);
+  add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, PacketLeaves{});
+  add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", PacketLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

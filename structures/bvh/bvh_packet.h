@@ -31,11 +31,40 @@ using PacketLeaves = std::conditional_t<
     std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>, CompiledLeaves<VertexBlock<4>, Watertight>>,
                        TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>, CompiledLeaves<VertexBlock<8>, Watertight>>>>;
 
+/// Where rays with the constants r and c (BoxRay) meet a plane.
+template <class F>
+[[nodiscard]] ARBORETUM_INLINE F plane_distance(F plane, F r, F c) {
+  if constexpr (kHasFma) {
+    return msub(plane, r, c);
+  } else {
+    return (plane - c) * r;
+  }
+}
+
+/// How packets read the nodes of bvh::SoaNodes<N>: planes k = 2 * axis + side, side 0 lower and 1 upper, of all children; where rays meet that of child i,
+/// as their own box test computes it.
+template <int N>
+struct SoaPacketNodes {
+  static constexpr int kBranching = N, kLanes = N < 4 ? 4 : N;
+  template <bool Padded>
+  using Single = SoaNodeTest<N, Padded>;
+
+  static ARBORETUM_INLINE vf<kLanes> planes(const std::byte* node, unsigned k) { return vf<kLanes>::load(node + k * (N * sizeof(float))); }
+  template <class F>
+  static ARBORETUM_INLINE F distance(const std::byte* node, unsigned k, int i, F r, F c) {
+    float p;
+    std::memcpy(&p, node + (k * N + unsigned(i)) * sizeof(float), sizeof p);
+    return plane_distance(F(p), r, c);
+  }
+  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) { return Single<true>::children(node)[i]; }
+  static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
+};
+
 /// One ray through what hangs below `root`, with what it has met already.
-template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
+template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
 __attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Leaves& leaves, const LeafForm& form,
                                            const Counting& counting, StackEntry* stack, const Ray& ray, typename Leaves::RayData& data, NearestHit& best) {
-  SoaNodeTest<N, Padded> nodes(ray, max_coordinate);
+  typename Format::template Single<Padded> nodes(ray, max_coordinate);
   if constexpr (!AnyHit) nodes.shorten(best.t);
   return walk_bvh<AnyHit>(base, root, nodes, stack, best.t, counting, [&](bvh::NodeReference r) {
     const std::byte* const blocks = base + bvh::offset_of(r);
@@ -48,7 +77,7 @@ __attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeRefer
 }
 
 /// W rays a register. `fast` and `padded` are one class: they differ in what rays bring with them (compile time).
-template <int N, int W, class Leaves, bool AnyHit, class Counting>
+template <class Format, int W, class Leaves, bool AnyHit, class Counting>
 class BvhPackets {
  public:
   BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
@@ -76,9 +105,8 @@ class BvhPackets {
 
  private:
   using F = vf<W>;
-  static constexpr int kLanes = N < 4 ? 4 : N;
+  static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
   using Children = vf<kLanes>;
-  static constexpr int kPlane = N * int(sizeof(float));
 
   struct Entry {
     bvh::NodeReference reference;
@@ -92,7 +120,7 @@ class BvhPackets {
     float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
     float tnear;
     bool usable;
-    unsigned near[3];  ///< byte offsets of the near planes
+    unsigned near[3];  ///< the near planes; the far one of axis a is 4 a + 1 less that
   };
 
   /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever it is asked for.
@@ -190,7 +218,7 @@ class BvhPackets {
       const float o = -o_low[a] > o_high[a] ? -o_low[a] : o_high[a];
       v.near_origin[a] = negative ? o_low[a] : o_high[a], v.far_origin[a] = negative ? o_high[a] : o_low[a];
       v.pad[a] = 0x1p-20f * (max_coordinate_ + o) * r + 0x1p-99f;
-      v.near[a] = unsigned(2 * a + negative) * kPlane;
+      v.near[a] = unsigned(2 * a + negative);
       v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
       if constexpr (Leaves::kRaysInLanes) spread_.set_axis(a, o_low[a], o_high[a], d_low[a], d_high[a]);
     }
@@ -202,8 +230,8 @@ class BvhPackets {
     Children near(v.tnear), far(tfar);
     for (int a = 0; a < 3; ++a) {
       const Children low(v.r_low[a]), high(v.r_high[a]), pad(v.pad[a]);
-      const Children n = Children::load(node + v.near[a]) - Children(v.near_origin[a]);
-      const Children f = Children::load(node + (unsigned(4 * a + 1) * kPlane - v.near[a])) - Children(v.far_origin[a]);
+      const Children n = Format::planes(node, v.near[a]) - Children(v.near_origin[a]);
+      const Children f = Format::planes(node, unsigned(4 * a + 1) - v.near[a]) - Children(v.far_origin[a]);
       near = max_x86(min_x86(n * low, n * high) - pad, near);
       far = min_x86(max_x86(f * low, f * high) + pad, far);
     }
@@ -214,28 +242,15 @@ class BvhPackets {
 
   /// Those of `mask` that meet child i.
   ARBORETUM_INLINE std::uint64_t rays_met(const unsigned (&near)[3], const std::byte* node, int i, std::uint64_t mask) const {
-    const auto plane = [&](unsigned offset) {
-      float p;
-      std::memcpy(&p, node + offset + std::size_t(i) * sizeof(float), sizeof p);
-      return F(p);
-    };
-    const F nx = plane(near[0]), ny = plane(near[1]), nz = plane(near[2]);
-    const F fx = plane(1 * kPlane - near[0]), fy = plane(5 * kPlane - near[1]), fz = plane(9 * kPlane - near[2]);
     std::uint64_t met = 0;
     for (int c = 0; c < chunks_; ++c) {
       const unsigned in = unsigned(mask >> (c * W)) & ((1u << W) - 1u);
       if (in == 0) continue;
       const int k = c * W;
       const F rx = F::load(r_[0] + k), ry = F::load(r_[1] + k), rz = F::load(r_[2] + k);
-      const auto at = [](F p, F r, const float* o) {
-        if constexpr (kHasFma) {
-          return msub(p, r, F::load(o));
-        } else {
-          return (p - F::load(o)) * r;
-        }
-      };
-      const F enter = max_x86(max_x86(at(nx, rx, near_[0] + k), at(ny, ry, near_[1] + k)), max_x86(at(nz, rz, near_[2] + k), F::load(tnear_ + k)));
-      const F leave = min_x86(min_x86(at(fx, rx, far_[0] + k), at(fy, ry, far_[1] + k)), min_x86(at(fz, rz, far_[2] + k), F::load(t_ + k)));
+      const auto at = [&](unsigned plane, F r, const float* c) { return Format::template distance<F>(node, plane, i, r, F::load(c + k)); };
+      const F enter = max_x86(max_x86(at(near[0], rx, near_[0]), at(near[1], ry, near_[1])), max_x86(at(near[2], rz, near_[2]), F::load(tnear_ + k)));
+      const F leave = min_x86(min_x86(at(1 - near[0], rx, far_[0]), at(5 - near[1], ry, far_[1])), min_x86(at(9 - near[2], rz, far_[2]), F::load(t_ + k)));
       met |= std::uint64_t((enter <= leave).bits() & in) << k;
     }
     return met;
@@ -267,11 +282,10 @@ class BvhPackets {
           hit = children_met(interval, node, tfar, entry);
         } else {
           entry = Children(interval.tnear);
-          hit = (1u << SoaNodeTest<N, false>::boxes(node)) - 1u;
+          hit = (1u << Format::boxes(node)) - 1u;
         }
         alignas(64) float t[kLanes];
         entry.store(t);
-        const bvh::NodeReference* child = SoaNodeTest<N, false>::children(node);
         Entry* const bottom = top;
         [[maybe_unused]] unsigned taken = 0;
         for (; hit; hit &= hit - 1) {
@@ -279,11 +293,14 @@ class BvhPackets {
           const std::uint64_t mask = rays_met(interval.near, node, i, e.mask);
           if (mask == 0) continue;
           ++taken;
-          const auto* target = reinterpret_cast<const char*>(base_ + bvh::offset_of(child[i]));
+          const bvh::NodeReference child = Format::child(node, i);
+          const auto* target = reinterpret_cast<const char*>(base_ + bvh::offset_of(child));
           for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
           Entry* p = top++;
-          for (; p != bottom && p[-1].t < t[i]; --p) *p = p[-1];
-          *p = {child[i], t[i], mask};
+          if constexpr (!AnyHit) {
+            for (; p != bottom && p[-1].t < t[i]; --p) *p = p[-1];
+          }
+          *p = {child, t[i], mask};
         }
         if constexpr (Counting::kCounting) count(node, unsigned(__builtin_popcountll(e.mask)), taken);
         if (top == bottom) goto pop;
@@ -302,7 +319,7 @@ class BvhPackets {
   }
 
   void alone(int i, bvh::NodeReference reference) {
-    const auto below = padded_ ? &trace_below<N, Leaves, true, AnyHit, Counting> : &trace_below<N, Leaves, false, AnyHit, Counting>;
+    const auto below = padded_ ? &trace_below<Format, Leaves, true, AnyHit, Counting> : &trace_below<Format, Leaves, false, AnyHit, Counting>;
     auto&& ray = data(i);
     const bool hit = below(base_, reference, max_coordinate_, leaves_, form_, counting_, single_stack_.data(), rays_[i], ray, best_[i]);
     if constexpr (AnyHit) {
@@ -395,7 +412,7 @@ class BvhPackets {
 
   /// A node visit of a packet counts as one of each of its rays.
   void count(const std::byte* node, unsigned rays, unsigned taken) const {
-    const unsigned boxes = SoaNodeTest<N, false>::boxes(node);
+    const unsigned boxes = Format::boxes(node);
     for (unsigned i = 0; i < rays; ++i) counting_.node(boxes, kLanes, taken);
   }
 
@@ -426,7 +443,7 @@ class BvhPackets {
 };
 
 /// Packets of `Rays` rays that follow each other in the batch; with no more than `Threshold` of them in a node they go on alone.
-template <int N, int Rays, int Threshold>
+template <class Format, int Rays, int Threshold>
 struct BvhPacketFunctions {
   static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
 
@@ -440,7 +457,7 @@ struct BvhPacketFunctions {
     }
     template <bool AnyHit, class Report>
     static ARBORETUM_INLINE void packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
-      BvhPackets<N, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
+      BvhPackets<Format, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
       for (std::size_t begin = 0; begin < rays.size(); begin += Rays) {
         const int count = int(std::min<std::size_t>(Rays, rays.size() - begin));
         packet.trace(&rays[begin], count, Threshold);
@@ -463,17 +480,17 @@ struct BvhPacketFunctions {
   }
 };
 
-template <int N>
-void add_packet_rows(KernelRows& rows) {
-  using Structure = bvh::Bvh<N>;
-  add_rows<Structure, BvhPacketFunctions<N, 4, 0>>(rows, "packet4", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<N, 8, 0>>(rows, "packet8", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<N, 16, 0>>(rows, "packet16", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<N, 32, 4>>(rows, "packet32", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<N, 64, 6>>(rows, "packet64", PacketLeaves{});
-  add_rows<Structure, BvhPacketFunctions<N, 4, 1>>(rows, "hybrid4", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<N, 8, 2>>(rows, "hybrid8", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<N, 16, 3>>(rows, "hybrid16", TypeList<>{});
+/// `Compiled`: what packet64 has compiled in.
+template <class Structure, class Format, class Compiled>
+void add_packet_rows(KernelRows& rows, Compiled compiled) {
+  add_rows<Structure, BvhPacketFunctions<Format, 4, 0>>(rows, "packet4", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 8, 0>>(rows, "packet8", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 16, 0>>(rows, "packet16", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 32, 4>>(rows, "packet32", compiled);
+  add_rows<Structure, BvhPacketFunctions<Format, 64, 6>>(rows, "packet64", compiled);
+  add_rows<Structure, BvhPacketFunctions<Format, 4, 1>>(rows, "hybrid4", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 8, 2>>(rows, "hybrid8", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 16, 3>>(rows, "hybrid16", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -19,14 +19,16 @@ inline constexpr bvh::NodeReference kDone = 16;
 /// The kinds of step, as the reference's own bits tell them: node 0, leaf 1, done 2.
 [[nodiscard]] ARBORETUM_INLINE unsigned kind_of(bvh::NodeReference r) { return r >> 3 & 3u; }
 
-/// The children of `hit` onto the stack, the nearest on top: the order of push_children().
-template <int N>
+/// The children of `hit` onto the stack, the nearest on top: the order of push_children(). For any hit as they stand in the node: walk_bvh()'s.
+template <int N, bool AnyHit>
 ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std::uint32_t* key, unsigned hit, StackEntry*& top) {
   for (StackEntry* const bottom = top; hit; hit &= hit - 1) {
     const int i = __builtin_ctz(hit);
     const StackEntry e = stack_entry(key[i], child[i]);
     StackEntry* p = top++;
-    for (; p != bottom && p[-1] < e; --p) *p = p[-1];
+    if constexpr (!AnyHit) {
+      for (; p != bottom && p[-1] < e; --p) *p = p[-1];
+    }
     *p = e;
   }
 }
@@ -58,7 +60,7 @@ ARBORETUM_INLINE __m256d sort_down(__m256d e) {
 
 /// The same for all: up to four children, the usual case, without a branch where the registers can do it. Writes up to four
 /// entries whatever their number.
-template <int N>
+template <int N, bool AnyHit>
 ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> entry, unsigned hit, StackEntry*& top) {
   constexpr int W = N < 4 ? 4 : N;
   [[maybe_unused]] const unsigned count = unsigned(__builtin_popcount(hit));
@@ -90,7 +92,7 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
     if (__builtin_expect(count <= 4, 1)) {
       const __m256i e = _mm256_set_m128i(_mm_unpackhi_epi32(references, keys), _mm_unpacklo_epi32(references, keys));
-      _mm256_storeu_pd(reinterpret_cast<double*>(top), sort_down(_mm256_castsi256_pd(e)));
+      _mm256_storeu_pd(reinterpret_cast<double*>(top), AnyHit ? _mm256_castsi256_pd(e) : sort_down(_mm256_castsi256_pd(e)));
       top += count;
       return;
     }
@@ -98,7 +100,7 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
   }
   alignas(64) std::uint32_t key[W];
   entry.store(key);
-  push_in_scalars<N>(child, key, hit, top);
+  push_in_scalars<N, AnyHit>(child, key, hit, top);
 }
 
 /// Rays in flight at most.
@@ -212,7 +214,7 @@ class Queued {
       const std::byte* node = base_ + bvh::offset_of(steps[i].target);
       F entry;
       const unsigned hit = BoxLanes<N, Padded>(s.box).test(node, F(s.first), F(s.best.t), entry);
-      push<N>(reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float)), entry, hit, s.top);
+      push<N, AnyHit>(reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float)), entry, hit, s.top);
       tails.route(steps[i].slot, pop(s));
     }
   }

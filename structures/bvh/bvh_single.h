@@ -45,7 +45,7 @@ struct SoaTests {
   using Nodes = SoaNodeTest<N, Padded>;
 };
 
-/// Depth first, children near to far. `leaf(reference)` returns true to stop; where it finds a nearer hit it lowers `nearest`, beyond which
+/// Depth first, children near to far; for any hit in whatever order, since an occluder may be anywhere. `leaf(reference)` returns true to stop; where it finds a nearer hit it lowers `nearest`, beyond which
 /// nothing is visited, and shortens `nodes`. Returns whether it was stopped.
 template <bool AnyHit, class Nodes, class Counting, class Leaf>
 ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, Nodes& nodes, StackEntry* stack, const float& nearest,
@@ -62,6 +62,10 @@ ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, N
       const bvh::NodeReference* child = Nodes::children(node);
       if ((hit & (hit - 1)) == 0) {
         reference = child[__builtin_ctz(hit) * Nodes::kStride];
+        continue;
+      }
+      if constexpr (AnyHit) {
+        reference = push_unordered<Nodes::kStride>(base, child, hit, top);
         continue;
       }
       alignas(64) std::uint32_t key[Nodes::W];

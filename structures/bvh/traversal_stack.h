@@ -64,6 +64,18 @@ ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const b
   return bvh::NodeReference(*--top);
 }
 
+/// The same without an order: the last child is taken, the others wait.
+template <int Stride = 1>
+ARBORETUM_INLINE bvh::NodeReference push_unordered(const std::byte* base, const bvh::NodeReference* child, unsigned hit, StackEntry*& top) {
+  for (; hit & (hit - 1); hit &= hit - 1) {
+    const bvh::NodeReference reference = child[__builtin_ctz(hit) * Stride];
+    const auto* target = reinterpret_cast<const char*>(base + bvh::offset_of(reference));
+    for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
+    *top++ = reference;
+  }
+  return child[__builtin_ctz(hit) * Stride];
+}
+
 using TraversalStack = BatchStack<StackEntry, 1024>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -7,6 +7,7 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
+#include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/kernel_rows.h"
 
@@ -64,8 +65,31 @@ struct AosNodeTest {
   }
 };
 
+/// How packets read a node (structures/bvh/bvh_packet.h).
+struct AosPacketNodes {
+  static constexpr int kBranching = 4, kLanes = 4;
+  template <bool Padded>
+  using Single = AosNodeTest<Padded>;
+
+  static ARBORETUM_INLINE float plane(const std::byte* node, unsigned k, int i) {
+    float p;
+    std::memcpy(&p, node + ((k & 1u) * 16u + unsigned(i) * 4u + k / 2u) * sizeof(float), sizeof p);
+    return p;
+  }
+  template <class F>
+  static ARBORETUM_INLINE F distance(const std::byte* node, unsigned k, int i, F r, F c) {
+    return plane_distance(F(plane(node, k, i)), r, c);
+  }
+  static ARBORETUM_INLINE vf<4> planes(const std::byte* node, unsigned k) {
+    return four(plane(node, k, 0), plane(node, k, 1), plane(node, k, 2), plane(node, k, 3));
+  }
+  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) { return Single<true>::children(node)[4 * i]; }
+  static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
+};
+
 inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows) {
   add_rows<bvh4_aos::Bvh4Aos, BvhSingle<AosNodeTest>::Functions>(rows, "single", UsualLeaves{});
+  add_packet_rows<bvh4_aos::Bvh4Aos, AosPacketNodes>(rows, TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -11,6 +11,7 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
+#include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/kernel_rows.h"
 
@@ -70,10 +71,40 @@ struct QuantisedTests {
   using Nodes = QuantisedNodeTest<N, Padded>;
 };
 
+/// How packets read a node (structures/bvh/bvh_packet.h).
+template <int N>
+struct QuantisedPacketNodes {
+  static constexpr int kBranching = N, kLanes = N;
+  using Node = bvh_quantised::Node<N>;
+  template <bool Padded>
+  using Single = QuantisedNodeTest<N, Padded>;
+
+  static ARBORETUM_INLINE float step(const Node* node, unsigned axis) { return __builtin_bit_cast(float, std::uint32_t(node->exponent[axis]) << 23); }
+  template <class F>
+  static ARBORETUM_INLINE F distance(const std::byte* at, unsigned k, int i, F r, F c) {
+    const auto* node = reinterpret_cast<const Node*>(at);
+    const F q(float(node->planes[k][i])), size(step(node, k / 2)), origin(node->origin[k / 2]);
+    if constexpr (kHasFma) {
+      return madd(q, size * r, msub(origin, r, c));
+    } else {
+      return (q * size + origin - c) * r;
+    }
+  }
+  static ARBORETUM_INLINE vf<N> planes(const std::byte* at, unsigned k) {
+    const auto* node = reinterpret_cast<const Node*>(at);
+    const vf<N> p = to_float(load_bytes<N>(node->planes[k])) * vf<N>(step(node, k / 2)) + vf<N>(node->origin[k / 2]);
+    const vf<N> nowhere(k & 1u ? -std::numeric_limits<float>::infinity() : std::numeric_limits<float>::infinity());
+    return select(vm<N>::from_bits(node->children), p, nowhere);
+  }
+  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) { return Single<true>::children(node)[i]; }
+  static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
+};
+
 template <int N>
 void add_kernels(std::type_identity<bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>>, KernelRows& rows) {
   using Structure = bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>;
   add_rows<Structure, typename BvhSingle<QuantisedTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
+  add_packet_rows<Structure, QuantisedPacketNodes<N>>(rows, TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
