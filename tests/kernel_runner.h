@@ -26,18 +26,22 @@ namespace arboretum::test {
   return name;
 }
 
-/// The rows of the ISAs that are available here, without those that are other rows' code put together anew: leaves that are called by the same
-/// functions are all there for single rays in bvh8 and brute_force, and for the two intersectors that most kernels are run with; elsewhere
-/// each function is there with each intersector once.
+/// The rows of the ISAs that are available here, without most that are other rows' code put together anew: an intersector is compiled once and called
+/// by every structure and traversal through the same pointers. The two that most kernels are run with are there everywhere; `pluecker` and
+/// `exact` for single rays everywhere and in one mode of each kind; the others with a BVH, a kd-tree and the reference. Leaves that are
+/// called by the same functions are all there for single rays in bvh8, elsewhere once.
 [[nodiscard]] inline std::vector<KernelRow> runnable_rows() {
   std::vector<KernelRow> rows;
   std::set<std::tuple<std::string_view, std::string_view, std::string_view, std::string_view, Isa, ClosestHitFunction>> seen;
   for (const KernelRow& row : kernel_table()) {
     if (!is_available(row.isa)) continue;
+    const bool single = row.traversal == "single", reference = row.structure == "bvh8" || row.structure == "brute_force";
+    const bool common = row.intersector == "moller_trumbore" || row.intersector == "watertight";
+    const bool mode = single || (row.structure == "bvh8" && (row.traversal == "packet64" || row.traversal == "queued"));
+    if (!common && !mode) continue;
+    if (!common && row.intersector != "pluecker" && row.intersector != "exact" && !reference && row.structure != "kdtree") continue;
     const bool first = seen.insert({row.structure, row.intersector, row.box, row.traversal, row.isa, row.timed.closest_hit}).second;
-    const bool every_leaf = row.traversal == "single" && (row.structure == "bvh8" || row.structure == "brute_force" ||
-                                                          row.intersector == "moller_trumbore" || row.intersector == "watertight");
-    if (first || every_leaf) rows.push_back(row);
+    if (first || (single && row.structure == "bvh8")) rows.push_back(row);
   }
   return rows;
 }
