@@ -43,10 +43,11 @@ static_assert(sizeof(Hit) == 16);
          (ray.direction.x != 0.0f || ray.direction.y != 0.0f || ray.direction.z != 0.0f) && ray.tnear <= ray.tfar;
 }
 
-/// What a kernel is handed: rays, and where the scene moves the time of each.
+/// What a kernel is handed: rays, where the scene moves the time of each, and what is known of them all.
 struct RayBatch {
   std::span<const Ray> rays;
   std::span<const float> times;  ///< within [0, 1], the time of the key frames; one a ray, or empty: 0 for all
+  bool coherent = false;         ///< a hint: neighbours in `rays` take much the same way, as primary rays in tile order do
 
   RayBatch() = default;
   RayBatch(const Ray* first, std::size_t count) noexcept : rays(first, count) {}
@@ -59,7 +60,9 @@ struct RayBatch {
   [[nodiscard]] const Ray& operator[](std::size_t i) const noexcept { return rays[i]; }
   /// `count` rays from ray `begin` on.
   [[nodiscard]] RayBatch part(std::size_t begin, std::size_t count) const noexcept {
-    return {rays.subspan(begin, count), times.empty() ? times : times.subspan(begin, count)};
+    RayBatch b(rays.subspan(begin, count), times.empty() ? times : times.subspan(begin, count));
+    b.coherent = coherent;
+    return b;
   }
   [[nodiscard]] float time(std::size_t i) const noexcept { return times.empty() ? 0.0f : times[i]; }
 };

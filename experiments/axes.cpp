@@ -109,6 +109,11 @@ std::string leaf_summary(std::string_view leaf) {
 
 std::string traversal_summary(std::string_view traversal) {
   if (const auto line = look_up(kTraversals, traversal); !line.empty()) return std::string(line);
+  for (std::string_view flag : {"_coherent", "_incoherent"}) {
+    if (!traversal.ends_with(flag)) continue;
+    const std::string plain = traversal_summary(traversal.substr(0, traversal.size() - flag.size()));
+    return plain + (flag == "_coherent" ? ", always with Embree's coherent flag" : ", never with Embree's coherent flag");
+  }
   const auto [kind, number] = split_number(traversal);
   if (kind == "packet") return "packets of " + std::string(number) + " rays";
   if (kind == "hybrid") return "packets of " + std::string(number) + " rays that fall apart into single rays";

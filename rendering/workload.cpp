@@ -192,6 +192,12 @@ bool is_secondary(std::string_view workload) {
   return workload != "primary" && workload != "random";
 }
 
+RayBatch Workload::batch() const noexcept {
+  RayBatch b(rays, times);
+  b.coherent = name == "primary" || name == "shadow";
+  return b;
+}
+
 Query query_of(std::string_view workload) {
   check_known(workload);
   return workload == "shadow" || workload == "ambient_occlusion" ? Query::any_hit : Query::closest_hit;

@@ -20,7 +20,8 @@ struct Workload {
   std::vector<Ray> rays;  ///< in tile (Morton) order of the pixels they belong to
   /// Within the scene's shutter, one a ray, where the scene moves; else empty. Secondary rays keep their primary ray's.
   std::vector<float> times{};
-  [[nodiscard]] RayBatch batch() const noexcept { return {rays, times}; }
+  /// `primary` and `shadow` rays are marked coherent.
+  [[nodiscard]] RayBatch batch() const noexcept;
 };
 
 struct View {

@@ -14,6 +14,8 @@
 
 using namespace arboretum;
 using arboretum::embree::EmbreeAccel;
+using arboretum::embree::Form;
+using arboretum::embree::Mode;
 
 namespace {
 
@@ -95,15 +97,45 @@ EmbreeAccel& build(EmbreeAccel& accel, const TriangleMesh& mesh, Isa isa, std::s
   return accel;
 }
 
-std::vector<Hit> closest(const EmbreeAccel& accel, const std::vector<Ray>& rays) {
-  std::vector<Hit> hits(rays.size());
-  accel.intersect_single(rays, hits);
+/// A way of tracing, and whether the batch is marked coherent.
+struct Way {
+  const char* name;
+  Mode mode;
+  bool coherent;
+};
+constexpr Way kSingle{"single", Mode::single, false};
+
+/// Those that the instruction set has.
+std::vector<Way> ways_of(Isa isa) {
+  std::vector<Way> ways{kSingle, {"packet4", Mode::packet4, false}, {"packet4, coherent", Mode::packet4, true}};
+  if (isa >= Isa::avx2) {
+    ways.push_back({"packet8", Mode::packet8, false});
+    ways.push_back({"packet8, coherent", Mode::packet8, true});
+  }
+  if (isa >= Isa::avx512) {
+    ways.push_back({"packet16", Mode::packet16, false});
+    ways.push_back({"packet16, coherent", Mode::packet16, true});
+  }
+  if (arboretum::embree::has_streams()) {
+    ways.push_back({"stream", Mode::stream, false});
+    ways.push_back({"stream, coherent", Mode::stream, true});
+  }
+  return ways;
+}
+
+std::vector<Hit> closest(const EmbreeAccel& accel, std::span<const Ray> rays, const Way& way = kSingle) {
+  std::vector<Hit> hits(rays.size(), Hit{std::numeric_limits<float>::quiet_NaN(), 0, 0, 0xdeadbeefu});
+  RayBatch batch(rays);
+  batch.coherent = way.coherent;
+  accel.closest_hit(way.mode, batch, hits);
   return hits;
 }
 
-std::vector<std::uint8_t> any(const EmbreeAccel& accel, const std::vector<Ray>& rays) {
+std::vector<std::uint8_t> any(const EmbreeAccel& accel, std::span<const Ray> rays, const Way& way = kSingle) {
   std::vector<std::uint8_t> occluded(rays.size(), 2);
-  accel.occluded_single(rays, occluded);
+  RayBatch batch(rays);
+  batch.coherent = way.coherent;
+  accel.any_hit(way.mode, batch, occluded);
   return occluded;
 }
 
@@ -128,31 +160,34 @@ TEST_CASE("embree finds what a double-precision brute force finds") {
           build(accel, mesh, isa, builder, leaf);
           CHECK(accel.isa() == isa);
           CHECK(accel.bytes() > 0);
-          const std::vector<Hit> hits = closest(accel, rays);
-          const std::vector<std::uint8_t> occluded = any(accel, rays);
-          std::size_t compared = 0, found = 0;
-          for (std::size_t i = 0; i < rays.size(); ++i) {
-            CHECK((occluded[i] == 0 || occluded[i] == 1));
-            if (truth[i].near_edge) continue;
-            ++compared, found += truth[i].hit;
-            INFO("ray " << i);
-            REQUIRE(hits[i].is_hit() == truth[i].hit);
-            REQUIRE(occluded[i] == std::uint8_t(truth[i].hit));
-            if (!truth[i].hit) {
-              REQUIRE(hits[i].t == kInfinity);
-              continue;
+          for (const Way& way : ways_of(isa)) {
+            INFO(way.name);
+            const std::vector<Hit> hits = closest(accel, rays, way);
+            const std::vector<std::uint8_t> occluded = any(accel, rays, way);
+            std::size_t compared = 0, found = 0;
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+              CHECK((occluded[i] == 0 || occluded[i] == 1));
+              if (truth[i].near_edge) continue;
+              ++compared, found += truth[i].hit;
+              INFO("ray " << i);
+              REQUIRE(hits[i].is_hit() == truth[i].hit);
+              REQUIRE(occluded[i] == std::uint8_t(truth[i].hit));
+              if (!truth[i].hit) {
+                REQUIRE(hits[i].t == kInfinity);
+                continue;
+              }
+              REQUIRE(std::abs(hits[i].t - truth[i].t) <= 1e-4 * truth[i].t + 1e-5);
+              if (hits[i].primitive != truth[i].primitive) {  // two surfaces closer than the tolerance
+                const Truth other = truth[i];
+                REQUIRE(std::abs(hits[i].t - other.t) <= 1e-5);
+                continue;
+              }
+              REQUIRE(std::abs(hits[i].u - truth[i].u) <= 2e-3);
+              REQUIRE(std::abs(hits[i].v - truth[i].v) <= 2e-3);
             }
-            REQUIRE(std::abs(hits[i].t - truth[i].t) <= 1e-4 * truth[i].t + 1e-5);
-            if (hits[i].primitive != truth[i].primitive) {  // two surfaces closer than the tolerance
-              const Truth other = truth[i];
-              REQUIRE(std::abs(hits[i].t - other.t) <= 1e-5);
-              continue;
-            }
-            REQUIRE(std::abs(hits[i].u - truth[i].u) <= 2e-3);
-            REQUIRE(std::abs(hits[i].v - truth[i].v) <= 2e-3);
+            CHECK(compared > rays.size() * 9 / 10);
+            if (triangles >= 300) CHECK(found > rays.size() / 10);
           }
-          CHECK(compared > rays.size() * 9 / 10);
-          if (triangles >= 300) CHECK(found > rays.size() / 10);
         }
       }
     }
@@ -166,7 +201,8 @@ TEST_CASE("u weighs the second vertex and v the third") {
   for (std::string_view leaf : EmbreeAccel::static_info().leaves) {
     EmbreeAccel accel;
     build(accel, mesh, Isa::sse, "medium", leaf);
-    const Hit hit = closest(accel, {Ray{{1, 0.5f, -2}, 0, {0, 0, 2}, 1}})[0];  // t == tfar: a closed interval
+    const Ray ray{{1, 0.5f, -2}, 0, {0, 0, 2}, 1};
+    const Hit hit = closest(accel, {&ray, 1})[0];  // t == tfar: a closed interval
     CHECK(hit.primitive == 0);
     CHECK(hit.t == Approx(1.0f));
     CHECK(hit.u == Approx(0.25f));
@@ -189,15 +225,77 @@ TEST_CASE("rays that are none hit nothing in embree") {
     for (std::string_view leaf : EmbreeAccel::static_info().leaves) {
       EmbreeAccel accel;
       build(accel, mesh, isa, "medium", leaf);
-      const std::vector<Hit> hits = closest(accel, rays);
-      const std::vector<std::uint8_t> occluded = any(accel, rays);
-      for (std::size_t i = 0; i < rays.size(); ++i) {
-        INFO(to_string(isa) << " " << leaf << " ray " << i);
-        CHECK_FALSE(hits[i].is_hit());
-        CHECK(occluded[i] == 0);
+      for (const Way& way : ways_of(isa)) {
+        const std::vector<Hit> hits = closest(accel, rays, way);
+        const std::vector<std::uint8_t> occluded = any(accel, rays, way);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+          INFO(to_string(isa) << " " << leaf << " " << way.name << " ray " << i);
+          CHECK_FALSE(hits[i].is_hit());
+          CHECK(hits[i].t == kInfinity);
+          CHECK(occluded[i] == 0);
+        }
       }
     }
   }
+}
+
+// Lanes and places of a stream without a ray, and rays that Embree does not get, between those that it gets.
+TEST_CASE("packets and streams of embree answer as its single rays do, whatever the batch") {
+  const TriangleMesh mesh = random_triangles(2000, 17);
+  const Bounds3f bounds = mesh.bounds();
+  std::vector<Ray> rays = random_rays(600, 23);
+  for (std::size_t i = 0; i < 600; ++i) {  // seen from a point, as a camera's
+    const Vec3f to{number(29, i, 0, -1, 1), number(29, i, 1, -1, 1), bounds.lower.z};
+    rays.push_back({{0, 0, 4}, 0.0f, to - Vec3f{0, 0, 4}, kInfinity});
+  }
+  for (std::size_t i = 0; i < rays.size(); i += 7) rays[i].direction = {0, 0, 0};
+  for (std::size_t i = 3; i < rays.size(); i += 31) rays[i].tnear = -1.0f;  // Embree takes 0
+  for (Isa isa : available_isas()) {
+    if (isa == Isa::scalar) continue;
+    for (std::string_view leaf : EmbreeAccel::static_info().leaves) {
+      EmbreeAccel accel;
+      build(accel, mesh, isa, "medium", leaf);
+      const std::vector<Hit> want = closest(accel, rays);
+      const std::vector<std::uint8_t> want_any = any(accel, rays);
+      std::size_t found = 0;
+      for (const Hit& hit : want) found += hit.is_hit();
+      CHECK(found > 100);
+      for (const Way& way : ways_of(isa)) {
+        for (std::size_t size : {0u, 1u, 2u, 3u, 4u, 5u, 7u, 8u, 9u, 15u, 16u, 17u, 31u, 32u, 33u, 65u, 1200u}) {
+          for (std::size_t begin : {0u, 599u}) {
+            const std::size_t count = std::min(size, rays.size() - begin);
+            const std::vector<Hit> hits = closest(accel, std::span(rays).subspan(begin, count), way);
+            const std::vector<std::uint8_t> occluded = any(accel, std::span(rays).subspan(begin, count), way);
+            for (std::size_t i = 0; i < count; ++i) {
+              INFO(to_string(isa) << " " << leaf << " " << way.name << " of " << count << " from " << begin << ", ray " << i);
+              const Hit& single = want[begin + i];
+              REQUIRE(hits[i].is_hit() == single.is_hit());
+              REQUIRE(occluded[i] == want_any[begin + i]);
+              if (!single.is_hit()) {
+                REQUIRE(hits[i].t == kInfinity);
+                continue;
+              }
+              REQUIRE(hits[i].primitive == single.primitive);
+              REQUIRE(std::abs(hits[i].t - single.t) <= 1e-5f * single.t);
+              REQUIRE(std::abs(hits[i].u - single.u) <= 1e-3f);
+              REQUIRE(std::abs(hits[i].v - single.v) <= 1e-3f);
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("embree's compact scene takes less memory than its default one") {
+  TriangleMesh mesh = random_triangles(20000, 1);
+  mesh.vertices.reserve(mesh.vertices.size() + 1);  // no copy of the vertices in either
+  EmbreeAccel accel;
+  const std::size_t plain = build(accel, mesh, Isa::sse, "medium", "triangle4").bytes();
+  CHECK(accel.form() == Form::triangle4);
+  const std::size_t compact = build(accel, mesh, Isa::sse, "medium", "triangle4i").bytes();
+  CHECK(accel.form() == Form::triangle4i);
+  CHECK(compact < plain * 3 / 4);
 }
 
 TEST_CASE("embree gives its memory back, and can build again") {
@@ -230,9 +328,10 @@ TEST_CASE("embree says what it cannot do") {
                     Catch::Contains("did you mean 'medium'?"));
   CHECK_THROWS_AS(build(accel, mesh, Isa::sse, "medium", "triangle8"), UserError);
   build(accel, mesh, Isa::sse, "medium", "triangle4");
-  CHECK_NOTHROW(accel.expect(Isa::sse, false));
-  CHECK_THROWS_AS(accel.expect(Isa::avx2, false), std::logic_error);
-  CHECK_THROWS_AS(accel.expect(Isa::sse, true), std::logic_error);
+  CHECK_NOTHROW(accel.expect(Isa::sse, Form::triangle4));
+  CHECK_THROWS_AS(accel.expect(Isa::avx2, Form::triangle4), std::logic_error);
+  CHECK_THROWS_AS(accel.expect(Isa::sse, Form::triangle4v), std::logic_error);
+  CHECK_THROWS_AS(accel.expect(Isa::sse, Form::triangle4i), std::logic_error);
   struct : StructureVisitor {
     void node(const NodeView&) override { FAIL(); }
     void leaf(const LeafView&) override { FAIL(); }

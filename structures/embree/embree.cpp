@@ -1,19 +1,14 @@
 #include "structures/embree/embree.h"
 
-#if __has_include(<embree3/rtcore.h>)
-#include <embree3/rtcore.h>
-#else
-#include <embree4/rtcore.h>
-#endif
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "core/error.h"
 #include "core/memory_meter.h"
 #include "core/names.h"
+#include "structures/embree/rtcore.h"
 
 namespace arboretum::embree {
 namespace {
@@ -38,29 +33,9 @@ bool device_runs(RTCDevice device, Isa isa) {
   return ray8 == (isa >= Isa::avx2) && ray16 == (isa == Isa::avx512);
 }
 
-/// Embree's own bound on the numbers of a ray (its FLT_LARGE). A build with assertions, such as Debian's,
-/// aborts on anything beyond it, NaN and infinities included.
-constexpr float kLargest = 1.844e18f;
-
-/// Whether the ray may be handed to Embree: is_valid() in one pass, the bound, and some t >= 0, since a build
-/// with assertions aborts on tnear < 0 (to_embree() raises it to 0). False with a NaN anywhere.
-inline bool accepts(const Ray& ray) noexcept {
-  const auto in_range = [](Vec3f a) {
-    return (std::abs(a.x) <= kLargest) & (std::abs(a.y) <= kLargest) & (std::abs(a.z) <= kLargest);
-  };
-  const Vec3f d = ray.direction;
-  return in_range(ray.origin) & in_range(d) & ((d.x != 0.0f) | (d.y != 0.0f) | (d.z != 0.0f)) &
-         (ray.tnear <= ray.tfar) & (ray.tfar >= 0.0f);
-}
-
-inline RTCRay to_embree(const Ray& ray) noexcept {
-  RTCRay r;
-  r.org_x = ray.origin.x, r.org_y = ray.origin.y, r.org_z = ray.origin.z;
-  r.tnear = std::max(ray.tnear, 0.0f);
-  r.dir_x = ray.direction.x, r.dir_y = ray.direction.y, r.dir_z = ray.direction.z, r.time = 0.0f;
-  r.tfar = ray.tfar, r.mask = ~0u, r.id = 0, r.flags = 0;
-  return r;
-}
+/// In Form's order.
+constexpr std::string_view kLeaves[] = {"triangle4", "triangle4v", "triangle4i"};
+constexpr RTCSceneFlags kSceneFlags[] = {RTC_SCENE_FLAG_NONE, RTC_SCENE_FLAG_ROBUST, RTC_SCENE_FLAG_COMPACT};
 
 }  // namespace
 
@@ -69,7 +44,7 @@ const StructureInfo& EmbreeAccel::static_info() {
       .name = kName,
       .summary = "Intel Embree " RTC_VERSION_STRING ": its own builders and kernels, beside ours",
       .builders = {"medium", "low", "high"},
-      .leaves = {"triangle4", "triangle4v"},
+      .leaves = {std::begin(kLeaves), std::end(kLeaves)},
       .build_depends_on_isa = true,
       .build_depends_on_threads = true,
       .uses_parameters = false,
@@ -137,11 +112,11 @@ void EmbreeAccel::build(const TriangleMesh& mesh, const BuildSettings& settings,
   require_name("leaf of embree", settings.leaf, info().leaves);
   release();
   open_device(settings.isa);
-  robust_ = settings.leaf == "triangle4v";
+  form_ = Form(std::ranges::find(kLeaves, settings.leaf) - std::begin(kLeaves));
   const RTCBuildQuality quality = quality_of(settings.builder);
   scene_.reset(rtcNewScene(device_.get()));
   check("rtcNewScene");
-  rtcSetSceneFlags(scene_.get(), robust_ ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+  rtcSetSceneFlags(scene_.get(), kSceneFlags[int(form_)]);
   rtcSetSceneBuildQuality(scene_.get(), quality);
 
   if (!mesh.triangles.empty()) {
@@ -172,53 +147,10 @@ void EmbreeAccel::build(const TriangleMesh& mesh, const BuildSettings& settings,
   check("rtcCommitScene");
 }
 
-const EmbreeAccel& EmbreeAccel::expect(Isa isa, bool robust) const {
-  if (isa_ == isa && robust_ == robust) return *this;
-  throw std::logic_error("embree: a kernel of " + std::string(to_string(isa)) + (robust ? ", robust" : "") +
-                         " was called on a scene built for " + std::string(to_string(isa_)) +
-                         (robust_ ? ", robust" : ""));
-}
-
-void EmbreeAccel::intersect_single(std::span<const Ray> rays, std::span<Hit> hits) const {
-  const RTCScene scene = scene_.get();
-#if RTC_VERSION_MAJOR < 4
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);  // RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT: single rays know no other
-#endif
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    hits[i] = Hit{};
-    if (!accepts(rays[i])) continue;
-    RTCRayHit query;
-    query.ray = to_embree(rays[i]);
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-#if RTC_VERSION_MAJOR < 4
-    rtcIntersect1(scene, &context, &query);
-#else
-    rtcIntersect1(scene, &query, nullptr);
-#endif
-    if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID)
-      hits[i] = {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID};
-  }
-}
-
-void EmbreeAccel::occluded_single(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
-  const RTCScene scene = scene_.get();
-#if RTC_VERSION_MAJOR < 4
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-#endif
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    occluded[i] = 0;
-    if (!accepts(rays[i])) continue;
-    RTCRay ray = to_embree(rays[i]);
-#if RTC_VERSION_MAJOR < 4
-    rtcOccluded1(scene, &context, &ray);
-#else
-    rtcOccluded1(scene, &ray, nullptr);
-#endif
-    occluded[i] = ray.tfar < 0.0f;  // -infinity when something is hit; accepts() saw it >= 0
-  }
+const EmbreeAccel& EmbreeAccel::expect(Isa isa, Form form) const {
+  if (isa_ == isa && form_ == form) return *this;
+  const auto name = [](Isa i, Form f) { return std::string(to_string(i)).append(", ").append(kLeaves[int(f)]); };
+  throw std::logic_error("embree: a kernel of " + name(isa, form) + " was called on a scene built for " + name(isa_, form_));
 }
 
 }  // namespace arboretum::embree
