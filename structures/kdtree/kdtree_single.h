@@ -49,6 +49,16 @@ struct KdRay {
     r[3] = enter[3] = leave[3] = 0.0f, far[3] = 0u;
   }
 
+  /// Cuts [begin, end] down to the part of the ray within the bounds; begin > end where there is none.
+  ARBORETUM_INLINE void clip(const Bounds3f& bounds, float& begin, float& end) const {
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      const bool up = far[axis] != 0;
+      const float low = (&bounds.lower.x)[axis], high = (&bounds.upper.x)[axis];
+      const float in = entering(up ? low : high, axis), out = leaving(up ? high : low, axis);
+      begin = in > begin ? in : begin, end = out < end ? out : end;
+    }
+  }
+
   static constexpr float kPad = 0x1p-21f;
 
   static ARBORETUM_INLINE float fused(float s, float r, float c) {
@@ -85,12 +95,7 @@ class KdSingle {
   ARBORETUM_INLINE bool walk(const Ray& ray, typename Leaves::RayData& data, NearestHit& best) {
     const KdRay planes(ray, max_coordinate_, pad_);
     float begin = ray.tnear, end = best.t;
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      const bool up = planes.far[axis] != 0;
-      const float low = (&bounds_.lower.x)[axis], high = (&bounds_.upper.x)[axis];
-      const float in = planes.entering(up ? low : high, axis), out = planes.leaving(up ? high : low, axis);
-      begin = in > begin ? in : begin, end = out < end ? out : end;
-    }
+    planes.clip(bounds_, begin, end);
     if (begin > end) return false;
     const std::byte* const base = base_;
     KdStackEntry* const stack = stack_.data();
