@@ -47,10 +47,16 @@ struct Combination {
   }
 };
 
-[[nodiscard]] inline std::vector<const KernelRow*> rows_of(std::string_view structure, std::string_view leaf) {
+/// Single rays with four intersectors; with `modes` the other ways of traversal, too, with `watertight`. A tree is at stake here, not an
+/// intersector: those are called by all structures through the same pointers.
+[[nodiscard]] inline std::vector<const KernelRow*> rows_of(std::string_view structure, std::string_view leaf, bool modes) {
   std::vector<const KernelRow*> rows;
-  for (const KernelRow& row : kernel_table())
-    if (row.structure == structure && row.leaf == leaf && row.isa == tested_isa()) rows.push_back(&row);
+  for (const KernelRow& row : kernel_table()) {
+    if (row.structure != structure || row.leaf != leaf || row.isa != tested_isa()) continue;
+    const bool single = row.traversal == "single", crack_free = row.intersector == "watertight";
+    const bool common = crack_free || row.intersector == "moller_trumbore" || row.intersector == "pluecker" || row.intersector == "exact";
+    if (single ? common : modes && crack_free) rows.push_back(&row);
+  }
   return rows;
 }
 
@@ -63,7 +69,8 @@ struct Combination {
       const std::string leaf(default_leaf(entry.info.name, "watertight", tested_isa()));
       for (std::string_view builder : entry.info.builders)
         // What stands above others hands the builder on: one stands for all, with the default structure below.
-        if (!entry.info.takes_below || builder == entry.info.builders.front()) list.push_back({&entry, std::string(builder), leaf, rows_of(entry.info.name, leaf)});
+        if (!entry.info.takes_below || builder == entry.info.builders.front()) 
+          list.push_back({&entry, std::string(builder), leaf, rows_of(entry.info.name, leaf, builder == entry.info.builders.front())});
     }
     return list;
   }();
