@@ -53,10 +53,11 @@ constexpr Summary kBoxes[] = {
 };
 constexpr Summary kTraversals[] = {
     {"single", "one ray at a time, boxes and triangles in the lanes"},
+    {"queued", "32 rays in flight (any hit: 64), their next steps in queues"},
     {"packet", "rays in the lanes, as many as the instruction set has"},
     {"hybrid", "packets that fall apart into single rays, as wide as the instruction set"},
-    {"stream", "a whole batch goes down together"},
-    {"queued", "rays in flight, as many as paid most: their next steps in two queues, prefetched"},
+    {"stream", "groups of rays go down together, sorted into a list for each child"},
+    {"stream_sorted", "stream, of rays sorted by octant and origin within the measured time"},
     {"auto", "looks at the rays, tile by tile: packets of 64 where they are coherent, else rays in flight"},
 };
 constexpr Summary kIsas[] = {

@@ -10,6 +10,7 @@
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
+#include "traversal/ray_order.h"
 
 using namespace arboretum;
 using namespace arboretum::test;
@@ -242,6 +243,51 @@ TEST_CASE("every way of traversal gives the single ray's answers, bit for bit") 
     }
   }
   CHECK(traversals.count("queued") == (find_structure("bvh8") || find_structure("kdtree") ? 1u : 0u));
+}
+
+TEST_CASE("streams of one to many groups give the single ray's answers, bit for bit") {
+  const std::size_t sizes[] = {1, 2, 3, 4, 5, 7, 8, 9, 15, 16, 17, 31, 32, 33, 1023, 1024, 1025, 2100};
+  for (const TriangleMesh& mesh : {random_triangles(3000, 0.1f, 2), sphere(40)}) {
+    std::vector<Ray> rays = generic_rays(mesh, 1100, 41);
+    const std::vector<Ray> aimed = aimed_rays(mesh, mesh.bounds().center(), 1000, 42);  // every octant, coherent
+    rays.insert(rays.end(), aimed.begin(), aimed.end());
+    std::size_t place = 1;
+    for (const Ray& ray : invalid_rays()) rays[place] = ray, place += 11;
+    Structures structures(mesh);
+    for (const KernelRow& row : runnable_rows()) {
+      if (!row.traversal.starts_with("stream") || row.box != "padded") continue;
+      INFO(name_of(row));
+      const Accel& accel = structures.get(row);
+      const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+      REQUIRE(single);
+      const std::vector<Hit> alone = closest_hit(*single, accel, rays);
+      const std::vector<std::uint8_t> occluded = any_hit(*single, accel, rays);
+      for (std::size_t size : sizes) {
+        INFO("batch of " << size);
+        const std::span<const Ray> batch = std::span(rays).first(size);
+        REQUIRE(same_bits(closest_hit(row, accel, batch), std::span(alone).first(size)));
+        REQUIRE(std::ranges::equal(any_hit(row, accel, batch), std::span(occluded).first(size)));
+      }
+    }
+  }
+}
+
+TEST_CASE("the order of sorted streams: every ray once, octant after octant") {
+  std::vector<Ray> rays = generic_rays(random_triangles(50, 0.3f, 1), 3000, 5);
+  for (const Ray& ray : invalid_rays()) rays.push_back(ray);
+  for (std::size_t size : {std::size_t(0), std::size_t(1), std::size_t(40), rays.size()}) {
+    const std::vector<std::uint32_t> order = ray_order(std::span<const Ray>(rays).first(size));
+    std::set<int> octants;
+    int last = -1;
+    for (std::uint32_t i : order) {
+      const Vec3f d = rays[i].direction;
+      const int octant = std::signbit(d.x) * 4 + std::signbit(d.y) * 2 + std::signbit(d.z);
+      if (octant != last) CHECK(octants.insert(octant).second);
+      last = octant;
+    }
+    CHECK(std::set<std::uint32_t>(order.begin(), order.end()).size() == size);
+    CHECK(order.size() == size);
+  }
 }
 
 TEST_CASE("what promises it has, with padded boxes, no crack in a closed mesh") {

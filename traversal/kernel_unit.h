@@ -28,5 +28,6 @@
 #include "structures/leaves/leaf_form.h"
 #include "traversal/counting.h"
 #include "traversal/kernel_table.h"
+#include "traversal/ray_order.h"
 
 #include "simd/target.h"

@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
+#include "core/morton.h"
 #include "structures/builders/box4.h"
 #include "structures/builders/radix_sort.h"
 
@@ -15,17 +16,6 @@ namespace {
 
 constexpr std::size_t kChunk = 1u << 14;
 constexpr unsigned kRestBits = 31;
-
-/// Bit i goes to bit 3 i; 21 bits at most.
-std::uint64_t spread(std::uint32_t x) noexcept {
-  std::uint64_t v = x;
-  v = (v | v << 32) & 0x001f00000000ffff;
-  v = (v | v << 16) & 0x001f0000ff0000ff;
-  v = (v | v << 8) & 0x100f00f00f00f00f;
-  v = (v | v << 4) & 0x10c30c30c30c30c3;
-  v = (v | v << 2) & 0x1249249249249249;
-  return v;
-}
 
 template <class F>
 void for_chunks(std::size_t n, const F& f) {
@@ -45,7 +35,7 @@ class Cells {
     const __m128 at = _mm_mul_ps(_mm_sub_ps(c, lower_), scale_);
     alignas(16) std::uint32_t cell[4];
     _mm_store_si128(reinterpret_cast<__m128i*>(cell), _mm_cvttps_epi32(_mm_min_ps(_mm_max_ps(at, _mm_setzero_ps()), last_)));
-    return spread(cell[0]) << 2 | spread(cell[1]) << 1 | spread(cell[2]);
+    return morton_code(cell[0], cell[1], cell[2]);
   }
 
  private:

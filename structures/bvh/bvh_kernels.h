@@ -6,6 +6,7 @@
 #include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
+#include "structures/bvh/bvh_stream.h"
 #include "traversal/kernel_rows.h"
 
 namespace arboretum {
@@ -17,6 +18,7 @@ void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_queued_rows<N>(rows);
   add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, PacketLeaves{});
   add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", PacketLeaves{});
+  add_stream_rows<N>(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

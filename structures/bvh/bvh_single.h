@@ -26,6 +26,8 @@ struct SoaNodeTest {
   /// `max_coordinate`: the largest of the scene, what padded boxes scale their pad with.
   ARBORETUM_INLINE SoaNodeTest(const Ray& ray, float max_coordinate)
       : box(BoxRay<N, Padded>(ray, max_coordinate)), tnear(first_distance(ray)), tfar(ray.tfar) {}
+  /// Of a ray whose constants are known, between the distances `first` and `last`.
+  ARBORETUM_INLINE SoaNodeTest(const BoxRay<N, Padded>& constants, float first, float last) : box(constants), tnear(first), tfar(last) {}
   ARBORETUM_INLINE unsigned test(const std::byte* node, F& entry) const { return box.test(node, tnear, tfar, entry); }
   ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
   static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
