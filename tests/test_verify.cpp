@@ -307,7 +307,7 @@ TEST_CASE("the command's verdicts and words") {
   CHECK(leaks.out.find("promised: nothing") != std::string::npos);
   CHECK(leaks.out.find("per million") != std::string::npos);
 
-  command.axes = {isa, "structure=kdtree", "traversal=queued"};
+  command.axes = {isa, "structure=grid", "traversal=queued"};
   CHECK(verify(command).status == 4);
 
   const struct {
