@@ -22,3 +22,9 @@ if(ARBORETUM_SANITIZE)
   target_link_options(arboretum_flags INTERFACE -fsanitize=${ARBORETUM_SANITIZE})
   list(APPEND ARBORETUM_OPTIONS -fsanitize=${ARBORETUM_SANITIZE})
 endif()
+
+# For code that waits for others: the command line, readers of files, tests. A release build spends half of its time on optimising them at -O3.
+# The rest, whatever a measurement or a build of a structure runs through, keeps the build type's own flags.
+function(arboretum_optimise_little target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+endfunction()

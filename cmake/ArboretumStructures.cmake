@@ -50,7 +50,8 @@ endmacro()
 # Compile options of a generated unit for an instruction set.
 function(arboretum_kernel_options unit isa)
   # GCC's own AVX-512 headers set off -Wmaybe-uninitialized.
-  set(options "-Wno-uninitialized;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
+  # A copy of a kernel for each constant that it is called with would take a fifth of the compile time and gain nothing.
+  set(options "-Wno-uninitialized;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>;$<$<CXX_COMPILER_ID:GNU>:-fno-ipa-cp-clone>")
   # The scalar kernels are the reference, not a race: unrolling their lane loops would cost a minute of compile time each.
   # Units of ISAs with FMA are scheduled for the machines that have it (2 to 3 % on incoherent rays); tuning uses no
   # instruction that the pragma does not allow.

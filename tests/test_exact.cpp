@@ -44,6 +44,14 @@ std::vector<KernelRow> single_rows(std::initializer_list<std::string_view> struc
   return rows;
 }
 
+/// Every way of traversal of two BVHs.
+std::vector<KernelRow> rows_of_every_mode() {
+  std::vector<KernelRow> rows;
+  for (const KernelRow& row : kernel_table())
+    if ((row.structure == "bvh4" || row.structure == "bvh8") && row.intersector == "exact" && row.box == "padded" && row.leaf == "triangle4v" && is_available(row.isa)) rows.push_back(row);
+  return rows;
+}
+
 /// What a kernel must answer: the lowest id of those at the nearest t, and t as a float. u and v are near the oracle's, within an ulp.
 struct Truth {
   std::vector<Hit> hits;
@@ -241,6 +249,16 @@ TEST_CASE("exact kernels against the oracle: closed meshes, edges and vertices, 
       check(mesh, rays, Truth::by_oracle(mesh, rays), rows);
     }
   }
+}
+
+TEST_CASE("exact kernels of every mode where the constants of box tests overflow") {
+  const auto rows = rows_of_every_mode();
+  REQUIRE(rows.size() >= 2 * 10);
+  const TriangleMesh mesh = moved(test::sphere(24), 0x1p80f, {0, 0, 0});
+  std::vector<Ray> rays;
+  for (const Vec3f from : {Vec3f{0.01f, 0.02f, 0.03f}, Vec3f{3, 1, -2}})
+    for (const Ray& ray : aimed_rays(mesh, from * 0x1p80f, 50 * effort(), 7)) rays.push_back(ray);
+  check(mesh, rays, Truth::by_oracle(mesh, rays), rows);
 }
 
 TEST_CASE("exact kernels on inputs that once failed") {

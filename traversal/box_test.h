@@ -52,7 +52,6 @@ struct BoxRay {
         fx += ex, fy += ey, fz += ez;
         gx -= ex, gy -= ey, gz -= ez;
       }
-      keep_finite(rx, fx, gx), keep_finite(ry, fy, gy), keep_finite(rz, fz, gz);
     } else {
       rx = 1.0f / d.x, ry = 1.0f / d.y, rz = 1.0f / d.z;
       fx = gx = o.x, fy = gy = o.y, fz = gz = o.z;
@@ -62,12 +61,15 @@ struct BoxRay {
         gx -= ex, gy -= ey, gz -= ez;
       }
     }
-    if (__builtin_expect(!(__builtin_fabsf(fx) + __builtin_fabsf(fy) + __builtin_fabsf(fz) < 0x1p126f), 0))
+    if (__builtin_expect(!(size(fx, gx) + size(fy, gy) + size(fz, gz) < kLargest), 0))
       leave_out(rx, fx, gx), leave_out(ry, fy, gy), leave_out(rz, fz, gz);
     near_x = __builtin_signbit(rx) ? kSide : 0u;
     near_y = 2 * kSide + (__builtin_signbit(ry) ? kSide : 0u);
     near_z = 4 * kSide + (__builtin_signbit(rz) ? kSide : 0u);
   }
+
+  /// Constants whose sizes add up to this much are mended axis by axis; packets ask the same (bvh_packet.h).
+  static constexpr float kLargest = 0x1p125f;
 
  private:
   static ARBORETUM_INLINE float largest(Vec3f d) {
@@ -75,10 +77,11 @@ struct BoxRay {
     const float xy = x > y ? x : y;
     return xy > z ? xy : z;
   }
+  static ARBORETUM_INLINE float size(float f, float g) { return __builtin_fabsf(f) + __builtin_fabsf(g); }
   /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN. Its interval becomes
   /// all t for boxes that exist, and stays empty for others.
   static void leave_out(float& r, float& f, float& g) {
-    if (__builtin_fabsf(f) < 0x1p124f) return;
+    if (size(f, g) < kLargest / 4) return;
     constexpr float largest = std::numeric_limits<float>::max();
     r = __builtin_copysignf(1.0f, r);
     f = kHasFma ? largest : __builtin_copysignf(largest, r);
@@ -86,13 +89,6 @@ struct BoxRay {
   }
   static ARBORETUM_INLINE float reciprocal(float d, float tiny, float limit) {
     return __builtin_fabsf(d) > tiny ? 1.0f / d : __builtin_copysignf(limit, d);
-  }
-  /// Directions so small, or origins so large, that a constant overflows: a NaN would enter boxes that do not exist. Along such an
-  /// axis every box that exists is entered, and those that do not, with infinite planes, never.
-  static ARBORETUM_INLINE void keep_finite(float& r, float& f, float& g) {
-    constexpr float kMost = 0x1.fffffep127f;
-    if (__builtin_expect(__builtin_fabsf(r) <= kMost && __builtin_fabsf(f) <= kMost && __builtin_fabsf(g) <= kMost, 1)) return;
-    r = __builtin_copysignf(0x1p-60f, r), f = kMost, g = -f;
   }
   static ARBORETUM_INLINE float shift(float o, float r, float max_coordinate) {
     return __builtin_copysignf(0x1p-21f * (max_coordinate + __builtin_fabsf(o)) + 0x1p-100f, r);

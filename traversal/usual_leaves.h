@@ -17,5 +17,11 @@ using UsualLeaves = std::conditional_t<
                        TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>, CompiledLeaves<EdgeBlock<8>, MollerTrumbore>,
                                 CompiledLeaves<VertexBlock<8>, Watertight>, CompiledLeaves<VertexBlock<8>, Pluecker>>>>;
 
+/// What ways of traversal for many rays have compiled in: packets, rays in flight.
+using BatchLeaves = std::conditional_t<
+    kRegisterWidth == 1, TypeList<>,
+    std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>, CompiledLeaves<VertexBlock<4>, Watertight>>,
+                       TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>, CompiledLeaves<VertexBlock<8>, Watertight>>>>;
+
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -16,8 +16,8 @@ template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_rows<bvh::Bvh<N>, typename BvhSingle<SoaTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
   add_queued_rows<N>(rows);
-  add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, PacketLeaves{});
-  add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", PacketLeaves{});
+  add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, BatchLeaves{});
+  add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", BatchLeaves{});
   add_stream_rows<N>(rows);
 }
 

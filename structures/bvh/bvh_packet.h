@@ -25,12 +25,6 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Rays of a packet at most.
 inline constexpr int kMostPacketRays = PacketRays::kMost;
 
-/// What large packets have compiled in.
-using PacketLeaves = std::conditional_t<
-    kRegisterWidth == 1, TypeList<>,
-    std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>, CompiledLeaves<VertexBlock<4>, Watertight>>,
-                       TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>, CompiledLeaves<VertexBlock<8>, Watertight>>>>;
-
 /// Where rays with the constants r and c (BoxRay) meet a plane.
 template <class F>
 [[nodiscard]] ARBORETUM_INLINE F plane_distance(F plane, F r, F c) {
@@ -145,7 +139,7 @@ class BvhPackets {
       for (int a = 0; a < 3; ++a) soa_.origin[a][i] = soa_.direction[a][i] = 0.0f;
       soa_.tnear[i] = t_[i] = 0.0f;
     }
-    valid_ = 0;
+    valid_ = overflown_ = 0;
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
     std::uint64_t negative[3] = {};
     for (int c = 0; c < chunks_; ++c) {
@@ -159,6 +153,7 @@ class BvhPackets {
       valid_ |= std::uint64_t(valid.bits()) << k;
       max_x86(tnear, F(0.0f)).store(tnear_ + k);
       if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(soa_, k);
+      F size(0.0f);
       const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest, M(max_coordinate_);
       for (int a = 0; a < 3; ++a) {
         F r, f, g;
@@ -178,8 +173,11 @@ class BvhPackets {
           }
         }
         r.store(r_[a] + k), f.store(near_[a] + k), g.store(far_[a] + k);
+        size = size + (abs(f) + abs(g));
         negative[a] |= std::uint64_t((sign_bits(r) < vi<W>(0)).bits()) << k;
       }
+      const unsigned overflown = (~(size < F(BoxRay<N, true>::kLargest)) & valid).bits();
+      if (__builtin_expect(overflown != 0, 0)) set_one_by_one(overflown, k);
     }
     for (unsigned octant = 0; octant < 8; ++octant) {
       std::uint64_t mask = valid_;
@@ -190,6 +188,24 @@ class BvhPackets {
       for (std::uint64_t rest = valid_; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
         new (static_cast<void*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(rays_[i]));
+      }
+    }
+  }
+
+  /// Rays with constants that overflow, which BoxRay mends. No interval can hold them.
+  __attribute__((noinline)) void set_one_by_one(unsigned lanes, int k) {
+    overflown_ |= std::uint64_t(lanes) << k;
+    const auto set = [&](int i, const auto& box) {
+      r_[0][i] = box.rx, r_[1][i] = box.ry, r_[2][i] = box.rz;
+      near_[0][i] = box.fx, near_[1][i] = box.fy, near_[2][i] = box.fz;
+      far_[0][i] = box.gx, far_[1][i] = box.gy, far_[2][i] = box.gz;
+    };
+    for (; lanes; lanes &= lanes - 1) {
+      const int i = k + __builtin_ctz(lanes);
+      if (padded_) {
+        set(i, BoxRay<N, true>(rays_[i], max_coordinate_));
+      } else {
+        set(i, BoxRay<N, false>(rays_[i], max_coordinate_));
       }
     }
   }
@@ -208,7 +224,7 @@ class BvhPackets {
 
   Interval interval_of(std::uint64_t mask) {
     Interval v;
-    v.usable = true;
+    v.usable = (mask & overflown_) == 0;
     float o_low[3], o_high[3], d_low[3], d_high[3], unused;
     range(tnear_, mask, v.tnear, unused);
     for (int a = 0; a < 3; ++a) range(r_[a], mask, v.r_low[a], v.r_high[a]), range(soa_.origin[a], mask, o_low[a], o_high[a]), range(soa_.direction[a], mask, d_low[a], d_high[a]);
@@ -425,7 +441,7 @@ class BvhPackets {
   Counting counting_;
   const Ray* rays_ = nullptr;
   int threshold_ = 0, chunks_ = 0;
-  std::uint64_t active_ = 0, valid_ = 0;
+  std::uint64_t active_ = 0, valid_ = 0, overflown_ = 0;
   PacketRays soa_;
   alignas(64) float r_[3][kMostPacketRays], near_[3][kMostPacketRays], far_[3][kMostPacketRays], tnear_[kMostPacketRays], t_[kMostPacketRays];
   NearestHit best_[kMostPacketRays];
@@ -442,41 +458,48 @@ class BvhPackets {
   TraversalStack single_stack_;
 };
 
-/// Packets of `Rays` rays that follow each other in the batch; with no more than `Threshold` of them in a node they go on alone.
+/// A batch as packets of `rays_each` rays that follow each other.
+template <class Format, int W, class Leaves, class Counting>
+struct PacketBatch {
+  static __attribute__((noinline)) void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
+    packets<false>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+  }
+  static __attribute__((noinline)) void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters, int rays_each,
+                                                int threshold) {
+    packets<true>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
+  }
+
+ private:
+  template <bool AnyHit, class Report>
+  static ARBORETUM_INLINE void packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
+    BvhPackets<Format, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
+    for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
+      const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
+      packet.trace(&rays[begin], count, threshold);
+      for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
+    }
+    if constexpr (Counting::kCounting) counters->rays += rays.size();
+  }
+};
+
+/// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone.
 template <class Format, int Rays, int Threshold>
 struct BvhPacketFunctions {
   static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
 
-  template <int W, class Leaves, class Counting>
-  struct Batch {
-    static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-      packets<false>(accel, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-    }
-    static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-      packets<true>(accel, row, rays, counters, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-    }
-    template <bool AnyHit, class Report>
-    static ARBORETUM_INLINE void packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
-      BvhPackets<Format, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
-      for (std::size_t begin = 0; begin < rays.size(); begin += Rays) {
-        const int count = int(std::min<std::size_t>(Rays, rays.size() - begin));
-        packet.trace(&rays[begin], count, Threshold);
-        for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
-      }
-      if constexpr (Counting::kCounting) counters->rays += rays.size();
-    }
-  };
-
+  template <class Batch>
+  static RowFunctions functions() {
+    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) { Batch::closest_hit(a, row, rays, hits, c, Rays, Threshold); },
+            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* c) { Batch::any_hit(a, row, rays, occluded, c, Rays, Threshold); }};
+  }
   template <class Leaves, bool>
   static RowFunctions timed() {
-    using B = Batch<(Rays < kNative ? Rays : kNative), Leaves, NoCounters>;
-    return {&B::closest_hit, &B::any_hit};
+    return functions<PacketBatch<Format, (Rays < kNative ? Rays : kNative), Leaves, NoCounters>>();
   }
   /// What is visited does not depend on the lanes.
   template <bool>
   static RowFunctions counting() {
-    using B = Batch<kNative, CalledLeaves, WithCounters>;
-    return {&B::closest_hit, &B::any_hit};
+    return functions<PacketBatch<Format, kNative, CalledLeaves, WithCounters>>();
   }
 };
 

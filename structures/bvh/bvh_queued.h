@@ -286,11 +286,11 @@ struct BvhQueued {
 /// The rows of queued traversal: `queued` with the numbers that paid most (docs/performance.md), and fixed ones.
 template <int N>
 void add_queued_rows(KernelRows& rows) {
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 32, 64>>(rows, "queued", UsualLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 8>>(rows, "queued8", UsualLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 16>>(rows, "queued16", UsualLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 32>>(rows, "queued32", UsualLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 64>>(rows, "queued64", UsualLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 32, 64>>(rows, "queued", BatchLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 8>>(rows, "queued8", BatchLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 16>>(rows, "queued16", BatchLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 32>>(rows, "queued32", BatchLeaves{});
+  add_rows<bvh::Bvh<N>, BvhQueued<N, 64>>(rows, "queued64", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
