@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "intersectors/promises.h"
-#include "rendering/workload.h"
+#include "rendering/hard_workload.h"
 
 namespace arboretum {
 namespace {
@@ -73,6 +73,18 @@ constexpr Summary kWorkloads[] = {
     {"reflection", "closest hit, from the primary hits along the mirror direction"},
     {"diffuse", "closest hit, from the primary hits, cosine-distributed"},
     {"random", "closest hit, between two uniform points of the bounding sphere"},
+    {"hard", "closest hit, all kinds of hard rays in turn: what accuracy is measured by"},
+    {"hard_vertex", "closest hit, aimed at vertices, every fourth exactly"},
+    {"hard_edge", "closest hit, aimed at edges that two triangles share"},
+    {"hard_border", "closest hit, aimed at edges of one triangle, or of more than two"},
+    {"hard_interior", "closest hit, aimed at points within triangles"},
+    {"hard_grazing", "closest hit, nearly in a triangle's plane"},
+    {"hard_axis", "closest hit, along an axis, through vertices, edges and triangles"},
+    {"hard_plane", "closest hit, in the planes of box faces"},
+    {"hard_surface", "closest hit, from points of triangles, or off them by their rounding"},
+    {"hard_far", "closest hit, from 4 to 2^27 scene radii away"},
+    {"hard_interval", "closest hit, with tnear or tfar at the hit"},
+    {"camera_edges", "closest hit, from the camera at edges and vertices: a picture of leaks"},
 };
 
 std::string_view look_up(std::span<const Summary> table, std::string_view key) {
@@ -183,6 +195,7 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
       break;
     case Axis::workload:
       for (std::string_view name : workload_names()) append_new(list, name);
+      for (std::string_view name : hard_workload_names()) append_new(list, name);
       break;
     case Axis::threads:
       break;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/isa.h"
+#include "rendering/self_intersection.h"
 #include "structures/accel.h"
 #include "traversal/kernel_table.h"
 
@@ -18,12 +19,16 @@ struct Cell {
   unsigned threads = 1;
   BuilderParameters parameters;
   std::string parameter_label;        ///< what of `parameters` is swept: ":bins=16"; part of the name
+  SurfaceStart start;                 ///< of workloads whose rays start on surfaces
+  std::string start_label;            ///< where it is swept: ":self_intersection=none"; part of the name
   const KernelRow* kernel = nullptr;  ///< of a trace cell
 
   /// `metric/scene/structure/builder/leaf/intersector/box/traversal/isa/workload/threads:N`; `-` where an
-  /// axis does not apply; swept builder parameters follow the builder: `binned_sah:bins=16`.
+  /// axis does not apply; swept builder parameters follow the builder: `binned_sah:bins=16`; and what is swept of the
+  /// rays follows the workload: `diffuse:self_intersection=none`.
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::string builder_name() const { return builder + parameter_label; }
+  [[nodiscard]] std::string workload_name() const { return workload + start_label; }
 };
 
 struct SkippedCell {

@@ -11,6 +11,7 @@
 #include "experiments/axis_words.h"
 #include "experiments/config_scenes.h"
 #include "experiments/yaml_reader.h"
+#include "rendering/workload.h"
 
 namespace arboretum {
 namespace {
@@ -32,7 +33,7 @@ class ConfigReader {
   Experiment read(const Overrides& overrides) {
     const YAML::Node& root = yaml_.root();
     yaml_.check_map(root, "the configuration",
-                    std::vector<std::string>{"experiment", "scenes", "axes", "parameters", "include",
+                    std::vector<std::string>{"experiment", "scenes", "axes", "parameters", "rays", "include",
                                              "exclude", "measure", "metrics", "plots"});
     experiment_.name = experiment_.file.stem().string();
     if (const auto node = root["experiment"]) read_name(node);
@@ -45,11 +46,13 @@ class ConfigReader {
       yaml_.fail(root["measure"]["threads"], "threads are given in axes too; keep one of the two");
     }
     if (const auto node = root["parameters"]) read_parameters(node);
+    if (const auto node = root["rays"]) read_rays(node);
     if (const auto node = root["include"]) experiment_.include = read_choices(node, "include");
     if (const auto node = root["exclude"]) experiment_.exclude = read_choices(node, "exclude");
     if (const auto node = root["metrics"]) read_metrics(node);
     apply(overrides);
     fill_defaults();
+    refuse_ineffective_rays(root["rays"]);
     if (const auto node = root["plots"])
       read_plots(node);
     else
@@ -100,10 +103,11 @@ class ConfigReader {
 
   std::string known_scene(const YAML::Node& node) {
     std::vector<std::string> names;
-    for (const SceneChoice& s : experiment_.scenes) names.push_back(s.name);
-    if (std::ranges::find(names, node.Scalar()) == names.end())
-      yaml_.fail(node, unknown_name_message("scene", node.Scalar(), names));
-    return node.Scalar();
+    for (const SceneChoice& s : experiment_.scenes) {
+      if (s.is_called(node.Scalar())) return node.Scalar();
+      names.push_back(s.name);
+    }
+    yaml_.fail(node, unknown_name_message("scene", node.Scalar(), names));
   }
 
   std::vector<CellChoice> read_choices(const YAML::Node& node, std::string_view what) {
@@ -138,6 +142,35 @@ class ConfigReader {
         experiment_.parameters[key].push_back(node.Scalar());
       }
     }
+  }
+
+  void read_rays(const YAML::Node& map) {
+    yaml_.check_map(map, "rays", std::vector<std::string>{"self_intersection", "epsilon"});
+    RaySettings& rays = experiment_.rays;
+    if (const auto n = map["self_intersection"]) {
+      const std::vector<std::string> known = strings(kSelfIntersectionNames);
+      rays.self_intersection.clear();
+      for (const YAML::Node& value : yaml_.list(n, "rays: self_intersection")) {
+        const auto found = std::ranges::find(known, value.Scalar());
+        if (found == known.end()) yaml_.fail(value, unknown_name_message("self_intersection", value.Scalar(), known));
+        const auto method = static_cast<SelfIntersection>(found - known.begin());
+        if (std::ranges::find(rays.self_intersection, method) != rays.self_intersection.end())
+          yaml_.fail(value, fmt::format("self_intersection: '{}' is given twice; keep one", value.Scalar()));
+        rays.self_intersection.push_back(method);
+      }
+    }
+    if (const auto n = map["epsilon"]) {
+      rays.epsilon = yaml_.number(n, "epsilon (a share of the scene's diagonal)", 0.0, 1.0);
+      if (std::ranges::find(rays.self_intersection, SelfIntersection::epsilon) == rays.self_intersection.end())
+        yaml_.fail(n, "epsilon has no effect without self_intersection: epsilon; take it out");
+    }
+  }
+
+  /// `node`: the configuration's `rays`, or none.
+  void refuse_ineffective_rays(const YAML::Node& node) {
+    if (!node || experiment_.overridden) return;
+    if (!has_rays_on_surfaces(experiment_))
+      yaml_.fail(node, "rays has no effect: no workload starts on surfaces (shadow, ambient_occlusion, reflection, diffuse)");
   }
 
   void read_measure(const YAML::Node& map) {
@@ -239,8 +272,9 @@ class ConfigReader {
   void choose_scenes(const std::vector<std::string>& words) {
     std::vector<SceneChoice> chosen;
     for (const std::string& word : words) {
-      const auto known = std::ranges::find(experiment_.scenes, word, &SceneChoice::name);
-      chosen.push_back(known != experiment_.scenes.end() ? *known : scene_of_word(word));
+      const std::size_t before = chosen.size();
+      std::ranges::copy_if(experiment_.scenes, std::back_inserter(chosen), [&](const SceneChoice& s) { return s.is_called(word); });
+      if (chosen.size() == before) chosen.push_back(scene_of_word(word));
     }
     experiment_.scenes = chosen;
   }
@@ -272,6 +306,11 @@ class ConfigReader {
 };
 
 }  // namespace
+
+bool has_rays_on_surfaces(const Experiment& experiment) {
+  const auto has = [](const AxisLists& axes) { return std::ranges::any_of(axes[index_of(Axis::workload)], starts_on_surfaces); };
+  return has(experiment.axes) || std::ranges::any_of(experiment.include, [&](const CellChoice& c) { return has(c.axes); });
+}
 
 std::span<const std::string_view> plot_names() {
   return kPlots;

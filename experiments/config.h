@@ -11,17 +11,29 @@
 
 #include "experiments/axes.h"
 #include "experiments/parameters.h"
+#include "rendering/self_intersection.h"
 #include "scenes/scene.h"
 
 namespace arboretum {
 
 inline constexpr std::array<std::string_view, 4> kMetricNames{"trace", "build", "quality", "accuracy"};
 
+/// What is done to a scene's coordinates: stretched along y, sized, then moved by offset * (1, -3/4, 1/2), rounded once. A scene
+/// that is placed loses its camera and lights (it is framed whole) and its instances.
+struct Placing {
+  double stretch = 1.0, size = 1.0, offset = 0.0;
+  std::string label = {};  ///< what the configuration says of it: ":size=100:offset=1e4"; empty: nothing
+};
+
 struct SceneChoice {
   SceneSpec spec;
   std::string name;          ///< as in cell names
   bool moves = false;        ///< it has key frames, and its shutter opens
   std::string missing = {};  ///< why an optional scene is not here: its cells are skipped with this reason
+  Placing placing = {};
+  /// The name without the placing: include, exclude and the command line may name all placings of a scene by it.
+  [[nodiscard]] std::string family() const { return name.substr(0, name.size() - placing.label.size()); }
+  [[nodiscard]] bool is_called(std::string_view word) const { return word == name || word == family(); }
 };
 
 /// One entry of `include` or `exclude`. An empty list: the axis is not named.
@@ -41,6 +53,12 @@ struct MeasureSettings {
   std::filesystem::path structure_cache = {};  ///< folder of built structures to load and keep; empty: none
 };
 
+/// Of all workloads together; ineffective where none starts on surfaces.
+struct RaySettings {
+  std::vector<SelfIntersection> self_intersection{SelfIntersection::error_bound};  ///< several are swept
+  double epsilon = SurfaceStart{}.epsilon;
+};
+
 struct Metrics {
   bool trace = true, build = true, quality = true, accuracy = true;
 };
@@ -51,6 +69,7 @@ struct Experiment {
   std::vector<SceneChoice> scenes;
   AxisLists axes;  ///< every axis has a value
   ParameterSweep parameters;
+  RaySettings rays;
   std::vector<CellChoice> include, exclude;
   MeasureSettings measure;
   Metrics metrics;
@@ -65,6 +84,9 @@ struct Overrides {
   std::optional<std::uint64_t> seed = {};
   std::optional<double> min_time = {};
 };
+
+/// Whether a workload of the sweep starts on surfaces, so that RaySettings mean something.
+[[nodiscard]] bool has_rays_on_surfaces(const Experiment& experiment);
 
 /// Plots that plots/plot.py draws.
 [[nodiscard]] std::span<const std::string_view> plot_names();

@@ -59,10 +59,15 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
       yaml.fail(node, e.what());
     }
   }
-  yaml.check_map(node, "a scene", std::vector<std::string>{"file", "scene", "generate", "triangles", "seed", "optional"});
-  const int forms = int(bool(node["file"])) + int(bool(node["scene"])) + int(bool(node["generate"]));
-  if (forms != 1) yaml.fail(node, "a scene has exactly one of file, scene and generate");
+  yaml.check_map(node, "a scene", std::vector<std::string>{"file", "scene", "generate", "catalogue", "triangles", "seed", "optional",
+                                                           "stretch", "size", "offset"});
+  const int forms = int(bool(node["file"])) + int(bool(node["scene"])) + int(bool(node["generate"])) + int(bool(node["catalogue"]));
+  if (forms != 1) yaml.fail(node, "a scene has exactly one of file, scene, generate and catalogue");
   SceneSpec spec;
+  if (const auto n = node["catalogue"]) {
+    if (node["optional"]) yaml.fail(node["optional"], "optional has no effect with catalogue: take it out");
+    spec = read_scene(yaml, n, folder, missing);
+  }
   bool optional = false;
   if (const auto n = node["optional"]) {
     const std::string word = yaml.text(n, "optional");
@@ -80,7 +85,7 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
     spec.triangles = find_catalogue_entry(spec.generator).triangles;
   }
   for (const char* key : {"triangles", "seed"}) {
-    if (node[key] && spec.generator.empty())
+    if (node[key] && !node["generate"])
       yaml.fail(node[key], fmt::format("{} has no effect without generate: take it out", key));
   }
   if (const auto n = node["triangles"])
@@ -88,6 +93,30 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
   if (const auto n = node["seed"])
     spec.seed = yaml.integer(n, "seed", 0, std::numeric_limits<std::uint64_t>::max());
   return spec;
+}
+
+/// Each of the values that `key` has, `usual` where it is not there.
+struct PlacingValue {
+  double value;
+  std::string label;
+};
+std::vector<PlacingValue> placing_values(const YamlReader& yaml, const YAML::Node& node, const std::string& key, double low, double high, double usual) {
+  if (!node.IsMap() || !node[key]) return {{usual, ""}};
+  std::vector<PlacingValue> values;
+  for (const YAML::Node& n : yaml.list(node[key], key)) {
+    values.push_back({yaml.number(n, key, low, high), fmt::format(":{}={}", key, n.Scalar())});
+  }
+  return values;
+}
+
+/// Every combination of the values given.
+std::vector<Placing> read_placings(const YamlReader& yaml, const YAML::Node& node) {
+  std::vector<Placing> placings;
+  for (const auto& stretch : placing_values(yaml, node, "stretch", 1e-9, 1e9, 1.0))
+    for (const auto& size : placing_values(yaml, node, "size", 1e-9, 1e9, 1.0))
+      for (const auto& offset : placing_values(yaml, node, "offset", -kMaxCoordinate, kMaxCoordinate, 0.0))
+        placings.push_back({stretch.value, size.value, offset.value, fmt::format("{}{}{}", stretch.label, size.label, offset.label)});
+  return placings;
 }
 
 /// A name that is a part of cell names: no '/', which parts them.
@@ -106,14 +135,16 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
   std::vector<SceneChoice> scenes;
   for (const YAML::Node& entry : node) {
     std::string missing;
-    SceneSpec spec = read_scene(yaml, entry, folder, missing);
-    std::string name = cell_word(spec.name());
-    if (std::ranges::find(scenes, name, &SceneChoice::name) != scenes.end()) {
-      yaml.fail(entry,
-                fmt::format("scene '{}' is given twice; keep one, or give the files different names", name));
-    }
+    const SceneSpec spec = read_scene(yaml, entry, folder, missing);
     const bool moves = missing.empty() && scene_moves(spec);
-    scenes.push_back({std::move(spec), std::move(name), moves, std::move(missing)});
+    for (const Placing& placing : read_placings(yaml, entry)) {
+      const std::string name = fmt::format("{}{}", cell_word(spec.name()), placing.label);
+      if (std::ranges::find(scenes, name, &SceneChoice::name) != scenes.end()) {
+        yaml.fail(entry,
+                  fmt::format("scene '{}' is given twice; keep one, or give the files different names", name));
+      }
+      scenes.push_back({spec, name, moves, missing, placing});
+    }
   }
   return scenes;
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cstdint>
 
 namespace arboretum {
@@ -16,11 +17,13 @@ void emit_list(YAML::Emitter& out, const std::vector<std::string>& values) {
 
 void emit_scene(YAML::Emitter& out, const SceneChoice& scene) {
   const SceneSpec& spec = scene.spec;
-  if (!spec.catalogue.empty()) {
+  const Placing& placing = scene.placing;
+  if (!spec.catalogue.empty() && placing.label.empty()) {
     out << spec.catalogue;
     return;
   }
   out << YAML::Flow << YAML::BeginMap;
+  if (!spec.catalogue.empty()) out << YAML::Key << "catalogue" << YAML::Value << spec.catalogue;
   const auto path = [&](const std::filesystem::path& file) {  // one that is missing has no place
     return scene.missing.empty() ? std::filesystem::absolute(file).lexically_normal().string() : file.string();
   };
@@ -30,6 +33,12 @@ void emit_scene(YAML::Emitter& out, const SceneChoice& scene) {
   if (!spec.generator.empty()) {
     out << YAML::Key << "generate" << YAML::Value << spec.generator << YAML::Key << "triangles" << YAML::Value
         << spec.triangles << YAML::Key << "seed" << YAML::Value << spec.seed;
+  }
+  // As the configuration has them: they are a part of the name.
+  for (std::string_view label = placing.label; !label.empty();) {
+    const std::string_view pair = label.substr(1, label.find(':', 1) - 1);
+    out << YAML::Key << std::string(pair.substr(0, pair.find('='))) << YAML::Value << std::string(pair.substr(pair.find('=') + 1));
+    label.remove_prefix(pair.size() + 1);
   }
   out << YAML::EndMap;
 }
@@ -53,6 +62,16 @@ void emit_choices(YAML::Emitter& out, std::string_view key, const std::vector<Ce
   out << YAML::EndSeq;
 }
 
+void emit_rays(YAML::Emitter& out, const RaySettings& rays) {
+  std::vector<std::string> ways;
+  for (SelfIntersection way : rays.self_intersection) ways.emplace_back(to_string(way));
+  out << YAML::Key << "rays" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "self_intersection" << YAML::Value;
+  emit_list(out, ways);
+  if (std::ranges::find(rays.self_intersection, SelfIntersection::epsilon) != rays.self_intersection.end())
+    out << YAML::Key << "epsilon" << YAML::Value << fmt::format("{}", rays.epsilon);
+  out << YAML::EndMap;
+}
+
 /// `whole`: with what changes no measured number: plots, and the folder of saved structures.
 std::string text(const Experiment& e, bool whole) {
   YAML::Emitter out;
@@ -72,6 +91,7 @@ std::string text(const Experiment& e, bool whole) {
         out, named == e.parameters.end() ? std::vector<std::string>{default_parameter(name)} : named->second);
   }
   out << YAML::EndMap;
+  if (has_rays_on_surfaces(e)) emit_rays(out, e.rays);
   emit_choices(out, "include", e.include);
   emit_choices(out, "exclude", e.exclude);
   const MeasureSettings& m = e.measure;

@@ -8,12 +8,13 @@
 #include <set>
 
 #include "core/error.h"
+#include "rendering/workload.h"
 
 namespace arboretum {
 
 std::string Cell::name() const {
   return fmt::format("{}/{}/{}/{}/{}/{}/{}/{}/{}/{}/threads:{}", to_string(metric), scene, structure,
-                     builder_name(), leaf, intersector, box, traversal, to_string(isa), workload, threads);
+                     builder_name(), leaf, intersector, box, traversal, to_string(isa), workload_name(), threads);
 }
 
 namespace {
@@ -55,16 +56,24 @@ class Planner {
                 for (const std::string& traversal : values(Axis::traversal))
                   for (const std::string& isa : values(Axis::isa))
                     for (const std::string& workload : values(Axis::workload))
-                      for (const std::string& threads : values(Axis::threads)) {
-                        Cell cell;
-                        cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
-                        cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
-                        cell.intersector = intersector, cell.box = box, cell.traversal = traversal;
-                        cell.isa = *parse_isa(isa), cell.workload = workload;
-                        cell.threads = static_cast<unsigned>(std::stoul(threads));
-                        cell.parameters = point.parameters, cell.parameter_label = point.label;
-                        add(std::move(cell), out);
-                      }
+                      for (SelfIntersection start : starts_of(workload))
+                        for (const std::string& threads : values(Axis::threads)) {
+                          Cell cell;
+                          cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
+                          cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
+                          cell.intersector = intersector, cell.box = box, cell.traversal = traversal;
+                          cell.isa = *parse_isa(isa), cell.workload = workload;
+                          cell.threads = static_cast<unsigned>(std::stoul(threads));
+                          cell.parameters = point.parameters, cell.parameter_label = point.label;
+                          cell.start = {start, experiment_.rays.epsilon};
+                          if (starts_of(workload).size() > 1) cell.start_label = fmt::format(":self_intersection={}", to_string(start));
+                          add(std::move(cell), out);
+                        }
+  }
+
+  /// The ways of leaving a surface that make cells of the workload; the usual one for rays that start elsewhere.
+  std::vector<SelfIntersection> starts_of(const std::string& workload) const {
+    return starts_on_surfaces(workload) ? experiment_.rays.self_intersection : std::vector{SelfIntersection::error_bound};
   }
 
   /// `all` is each builder of the structure; one that is named beside it does not come twice.
@@ -150,8 +159,12 @@ class Planner {
     return {};
   }
 
+  static bool names_scene(const CellChoice& choice, const SceneChoice& scene) {
+    return choice.scenes.empty() || std::ranges::any_of(choice.scenes, [&](const std::string& word) { return scene.is_called(word); });
+  }
+
   bool matches(const CellChoice& choice, const Cell& cell) const {
-    if (!choice.scenes.empty() && !contains(choice.scenes, cell.scene)) return false;
+    if (!names_scene(choice, experiment_.scenes[cell.scene_index])) return false;
     const std::string values[kAxisCount] = {cell.structure,
                                             cell.builder,
                                             cell.leaf,
@@ -198,7 +211,7 @@ class Planner {
   /// traversal that the structure does not take gives way to its own default.
   void add_include(std::size_t index, std::size_t scene, std::vector<Cell>& out) {
     const CellChoice& choice = experiment_.include[index];
-    if (!choice.scenes.empty() && !contains(choice.scenes, experiment_.scenes[scene].name)) return;
+    if (!names_scene(choice, experiment_.scenes[scene])) return;
     for (const std::string& structure : choice.axes[index_of(Axis::structure)]) {
       AxisLists lists = choice.axes;
       lists[index_of(Axis::structure)] = {structure};
@@ -231,6 +244,7 @@ class Planner {
       cell.metric = Cell::Metric::build;
       cell.kernel = nullptr;
       cell.intersector = cell.box = cell.traversal = cell.workload = kNone;
+      cell.start = {}, cell.start_label.clear();
       if (seen.insert(cell.name()).second) plan_.cells.push_back(std::move(cell));
     }
   }

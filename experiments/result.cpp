@@ -1,6 +1,9 @@
 #include "experiments/result.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "experiments/sampling.h"
@@ -115,11 +118,32 @@ void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit) {
   facts["t_error_ulp_max"] = check.t_error_ulp_max;
 }
 
+void add_facts(Json& facts, const StartCheck& check, bool closest_hit) {
+  const double million = 1e6 / static_cast<double>(std::max<std::uint64_t>(check.rays, 1));
+  facts["self_hits"] = check.self_hits, facts["self_hits_per_million"] = static_cast<double>(check.self_hits) * million;
+  if (closest_hit) facts["near_hits"] = check.near_hits, facts["near_hits_per_million"] = static_cast<double>(check.near_hits) * million;
+  facts["leaks"] = check.leaks, facts["leaks_per_million"] = static_cast<double>(check.leaks) * million;
+}
+
+Json picture_points(std::span<const std::array<float, 2>> points, std::size_t most) {
+  Json list = Json::array();
+  const std::size_t step = std::max<std::size_t>(1, (points.size() + most - 1) / most);
+  for (std::size_t i = 0; i < points.size(); i += step) {
+    const auto [x, y] = points[i];
+    if (std::isfinite(x) && std::isfinite(y)) list.push_back({std::round(x * 10.0) / 10.0, std::round(y * 10.0) / 10.0});
+  }
+  return list;
+}
+
+std::string seen_points_file(const std::string& scene) {
+  return fmt::format("camera_edges-{}.json", scene);
+}
+
 void add_axes(Json& json, const Cell& cell) {
   json["metric"] = to_string(cell.metric), json["scene"] = cell.scene, json["structure"] = cell.structure;
   json["builder"] = cell.builder_name(), json["leaf"] = cell.leaf, json["intersector"] = cell.intersector;
   json["box"] = cell.box, json["traversal"] = cell.traversal, json["isa"] = to_string(cell.isa);
-  json["workload"] = cell.workload, json["threads"] = cell.threads;
+  json["workload"] = cell.workload_name(), json["threads"] = cell.threads;
 }
 
 Json repetition_entry(const CellResult& result, const Repetition& repetition) {
@@ -134,6 +158,7 @@ Json repetition_entry(const CellResult& result, const Repetition& repetition) {
   }
   add_axes(entry, result.cell);
   entry.update(result.facts);
+  if (repetition.index != 0) entry.erase(kLeakPoints);
   return entry;
 }
 
@@ -166,6 +191,7 @@ std::vector<Json> aggregate_entries(const CellResult& result) {
         entry["rays_per_cpu_second_low"] = cpu_rate.low, entry["rays_per_cpu_second_high"] = cpu_rate.high;
       }
       entry.update(result.facts);
+      entry.erase(kLeakPoints);
     }
     if (name == "stddev" || name == "cv") {
       const bool relative = name == "cv";

@@ -1,14 +1,16 @@
 // CellResult: what was measured of a cell, and how it reads as JSON.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "experiments/cell.h"
-#include "oracle/oracle.h"
+#include "oracle/start_check.h"
 #include "structures/accel.h"
 #include "structures/statistics.h"
 #include "traversal/kernel_table.h"
@@ -44,6 +46,12 @@ struct CellResult {
 void add_facts(Json& facts, const StructureStatistics& statistics);
 void add_facts(Json& facts, const Counters& counters);
 void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit);
+void add_facts(Json& facts, const StartCheck& check, bool closest_hit);
+/// Points of a picture, in tenths of a pixel, at most so many of them, evenly taken; those beside the picture are left out.
+[[nodiscard]] Json picture_points(std::span<const std::array<float, 2>> points, std::size_t most);
+/// The fact that only a cell's first repetition repeats, and the file of a scene that it belongs to.
+inline constexpr const char* kLeakPoints = "leak_points";
+[[nodiscard]] std::string seen_points_file(const std::string& scene);
 /// The cell's name as fields of their own; `threads` as a number.
 void add_axes(Json& json, const Cell& cell);
 

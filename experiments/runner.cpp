@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/error.h"
+#include "experiments/append_file.h"
 #include "experiments/build_job.h"
 #include "experiments/interleave.h"
 #include "experiments/progress.h"
@@ -22,6 +23,7 @@ namespace arboretum {
 namespace {
 
 constexpr unsigned kFewestBuilds = 3;     // repetitions of a build cell at least
+constexpr std::size_t kMostSeenPoints = 30000;
 constexpr std::size_t kPrepareUnits = 2;  // making a cell ready takes about two repetitions
 
 class Runner {
@@ -123,13 +125,13 @@ class Runner {
     std::map<std::string, std::size_t> users;
     for (const Cell* cell : batch) {
       ++users[pool.key(*cell)];
-      if (std::ranges::find(workloads, cell->workload) == workloads.end())
-        workloads.push_back(cell->workload);
+      if (std::ranges::find(workloads, cell->workload_name()) == workloads.end())
+        workloads.push_back(cell->workload_name());
     }
     for (const std::string& name : workloads) {
       std::vector<const Cell*> cells;
       std::ranges::copy_if(batch, std::back_inserter(cells),
-                           [&](const Cell* c) { return c->workload == name; });
+                           [&](const Cell* c) { return c->workload_name() == name; });
       if (!outcome_.stopped) trace_workload(cells, data, pool);
       for (const Cell* cell : cells)
         if (--users[pool.key(*cell)] == 0) pool.release(pool.key(*cell));
@@ -137,12 +139,13 @@ class Runner {
   }
 
   void trace_workload(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {
-    const Workload& workload = data.workload(cells.front()->workload);
+    const Workload& workload = data.workload(cells.front()->workload, cells.front()->start);
     if (workload.rays.empty()) {
       for (const Cell* cell : cells)
         fail(*cell, fmt::format("no {} rays: no primary ray hits the scene", workload.name));
       return;
     }
+    if (experiment_.metrics.accuracy && !workload.pixels.empty()) keep_seen_points(data, workload);
     AnswerBuffers buffers;
     std::deque<TraceJob> jobs;
     std::vector<InterleavedJob> interleaved;
@@ -151,6 +154,7 @@ class Runner {
       TraceJob& job = jobs.emplace_back(*cell, accel, workload, buffers);
       Running& running = begin(*cell);
       running.result.facts.update(pool.facts(*cell, accel));
+      running.result.facts.update(data.facts());
       pool.add_build_facts(*cell, running.result.facts);
       job.prepare(running.result.facts, experiment_.metrics.accuracy ? &data : nullptr, experiment_.measure);
       interleaved.push_back(
@@ -161,6 +165,13 @@ class Runner {
       }
     }
     run_interleaved(std::move(interleaved));
+  }
+
+  /// What the picture of leaks is drawn on.
+  void keep_seen_points(SceneData& data, const Workload& workload) const {
+    const MeasureSettings& m = experiment_.measure;
+    const Json file{{"scene", data.name()}, {"width", m.width}, {"height", m.height}, {"points", picture_points(data.seen_pixels(workload), kMostSeenPoints)}};
+    write_whole(journal_.folder() / seen_points_file(data.name()), file.dump() + "\n");
   }
 
   void run_builds(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {

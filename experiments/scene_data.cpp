@@ -2,9 +2,32 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/timer.h"
+#include "experiments/exclusion.h"
+#include "experiments/sampling.h"
+#include "rendering/hard_workload.h"
+#include "scenes/sanitise.h"
+#include "scenes/vec3d.h"
 
 namespace arboretum {
+namespace {
+
+/// Longest edge over the height on it.
+double median_aspect(const TriangleMesh& mesh) {
+  std::vector<double> aspects;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const auto c = mesh.corners(i);
+    const Vec3d a(c[0]), b(c[1]), d(c[2]);
+    const double longest = std::max({length(b - a), length(d - b), length(a - d)});
+    aspects.push_back(longest * longest / length(cross(b - a, d - a)));
+  }
+  return median(aspects);
+}
+
+}  // namespace
 
 SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, NoteFunction note)
     : name_(choice.name),
@@ -12,6 +35,7 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
       note_(std::move(note)) {
   const double begin = wall_seconds();
   scene_ = load_scene(choice.spec);
+  if (!choice.placing.label.empty()) place(choice.placing);
   note_(fmt::format("{}: {} triangles, loaded in {:.2f} s", name_, mesh().size(), wall_seconds() - begin));
   const LoadReport& report = scene_.report;
   if (report.non_finite + report.out_of_range + report.degenerate > 0) {
@@ -19,6 +43,23 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
                       name_, report.non_finite, report.out_of_range, report.degenerate));
   }
   for (const std::string& warning : report.warnings) note_(fmt::format("{}: {}", name_, warning));
+}
+
+void SceneData::place(const Placing& placing) {
+  const double by[3] = {placing.offset, -0.75 * placing.offset, 0.5 * placing.offset};
+  const auto move = [&](std::vector<Vec3f>& vertices) {
+    for (Vec3f& v : vertices)
+      for (std::size_t axis = 0; axis < 3; ++axis) v[axis] = float(double(v[axis]) * (axis == 1 ? placing.stretch : 1.0) * placing.size + by[axis]);
+  };
+  move(scene_.mesh.vertices);
+  for (auto& frame : scene_.mesh.later_frames) move(frame);
+  scene_.mesh.instancing.reset();
+  scene_.camera.reset();
+  scene_.lights.clear();
+  sanitise(scene_, name_);  // rounding may have left triangles without area
+  const Bounds3f box = mesh().bounds();
+  facts_["offset"] = placing.offset, facts_["radius"] = 0.5 * length(Vec3d(box.upper) - Vec3d(box.lower));
+  facts_["triangle_aspect_median"] = median_aspect(mesh());
 }
 
 Oracle& SceneData::oracle() {
@@ -30,40 +71,93 @@ Oracle& SceneData::oracle() {
   return *oracle_;
 }
 
-const Workload& SceneData::workload(const std::string& name) {
-  if (const auto known = workloads_.find(name); known != workloads_.end()) return known->second;
-  if (!workloads_.contains("primary")) workloads_.emplace("primary", make_primary(scene_, view_));
-  const Workload& primary = workloads_.at("primary");
-  if (name == "primary") return primary;
-  if (is_secondary(name) && primary_hits_.empty()) {
+const Workload& SceneData::workload(const std::string& name, SurfaceStart start) {
+  if (!starts_on_surfaces(name)) start = {};
+  if (const auto known = workloads_.find({name, start.method}); known != workloads_.end()) return known->second;
+  const auto keep = [&](const std::string& of, SelfIntersection method, Workload made) -> const Workload& {
+    return workloads_.emplace(std::pair{of, method}, std::move(made)).first->second;
+  };
+  if (is_hard(name)) return keep(name, start.method, make_hard_workload(name, scene_, view_));
+  if (name == "primary") return keep(name, start.method, make_primary(scene_, view_));
+  const Workload& primary = workload("primary");
+  if (starts_on_surfaces(name) && primary_hits_.empty()) {
     for (const ExactHit& exact : closest_truth(primary)) primary_hits_.push_back(exact.hit);
   }
-  return workloads_.emplace(name, make_workload(name, scene_, view_, primary.batch(), primary_hits_))
-      .first->second;
+  View view = view_;
+  view.start = start;
+  return keep(name, start.method, make_workload(name, scene_, view, primary.batch(), primary_hits_));
+}
+
+template <class Answers, class Compute>
+const Answers& SceneData::truth(Answers& entry, const Workload& workload, std::string_view of, const Compute& compute) {
+  Oracle& exact = oracle();
+  const double begin = wall_seconds();
+  entry = compute(exact);
+  note_(fmt::format("{}/{}: exact answers of {} rays{} in {:.2f} s", name_, workload.name, workload.rays.size(), of, wall_seconds() - begin));
+  return entry;
 }
 
 const std::vector<ExactHit>& SceneData::closest_truth(const Workload& workload) {
-  auto [entry, fresh] = closest_truth_.try_emplace(workload.name);
-  if (fresh) {
-    Oracle& exact = oracle();
-    const double begin = wall_seconds();
-    entry->second = exact.closest_hit(workload.batch());
-    note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name,
-                      workload.rays.size(), wall_seconds() - begin));
-  }
-  return entry->second;
+  auto [entry, fresh] = closest_truth_.try_emplace(&workload);
+  if (!fresh) return entry->second;
+  return truth(entry->second, workload, "", [&](const Oracle& exact) {
+    return workload.excludes_sources ? closest_hit_excluding(exact, workload.batch(), workload.sources) : exact.closest_hit(workload.batch());
+  });
 }
 
 const std::vector<std::uint8_t>& SceneData::any_truth(const Workload& workload) {
-  auto [entry, fresh] = any_truth_.try_emplace(workload.name);
-  if (fresh) {
-    Oracle& exact = oracle();
-    const double begin = wall_seconds();
-    entry->second = exact.any_hit(workload.batch());
-    note_(fmt::format("{}/{}: exact answers of {} rays in {:.2f} s", name_, workload.name,
-                      workload.rays.size(), wall_seconds() - begin));
+  auto [entry, fresh] = any_truth_.try_emplace(&workload);
+  if (!fresh) return entry->second;
+  return truth(entry->second, workload, "", [&](const Oracle& exact) {
+    if (!workload.excludes_sources) return exact.any_hit(workload.batch());
+    std::vector<std::uint8_t> occluded;
+    for (const ExactHit& h : closest_hit_excluding(exact, workload.batch(), workload.sources)) occluded.push_back(h.hit.is_hit());
+    return occluded;
+  });
+}
+
+const std::vector<ExactHit>& SceneData::start_truth(const Workload& workload) {
+  auto [entry, fresh] = start_truth_.try_emplace(workload.name);
+  if (!fresh) return entry->second;
+  return truth(entry->second, workload, " from their hit points",
+               [&](const Oracle& exact) { return exact.closest_hit_from(workload.starts, {workload.references, workload.times}, workload.sources); });
+}
+
+std::vector<std::array<float, 2>> SceneData::seen_pixels(const Workload& workload) {
+  const auto& truth = closest_truth(workload);
+  std::vector<std::array<float, 2>> seen;
+  for (std::size_t i = 0; i < workload.pixels.size(); ++i) {  // they are aimed from t = 0 to t = 1
+    if (truth[i].hit.is_hit() && std::fabs(truth[i].t - 1.0) < 1e-3) seen.push_back(workload.pixels[i]);
   }
-  return entry->second;
+  return seen;
+}
+
+std::vector<std::array<float, 2>> SceneData::leak_pixels(const Workload& workload, std::span<const Hit> answers) {
+  const auto& truth = closest_truth(workload);
+  std::vector<std::array<float, 2>> leaks;
+  for (std::size_t i = 0; i < workload.pixels.size(); ++i) {
+    if (oracle().judge(workload.rays[i], workload.batch().time(i), truth[i], answers[i]).crack) leaks.push_back(workload.pixels[i]);
+  }
+  return leaks;
+}
+
+StartCheck SceneData::check_starts(const Workload& workload, std::span<const Hit> answers) {
+  return check_closest_starts(start_truth(workload), answers, workload.sources);
+}
+
+StartCheck SceneData::check_starts(const Workload& workload, std::span<const std::uint8_t> answers) {
+  return check_any_starts(start_truth(workload), answers);
+}
+
+double SceneData::start_distance(const Workload& workload) const {
+  const Bounds3f box = mesh().bounds();
+  const double diagonal = length(Vec3d(box.upper) - Vec3d(box.lower));
+  double sum = 0.0;
+  for (std::size_t i = 0; i < workload.starts.size(); ++i) {
+    const auto& p = workload.starts[i];
+    sum += length(Vec3d(workload.rays[i].origin) - Vec3d(p[0], p[1], p[2])) + double(workload.rays[i].tnear);
+  }
+  return sum / (diagonal * double(std::max<std::size_t>(workload.starts.size(), 1)));
 }
 
 AnswerCheck SceneData::check(const Workload& workload, std::span<const Hit> answers) {

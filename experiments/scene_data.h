@@ -2,14 +2,18 @@
 // cells.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "experiments/config.h"
-#include "oracle/oracle.h"
+#include "experiments/result.h"
+#include "oracle/start_check.h"
 #include "rendering/workload.h"
 #include "scenes/scene.h"
 
@@ -25,25 +29,45 @@ class SceneData {
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return scene_.mesh; }
-  [[nodiscard]] const Workload& workload(const std::string& name);
-  /// Against the oracle; the truth is computed at the first call for a workload.
+  /// Of a scene that is placed: `offset`, `radius` (half the diagonal), `triangle_aspect_median`.
+  [[nodiscard]] const Json& facts() const noexcept { return facts_; }
+  /// `start`: of workloads whose rays start on surfaces. The reference stays.
+  [[nodiscard]] const Workload& workload(const std::string& name, SurfaceStart start = {});
+  /// Against the oracle; the truth is computed at the first call for a workload, which is one of workload().
   [[nodiscard]] AnswerCheck check(const Workload& workload, std::span<const Hit> answers);
   [[nodiscard]] AnswerCheck check(const Workload& workload, std::span<const std::uint8_t> answers);
+  /// Of `camera_edges`: where in the picture rays are aimed at an edge or vertex that the camera sees.
+  [[nodiscard]] std::vector<std::array<float, 2>> seen_pixels(const Workload& workload);
+  /// Of `camera_edges`: where in the picture answers are cracks.
+  [[nodiscard]] std::vector<std::array<float, 2>> leak_pixels(const Workload& workload, std::span<const Hit> answers);
+  /// Of rays that start on surfaces.
+  [[nodiscard]] StartCheck check_starts(const Workload& workload, std::span<const Hit> answers);
+  [[nodiscard]] StartCheck check_starts(const Workload& workload, std::span<const std::uint8_t> answers);
+  /// How far from their hit points rays begin on average, as a share of the scene's diagonal.
+  [[nodiscard]] double start_distance(const Workload& workload) const;
 
  private:
+  /// Before any ray is made.
+  void place(const Placing& placing);
   Oracle& oracle();
+  /// Computes, and notes how long it took; `of` says more of the rays.
+  template <class Answers, class Compute>
+  const Answers& truth(Answers& entry, const Workload& workload, std::string_view of, const Compute& compute);
   const std::vector<ExactHit>& closest_truth(const Workload& workload);
   const std::vector<std::uint8_t>& any_truth(const Workload& workload);
+  const std::vector<ExactHit>& start_truth(const Workload& workload);
 
   std::string name_;
   View view_;
   NoteFunction note_;
   Scene scene_;
   std::unique_ptr<Oracle> oracle_;
+  Json facts_ = Json::object();
   std::vector<Hit> primary_hits_;  ///< the oracle's
-  std::map<std::string, Workload> workloads_;
-  std::map<std::string, std::vector<ExactHit>> closest_truth_;
-  std::map<std::string, std::vector<std::uint8_t>> any_truth_;
+  std::map<std::pair<std::string, SelfIntersection>, Workload> workloads_;
+  std::map<const Workload*, std::vector<ExactHit>> closest_truth_;
+  std::map<const Workload*, std::vector<std::uint8_t>> any_truth_;
+  std::map<std::string, std::vector<ExactHit>> start_truth_;  ///< the same for all ways of leaving the surface
 };
 
 }  // namespace arboretum

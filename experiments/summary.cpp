@@ -26,7 +26,7 @@ const CellResult* embree_beside(const CellResult& r, const std::vector<CellResul
   const CellResult* best = nullptr;
   for (const CellResult& other : all) {
     const Cell &a = r.cell, &b = other.cell;
-    if (b.structure != "embree" || !other.is_trace() || a.scene != b.scene || a.workload != b.workload ||
+    if (b.structure != "embree" || !other.is_trace() || a.scene != b.scene || a.workload_name() != b.workload_name() ||
         a.isa != b.isa || a.threads != b.threads) {
       continue;
     }
@@ -114,7 +114,7 @@ std::string result_tables(const RunOutcome& outcome) {
   std::vector<std::pair<std::string, std::vector<const CellResult*>>> groups;
   for (const CellResult& r : outcome.results) {
     if (!r.is_trace()) continue;
-    const std::string title = r.cell.scene + ", " + r.cell.workload;
+    const std::string title = r.cell.scene + ", " + r.cell.workload_name();
     auto group =
         std::ranges::find(groups, title, &std::pair<std::string, std::vector<const CellResult*>>::first);
     if (group == groups.end()) group = groups.insert(groups.end(), {title, {}});

@@ -6,12 +6,14 @@
 #include <cmath>
 
 #include "core/timer.h"
+#include "experiments/exclusion.h"
 
 namespace arboretum {
 namespace {
 
 constexpr std::size_t kRaysPerTask = 4096;  // 64 x 64 pixels of the Morton order
 constexpr std::uint64_t kMostPasses = 1'000'000;
+constexpr std::size_t kMostPoints = 4000;  // of a cell's leaks
 
 }  // namespace
 
@@ -27,14 +29,29 @@ TraceJob::TraceJob(const Cell& cell, const Accel& accel, const Workload& workloa
     buffers.occluded.resize(std::max(buffers.occluded.size(), workload.rays.size()));
 }
 
+void TraceJob::closest(RayBatch rays, std::size_t first, Counters* counters) const {
+  const auto hits = std::span(buffers_.hits).subspan(first, rays.size());
+  if (workload_.excludes_sources)
+    closest_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), hits, counters);
+  else
+    cell_.kernel->closest_hit(accel_, rays, hits, counters);
+}
+
+void TraceJob::any(RayBatch rays, std::size_t first, Counters* counters) const {
+  const auto occluded = std::span(buffers_.occluded).subspan(first, rays.size());
+  if (workload_.excludes_sources)
+    any_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), occluded, counters);
+  else
+    cell_.kernel->any_hit(accel_, rays, occluded, counters);
+}
+
 void TraceJob::trace(std::size_t rays) const {
   const auto range = [&](std::size_t begin, std::size_t end) {
     const RayBatch batch = workload_.batch().part(begin, end - begin);
-    if (workload_.query == Query::closest_hit) {
-      cell_.kernel->closest_hit(accel_, batch, std::span(buffers_.hits).subspan(begin, end - begin), nullptr);
-    } else {
-      cell_.kernel->any_hit(accel_, batch, std::span(buffers_.occluded).subspan(begin, end - begin), nullptr);
-    }
+    if (workload_.query == Query::closest_hit)
+      closest(batch, begin, nullptr);
+    else
+      any(batch, begin, nullptr);
   };
   if (cell_.threads == 1) return range(0, rays);
   arena_.execute([&] {
@@ -46,13 +63,12 @@ void TraceJob::trace(std::size_t rays) const {
 Counters TraceJob::count() const {
   Counters counters;
   const RayBatch rays = workload_.batch();
-  if (workload_.query == Query::closest_hit && cell_.kernel->counts()) {
-    cell_.kernel->closest_hit(accel_, rays, std::span(buffers_.hits).first(rays.size()), &counters);
-    counters.rays = rays.size();
-  } else if (workload_.query == Query::any_hit && cell_.kernel->counts()) {
-    cell_.kernel->any_hit(accel_, rays, std::span(buffers_.occluded).first(rays.size()), &counters);
-    counters.rays = rays.size();
-  }
+  if (!cell_.kernel->counts()) return counters;
+  if (workload_.query == Query::closest_hit)
+    closest(rays, 0, &counters);
+  else
+    any(rays, 0, &counters);
+  counters.rays = rays.size();
   return counters;
 }
 
@@ -69,6 +85,14 @@ void TraceJob::prepare(Json& facts, SceneData* data, const MeasureSettings& meas
   facts["hits"] = closest ? std::ranges::count_if(hits, &Hit::is_hit) : std::ranges::count(occluded, 1);
   if (data)
     add_facts(facts, closest ? data->check(workload_, hits) : data->check(workload_, occluded), closest);
+  if (data && closest && !workload_.pixels.empty()) {
+    facts[kLeakPoints] = picture_points(data->leak_pixels(workload_, hits), kMostPoints);
+  }
+  if (data && !workload_.starts.empty()) {
+    facts["self_intersection"] = to_string(cell_.start.method);
+    add_facts(facts, closest ? data->check_starts(workload_, hits) : data->check_starts(workload_, occluded), closest);
+    facts["start_distance"] = data->start_distance(workload_);
+  }
   add_facts(facts, count());
 
   for (unsigned i = 0; i < measure.warmup; ++i) trace(rays);

@@ -33,6 +33,9 @@ class TraceJob {
 
  private:
   void trace(std::size_t rays) const;
+  /// Of `rays`, which begin with ray `first` of the workload, into the buffers.
+  void closest(RayBatch rays, std::size_t first, Counters* counters) const;
+  void any(RayBatch rays, std::size_t first, Counters* counters) const;
   [[nodiscard]] Counters count() const;
 
   const Cell& cell_;

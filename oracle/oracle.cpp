@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <stdexcept>
 
 #include "oracle/answer_check.h"
 #include "core/exact/exact_predicate.h"
@@ -56,12 +57,24 @@ class CornersAt {
   FrameTime at_;
 };
 
-ExactHit closest(const SearchTree& tree, const CornersAt& corners_at, const Ray& ray, DecisionCounts& counts) {
+/// A ray of a batch: where it begins, and the triangle that it passes through, or kNoPrimitive.
+struct Query {
+  const Ray& ray;
+  std::array<double, 3> origin;
+  std::uint32_t left_out;
+};
+
+Query usual(const Ray& ray) {
+  return {ray, {ray.origin.x, ray.origin.y, ray.origin.z}, kNoPrimitive};
+}
+
+ExactHit closest(const SearchTree& tree, const CornersAt& corners_at, const Query& query, DecisionCounts& counts) {
   ExactHit result;
-  if (!is_valid(ray)) return result;
-  ExactPredicate predicate(ray);
+  if (!is_valid(query.ray)) return result;
+  ExactPredicate predicate(query.ray, query.origin);
   Nearest nearest;
-  tree.search(ray, [&](std::uint32_t id, const Corners& first, double& limit) {
+  tree.search(query.ray, query.origin, [&](std::uint32_t id, const Corners& first, double& limit) {
+    if (id == query.left_out) return false;
     const Corners corners = corners_at(id, first);
     Enclosure t;
     if (predicate.meets(corners, t)) {
@@ -78,11 +91,12 @@ ExactHit closest(const SearchTree& tree, const CornersAt& corners_at, const Ray&
   return result;
 }
 
-bool any(const SearchTree& tree, const CornersAt& corners_at, const Ray& ray, DecisionCounts& counts) {
-  if (!is_valid(ray)) return false;
-  ExactPredicate predicate(ray);
+bool any(const SearchTree& tree, const CornersAt& corners_at, const Query& query, DecisionCounts& counts) {
+  if (!is_valid(query.ray)) return false;
+  ExactPredicate predicate(query.ray, query.origin);
   bool found = false;
-  tree.search(ray, [&](std::uint32_t id, const Corners& first, double&) {
+  tree.search(query.ray, query.origin, [&](std::uint32_t id, const Corners& first, double&) {
+    if (id == query.left_out) return false;
     Enclosure t;
     return found = predicate.meets(corners_at(id, first), t);
   });
@@ -96,7 +110,7 @@ std::vector<Result> trace_all(const TriangleMesh& mesh, RayBatch rays, DecisionC
   tbb::enumerable_thread_specific<DecisionCounts> local;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), kGrain), [&](const auto& range) {
     DecisionCounts& mine = local.local();
-    for (std::size_t i = range.begin(); i != range.end(); ++i) results[i] = trace(CornersAt(mesh, rays.time(i)), rays[i], mine);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) results[i] = trace(i, CornersAt(mesh, rays.time(i)), mine);
   });
   if (counts != nullptr) {
     for (const DecisionCounts& c : local) *counts += c;
@@ -126,14 +140,23 @@ Oracle::Oracle(Oracle&&) noexcept = default;
 Oracle& Oracle::operator=(Oracle&&) noexcept = default;
 
 std::vector<ExactHit> Oracle::closest_hit(RayBatch rays, DecisionCounts* counts) const {
-  return trace_all<ExactHit>(implementation_->mesh, rays, counts, [this](const CornersAt& at, const Ray& ray, DecisionCounts& c) {
-    return closest(implementation_->tree, at, ray, c);
+  return trace_all<ExactHit>(implementation_->mesh, rays, counts, [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
+    return closest(implementation_->tree, at, usual(rays[i]), c);
+  });
+}
+
+std::vector<ExactHit> Oracle::closest_hit_from(std::span<const std::array<double, 3>> origins, RayBatch rays,
+                                               std::span<const std::uint32_t> left_out, DecisionCounts* counts) const {
+  if (origins.size() != rays.size() || left_out.size() != rays.size())
+    throw std::invalid_argument("oracle: as many origins and primitives left out as rays are needed");
+  return trace_all<ExactHit>(implementation_->mesh, rays, counts, [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
+    return closest(implementation_->tree, at, {rays[i], origins[i], left_out[i]}, c);
   });
 }
 
 std::vector<std::uint8_t> Oracle::any_hit(RayBatch rays, DecisionCounts* counts) const {
-  return trace_all<std::uint8_t>(implementation_->mesh, rays, counts, [this](const CornersAt& at, const Ray& ray, DecisionCounts& c) {
-    return static_cast<std::uint8_t>(any(implementation_->tree, at, ray, c));
+  return trace_all<std::uint8_t>(implementation_->mesh, rays, counts, [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
+    return static_cast<std::uint8_t>(any(implementation_->tree, at, usual(rays[i]), c));
   });
 }
 

@@ -9,6 +9,7 @@
 // at that time, as float32 numbers; from there on everything is exact as before.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -69,6 +70,12 @@ class Oracle {
   [[nodiscard]] std::vector<ExactHit> closest_hit(RayBatch rays, DecisionCounts* counts = nullptr) const;
   /// 1 where anything lies within the closed interval, else 0.
   [[nodiscard]] std::vector<std::uint8_t> any_hit(RayBatch rays, DecisionCounts* counts = nullptr) const;
+  /// closest_hit of rays that begin at `origins` instead of their own: points with more digits than float32 has, such as hit
+  /// points, each coordinate a multiple of 2^-149 below 2^128. Each ray passes through the primitive `left_out` of it, which may
+  /// be kNoPrimitive. Throws std::invalid_argument where the sizes differ.
+  [[nodiscard]] std::vector<ExactHit> closest_hit_from(std::span<const std::array<double, 3>> origins, RayBatch rays,
+                                                       std::span<const std::uint32_t> left_out,
+                                                       DecisionCounts* counts = nullptr) const;
 
   /// `truth` as closest_hit or any_hit gave it for the same rays. Throws std::invalid_argument where the
   /// sizes differ.

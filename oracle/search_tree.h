@@ -23,9 +23,10 @@ class SearchTree {
 
   /// Calls `triangle(id, corners, limit)` for every triangle that the ray may meet at a t in [tnear, limit],
   /// roughly front to back. `limit` starts as tfar; the callee may lower it to anything that is not below the
-  /// nearest hit's t. The search ends when the callee returns true.
+  /// nearest hit's t. The search ends when the callee returns true. The ray begins at `origin`, of which its own is the rounding or
+  /// something near.
   template <class Callee>
-  void search(const Ray& ray, Callee&& triangle) const;
+  void search(const Ray& ray, const std::array<double, 3>& origin, Callee&& triangle) const;
 
  private:
   /// Two children side by side: bounds[axis][side][child]. A child with count > 0 is a leaf of that many
@@ -59,15 +60,14 @@ class SearchTree {
 
 /// Box test of one ray. For an axis with d != 0 the exact ray is between the planes l and h for t in
 /// [(l - o) / d, (h - o) / d] (or the other way round). Computed in doubles, (l - o) * (1 / d) has three
-/// roundings and no under- or overflow (float32 operands), so it is the exact number times 1 + e with |e| < 4
+/// roundings and no under- or overflow (operands on the grid of float32), so it is the exact number times 1 + e with |e| < 4
 /// * 2^-53; scaling keeps the order, so the largest entry of the axes is also within that of the exact one,
 /// and widening entry and exit by kWiden = 2^-50 of their size covers both and the rounding of the widening
 /// itself. An axis with d == 0 (either sign) is a plain comparison of exact numbers.
 class ConservativeSlabs {
  public:
-  explicit ConservativeSlabs(const Ray& ray) noexcept : tnear_(ray.tnear) {
+  ConservativeSlabs(const Ray& ray, const std::array<double, 3>& origin) noexcept : origin_(origin), tnear_(ray.tnear) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      origin_[axis] = ray.origin[axis];
       const double d = ray.direction[axis];
       parallel_[axis] = d == 0.0;
       reciprocal_[axis] = parallel_[axis] ? 0.0 : 1.0 / d;
@@ -106,13 +106,13 @@ class ConservativeSlabs {
 };
 
 template <class Callee>
-void SearchTree::search(const Ray& ray, Callee&& triangle) const {
+void SearchTree::search(const Ray& ray, const std::array<double, 3>& origin, Callee&& triangle) const {
   if (leaves_.empty()) return;
   struct Entry {
     double entry;
     std::uint32_t first, count;
   };
-  const ConservativeSlabs slabs(ray);
+  const ConservativeSlabs slabs(ray, origin);
   double limit = ray.tfar;
   std::array<Entry, kStack> stack;  // one waiting child a level
   std::size_t height = 0;

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "core/random.h"
+#include "rendering/surface_point.h"
 #include "scenes/camera.h"
 
 namespace arboretum {
@@ -53,56 +54,6 @@ void visit_morton(unsigned x, unsigned y, unsigned size, const View& view, const
   visit_morton(x + half, y + half, half, view, visit);
 }
 
-/// A point of a surface that a ray has hit: where rays may start from.
-class SurfacePoint {
- public:
-  SurfacePoint(const TriangleMesh& mesh, const Ray& ray, float time, const Hit& hit) {
-    const auto corners = mesh.corners(hit.primitive, frame_at(time, mesh.frames()));
-    const Vec3d a(corners[0]), ab = Vec3d(corners[1]) - a, ac = Vec3d(corners[2]) - a;
-    const double u = hit.u, v = hit.v;
-    a_ = a;
-    point_ = a + ab * u + ac * v;
-    normal_ = normalize(cross(ab, ac));
-    if (dot(normal_, Vec3d(ray.direction)) > 0.0) normal_ = normal_ * -1.0;
-    // Bound of the rounding error of a point computed from barycentrics in float32: gamma_7 times the sum of
-    // the terms' magnitudes (Pharr, Jakob, Humphreys, Physically Based Rendering, 3rd ed., 3.9).
-    constexpr double kUnit = 0x1p-24, kGamma7 = 7.0 * kUnit / (1.0 - 7.0 * kUnit);
-    double weights[3] = {std::abs(1.0 - u - v), std::abs(u), std::abs(v)};
-    for (std::size_t k = 0; k < 3; ++k) {
-      error_.x += kGamma7 * weights[k] * std::abs(double(corners[k].x));
-      error_.y += kGamma7 * weights[k] * std::abs(double(corners[k].y));
-      error_.z += kGamma7 * weights[k] * std::abs(double(corners[k].z));
-    }
-  }
-
-  [[nodiscard]] Vec3d point() const noexcept { return point_; }
-  /// Of unit length, on the side that the incoming ray came from.
-  [[nodiscard]] Vec3d normal() const noexcept { return normal_; }
-
-  /// Where a ray on the side of `side` (the normal, or its opposite) starts: off the surface along the normal
-  /// by the error bound, rounded away from it, further until the float32 point is on that side of the
-  /// triangle's plane.
-  [[nodiscard]] Vec3f origin(Vec3d side) const noexcept {
-    double distance = std::abs(side.x) * error_.x + std::abs(side.y) * error_.y + std::abs(side.z) * error_.z;
-    distance = std::max(distance, 0x1p-126);
-    for (int attempt = 0; attempt < 200; ++attempt, distance *= 2.0) {
-      const Vec3d wanted = point_ + side * distance;
-      Vec3f p = to_float(wanted);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double s = axis == 0 ? side.x : axis == 1 ? side.y : side.z;
-        const double w = axis == 0 ? wanted.x : axis == 1 ? wanted.y : wanted.z;
-        if (s > 0.0 && double(p[axis]) < w) p[axis] = std::nextafter(p[axis], Bounds3f::kInfinity);
-        if (s < 0.0 && double(p[axis]) > w) p[axis] = std::nextafter(p[axis], -Bounds3f::kInfinity);
-      }
-      if (dot(Vec3d(p) - a_, side) > 0.5 * distance) return p;
-    }
-    return to_float(point_);
-  }
-
- private:
-  Vec3d a_, point_, normal_, error_;
-};
-
 /// The unit direction, turned away from the surface where it is too grazing to leave it for sure.
 Vec3f leaving(Vec3d direction, Vec3d side) {
   direction = normalize(direction);
@@ -142,17 +93,26 @@ Vec3d light_position(const Scene& scene, RayBatch primary_rays, std::span<const 
   return Vec3d(camera.position) + normalize(Vec3d(camera.up)) * (0.25 * *median);
 }
 
-Ray shadow_ray(const SurfacePoint& surface, Vec3d light) {
+/// The ray as traced, and as it would be if it started at the hit point itself (but for its origin, which is rounded).
+struct SecondaryRay {
+  Ray ray, reference;
+};
+
+SecondaryRay shadow_ray(const SurfacePoint& surface, Vec3d light, SelfIntersection method) {
   const Vec3d to_light = light - surface.point();
-  if (!(length(to_light) > 0.0))
-    return Ray{
-        .origin = surface.origin(surface.normal()), .direction = to_float(surface.normal()), .tfar = 0.0f};
+  if (!(length(to_light) > 0.0)) {
+    const Ray none{.origin = surface.origin(surface.normal(), method), .direction = to_float(surface.normal()), .tfar = 0.0f};
+    return {none, none};
+  }
   // A light behind the surface is seen from behind: the ray starts on the light's side, or it would meet its
   // own triangle.
   const Vec3d side = dot(to_light, surface.normal()) >= 0.0 ? surface.normal() : surface.normal() * -1.0;
-  const Vec3f origin = surface.origin(side);
-  const Vec3d rest = light - Vec3d(origin);
-  return Ray{.origin = origin, .direction = leaving(rest, side), .tfar = float(length(rest))};
+  const auto towards_light = [&](Vec3f origin, Vec3d from) {
+    const Vec3d rest = light - from;
+    return Ray{.origin = origin, .direction = leaving(rest, side), .tfar = float(length(rest))};
+  };
+  const Vec3f origin = surface.origin(side, method);
+  return {towards_light(origin, Vec3d(origin)), towards_light(to_float(surface.point()), surface.point())};
 }
 
 /// When the ray is under way: uniform over the time that the shutter is open.
@@ -189,7 +149,11 @@ std::span<const std::string_view> workload_names() {
 
 bool is_secondary(std::string_view workload) {
   check_known(workload);
-  return workload != "primary" && workload != "random";
+  return starts_on_surfaces(workload);
+}
+
+bool starts_on_surfaces(std::string_view workload) noexcept {
+  return workload == "shadow" || workload == "ambient_occlusion" || workload == "reflection" || workload == "diffuse";
 }
 
 RayBatch Workload::batch() const noexcept {
@@ -233,6 +197,13 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
     throw std::invalid_argument("make_workload: one hit for each primary ray");
   const double diagonal = length(Vec3d(bounds.upper) - Vec3d(bounds.lower));
   const Vec3d light = light_position(scene, primary_rays, primary_hits);
+  const SelfIntersection method = view.start.method;
+  workload.excludes_sources = method == SelfIntersection::exclusion;
+  const float tnear = method == SelfIntersection::epsilon ? float(view.start.epsilon * diagonal) : 0.0f;
+  const auto add = [&](Ray ray, const Ray& reference) {
+    ray.tnear = tnear;
+    workload.rays.push_back(ray), workload.references.push_back(reference);
+  };
   workload.rays.reserve(primary_rays.size());
   for (std::size_t i = 0; i < primary_rays.size(); ++i) {
     if (!primary_hits[i].is_hit()) continue;
@@ -240,11 +211,14 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
     if (scene.mesh.moves()) workload.times.push_back(time);
     const SurfacePoint surface(scene.mesh, primary_rays[i], time, primary_hits[i]);
     const Vec3d normal = surface.normal();
+    workload.sources.push_back(primary_hits[i].primitive);
+    workload.starts.push_back(surface.exact_point());
     if (name == "shadow") {
-      workload.rays.push_back(shadow_ray(surface, light));
+      const SecondaryRay made = shadow_ray(surface, light, method);
+      add(made.ray, made.reference);
       continue;
     }
-    Ray ray{.origin = surface.origin(normal), .direction = {}};
+    Ray ray{.origin = surface.origin(normal, method), .direction = {}};
     if (name == "reflection") {
       const Vec3d in = normalize(Vec3d(primary_rays[i].direction));
       ray.direction = leaving(in - normal * (2.0 * dot(in, normal)), normal);
@@ -254,7 +228,9 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
       ray.direction = leaving(cosine_direction(normal, view.seed, i, kOcclusionDimension), normal);
       ray.tfar = float(0.2 * diagonal);
     }
-    workload.rays.push_back(ray);
+    Ray reference = ray;
+    reference.origin = to_float(surface.point());
+    add(ray, reference);
   }
   return workload;
 }

@@ -1,6 +1,7 @@
 #include "scenes/camera.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace arboretum {
 
@@ -22,7 +23,7 @@ Camera view_of(const Scene& scene) {
 }
 
 RayGenerator::RayGenerator(const Camera& camera, unsigned width, unsigned height) : origin_(camera.position) {
-  const Vec3d forward = normalize(Vec3d(camera.look_at) - Vec3d(camera.position));
+  const Vec3d forward = forward_ = normalize(Vec3d(camera.look_at) - Vec3d(camera.position));
   const Vec3d right = normalize(cross(forward, Vec3d(camera.up))) * (camera.mirror_x ? -1.0 : 1.0);
   const Vec3d up = normalize(cross(cross(forward, Vec3d(camera.up)), forward));
   const UnitCircle half_angle(0.5 * double(camera.vertical_fov) / 360.0);
@@ -35,6 +36,15 @@ RayGenerator::RayGenerator(const Camera& camera, unsigned width, unsigned height
 
 Ray RayGenerator::ray(double x, double y) const noexcept {
   return Ray{.origin = origin_, .direction = to_float(normalize(corner_ + step_x_ * x + step_y_ * y))};
+}
+
+std::array<float, 2> RayGenerator::pixel(Vec3d point) const noexcept {
+  const Vec3d d = point - Vec3d(origin_);
+  const double depth = dot(d, forward_);
+  if (!(depth > 0.0)) return {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN()};
+  // The steps are at right angles to each other and to the view, the corner is where both begin.
+  const Vec3d in_plane = d * (1.0 / depth) - corner_;
+  return {float(dot(in_plane, step_x_) / dot(step_x_, step_x_)), float(dot(in_plane, step_y_) / dot(step_y_, step_y_))};
 }
 
 }  // namespace arboretum

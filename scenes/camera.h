@@ -1,6 +1,8 @@
 // Camera rays, and the view of a scene that has no camera.
 #pragma once
 
+#include <array>
+
 #include "core/bounds.h"
 #include "core/ray.h"
 #include "scenes/scene.h"
@@ -20,10 +22,13 @@ class RayGenerator {
   /// The pinhole ray through picture position (x, y) in pixels, y downwards; (0.5, 0.5) is the first pixel's
   /// centre. The direction has unit length, the interval is [0, infinity).
   [[nodiscard]] Ray ray(double x, double y) const noexcept;
+  [[nodiscard]] Vec3f origin() const noexcept { return origin_; }
+  /// Picture position of a point; NaN where it lies beside or behind the camera.
+  [[nodiscard]] std::array<float, 2> pixel(Vec3d point) const noexcept;
 
  private:
   Vec3f origin_;
-  Vec3d corner_, step_x_, step_y_;
+  Vec3d forward_, corner_, step_x_, step_y_;
 };
 
 }  // namespace arboretum

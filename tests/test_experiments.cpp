@@ -149,6 +149,19 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\nparameters: {bins: 1000}\n", ":2", "bins must be an integer from 4 to 64"},
       {"scenes: [bunny]\nparameters: {morton_bits: 31}\n", ":2", "morton_bits must be one of 30, 63"},
       {"scenes: [bunny]\nparameters: {colapse: greedy}\n", ":2", "did you mean 'collapse'"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [nun]}\n", ":3", "did you mean 'none'"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: []}\n", ":3", "is empty"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [none, none]}\n", ":3", "given twice"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersections: [none]}\n", ":3", "did you mean 'self_intersection'"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [epsilon], epsilon: 2}\n", ":3", "epsilon (a share of the scene's diagonal) must be"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {epsilon: 1e-3}\n", ":3", "no effect without self_intersection: epsilon"},
+      {"scenes: [bunny]\naxes: {workload: [primary]}\nrays: {self_intersection: [none]}\n", ":3", "rays has no effect"},
+      {"scenes: [{generate: sphere, offset: [1, 1]}]\n", ":1", "given twice"},
+      {"scenes: [{generate: sphere, offset: far}]\n", ":1", "offset must be a number"},
+      {"scenes: [{generate: sphere, stretch: 0}]\n", ":1", "stretch must be a number"},
+      {"scenes: [{generate: sphere, ofset: 1}]\n", ":1", "did you mean 'offset'"},
+      {"scenes: [{catalogue: buny, offset: 1}]\n", ":1", "did you mean 'bunny'"},
+      {"scenes: [{catalogue: bunny, triangles: 100}]\n", ":1", "no effect without generate"},
       {"scenes: [bunny]\ninclude: [{builder: morton}]\n", ":2", "names its structure"},
       {"scenes: [bunny]\nexclude: {structure: tree}\n", ":2", "must be a list of maps"},
       {"scenes: [bunny]\nexclude: [{scene: dragon}]\n", ":2", "unknown scene"},
@@ -284,6 +297,49 @@ metrics: [trace]
             "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/sse/primary/threads:1"});
   CHECK(plan.excluded == 1);
   CHECK(names(plan, Cell::Metric::build).empty());
+}
+
+TEST_CASE("ways of leaving a surface are part of the cell where several are swept, of workloads that start on surfaces") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const auto plan_of = [&](const std::string& ways) {
+    const fs::path file = folder.write("rays.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse], intersector: "
+                                                    "[moller_trumbore], workload: [primary, diffuse]}\nrays: {self_intersection: " + ways + "}\nmetrics: [trace]\n");
+    const Experiment experiment = read_experiment(file, registry);
+    const fs::path again = folder.write("again.yaml", effective_yaml(experiment));
+    CHECK(effective_yaml(read_experiment(again, registry)) == effective_yaml(experiment));
+    return make_plan(experiment, registry);
+  };
+  const Plan swept = plan_of("[none, epsilon], epsilon: 0.001");
+  CHECK(names(swept, Cell::Metric::trace) ==
+        std::vector<std::string>{"trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/primary/threads:1",
+                                 "trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/diffuse:self_intersection=none/threads:1",
+                                 "trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/diffuse:self_intersection=epsilon/threads:1"});
+  CHECK(swept.cells[2].start.epsilon == 0.001);
+  const Plan one = plan_of("exclusion");
+  REQUIRE(one.cells.size() == 2);
+  CHECK(one.cells[1].workload_name() == "diffuse");
+  CHECK(one.cells[1].start.method == SelfIntersection::exclusion);
+}
+
+TEST_CASE("placed scenes: a cell for each place, named by it; a choice may name them all") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("placed.yaml", R"(
+scenes: [{generate: sphere, triangles: 500, size: 100, offset: [1, 1e4]}, {generate: sphere, triangles: 600, stretch: 10}]
+axes: {structure: [tree], isa: [sse], intersector: [moller_trumbore], workload: [primary, random]}
+exclude: [{scene: sphere-500, workload: random}, {scene: "sphere-500:size=100:offset=1e4", workload: primary}]
+metrics: [trace]
+)");
+  const Experiment experiment = read_experiment(file, registry);
+  std::vector<std::string> found;
+  for (const Cell& cell : make_plan(experiment, registry).cells) found.push_back(cell.scene + " " + cell.workload);
+  CHECK(found == std::vector<std::string>{"sphere-500:size=100:offset=1 primary", "sphere-600:stretch=10 primary", "sphere-600:stretch=10 random"});
+  CHECK(experiment.scenes[1].placing.offset == 1e4);
+  const Experiment again = read_experiment(folder.write("again.yaml", effective_yaml(experiment)), registry);
+  CHECK(effective_yaml(again) == effective_yaml(experiment));
+  CHECK(again.scenes[1].placing.size == 100);
+  CHECK(read_experiment(file, registry, {.axes = {"scene=sphere-500"}}).scenes.size() == 2);
 }
 
 TEST_CASE("swept builder parameters are part of the cell where the builder reads them") {

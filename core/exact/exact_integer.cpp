@@ -35,11 +35,14 @@ ExactInteger shifted(ExactInteger x, int bits) {
   return x;
 }
 
-void lower_exponent(int& exponent, Vec3f p) {
+/// `Point`: of float32 numbers or doubles.
+template <class Point>
+void lower_exponent(int& exponent, const Point& p) {
   for (std::size_t k = 0; k < 3; ++k) exponent = std::min(exponent, parts_of(double(p[k])).exponent);
 }
 
-IntegerTriple to_integers(Vec3f p, int exponent) {
+template <class Point>
+IntegerTriple to_integers(const Point& p, int exponent) {
   IntegerTriple r;
   for (std::size_t k = 0; k < 3; ++k) {
     const Parts x = parts_of(double(p[k]));
@@ -63,14 +66,14 @@ struct Scaled {
   int direction_exponent = std::numeric_limits<int>::max();
   IntegerTriple direction, a, b, c;  // corners as seen from the origin
 
-  Scaled(const Ray& ray, const Corners& corners) {
-    lower_exponent(direction_exponent, ray.direction);
-    lower_exponent(point_exponent, ray.origin);
+  Scaled(const ExactLine& line, const Corners& corners) {
+    lower_exponent(direction_exponent, line.direction);
+    lower_exponent(point_exponent, line.origin);
     for (const Vec3f& p : corners) lower_exponent(point_exponent, p);
     if (point_exponent == std::numeric_limits<int>::max()) point_exponent = 0;
     if (direction_exponent == std::numeric_limits<int>::max()) direction_exponent = 0;
-    direction = to_integers(ray.direction, direction_exponent);
-    const IntegerTriple origin = to_integers(ray.origin, point_exponent);
+    direction = to_integers(line.direction, direction_exponent);
+    const IntegerTriple origin = to_integers(line.origin, point_exponent);
     a = difference(to_integers(corners[0], point_exponent), origin);
     b = difference(to_integers(corners[1], point_exponent), origin);
     c = difference(to_integers(corners[2], point_exponent), origin);
@@ -144,14 +147,14 @@ float round_to_float(const ExactFraction& a) {
   return value;
 }
 
-std::array<int, 3> exact_edge_signs(const Ray& ray, const Corners& corners) {
-  const Scaled s(ray, corners);
+std::array<int, 3> exact_edge_signs(const ExactLine& line, const Corners& corners) {
+  const Scaled s(line, corners);
   return {sign_of(determinant(s.a, s.b, s.direction)), sign_of(determinant(s.b, s.c, s.direction)),
           sign_of(determinant(s.c, s.a, s.direction))};
 }
 
-ExactPoint exact_point(const Ray& ray, const Corners& corners) {
-  const Scaled s(ray, corners);
+ExactPoint exact_point(const ExactLine& line, const Corners& corners) {
+  const Scaled s(line, corners);
   const IntegerTriple normal = cross(difference(s.b, s.a), difference(s.c, s.a));
   const ExactInteger denominator = dot(normal, s.direction);
   return {fraction(dot(normal, s.a), denominator, s.point_exponent - s.direction_exponent),

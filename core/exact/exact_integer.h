@@ -34,13 +34,19 @@ struct ExactFraction {
 /// Correctly rounded, ties to even; infinity beyond the float32 range.
 [[nodiscard]] float round_to_float(const ExactFraction& a);
 
-/// Signs of E_ab, E_bc, E_ca, where E_ij = det[p_i - o, p_j - o, d].
-[[nodiscard]] std::array<int, 3> exact_edge_signs(const Ray& ray, const Corners& corners);
+/// The line that a ray lies on. The origin may have more digits than float32 has, but is on its grid: a multiple of 2^-149 below 2^128.
+struct ExactLine {
+  std::array<double, 3> origin;
+  Vec3f direction;
+};
 
-/// t and the weights of the second and third corner. The ray must not be parallel to the triangle's plane.
+/// Signs of E_ab, E_bc, E_ca, where E_ij = det[p_i - o, p_j - o, d].
+[[nodiscard]] std::array<int, 3> exact_edge_signs(const ExactLine& line, const Corners& corners);
+
+/// t and the weights of the second and third corner. The line must not be parallel to the triangle's plane.
 struct ExactPoint {
   ExactFraction t, u, v;
 };
-[[nodiscard]] ExactPoint exact_point(const Ray& ray, const Corners& corners);
+[[nodiscard]] ExactPoint exact_point(const ExactLine& line, const Corners& corners);
 
 }  // namespace arboretum

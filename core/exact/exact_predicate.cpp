@@ -1,4 +1,5 @@
-// Error bounds. u = 2^-53. Every operand is a float32, a multiple of 2^-149 below 2^128 in size; so every
+// Error bounds. u = 2^-53. Every operand is a float32, a multiple of 2^-149 below 2^128 in size (an origin with more digits is
+// one too, and whatever is said of differences holds for it: they are rounded once, and exact as double-doubles); so every
 // value of degree three here is 0 or between 2^-447 and 2^390, a quotient of two such between 2^-840 and
 // 2^840, and the low parts of double-doubles are multiples of the same grids: nothing under- or overflows and
 // relative bounds hold throughout.
@@ -85,9 +86,11 @@ struct ExactPredicate::Approximate {
   }
 };
 
-ExactPredicate::ExactPredicate(const Ray& ray) noexcept
-    : ray_(ray),
-      origin_(widen(ray.origin)),
+ExactPredicate::ExactPredicate(const Ray& ray) noexcept : ExactPredicate(ray, widen(ray.origin)) {}
+
+ExactPredicate::ExactPredicate(const Ray& ray, const std::array<double, 3>& origin) noexcept
+    : line_{origin, ray.direction},
+      origin_(origin),
       direction_(widen(ray.direction)),
       tnear_(ray.tnear),
       tfar_(ray.tfar),
@@ -120,7 +123,7 @@ bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
     if (mixed()) return false;
     if (!all_certain) {
       ++counts_.in_integers;
-      const std::array<int, 3> exact = exact_edge_signs(ray_, corners);
+      const std::array<int, 3> exact = exact_edge_signs(line_, corners);
       std::copy(exact.begin(), exact.end(), sign);
       if (mixed() || (sign[0] == 0 && sign[1] == 0 && sign[2] == 0)) return false;
     }
@@ -174,7 +177,7 @@ bool ExactPredicate::within_interval(const Corners& corners, Enclosure& t) {
     if (decided(t, inside)) return ++counts_.in_double_double, inside;
   }
   ++counts_.in_integers;
-  const ExactFraction exact = exact_point(ray_, corners).t;
+  const ExactFraction exact = exact_point(line_, corners).t;
   const double rounded = to_double(exact);
   t = rounded == 0.0 ? Enclosure{0.0, 0.0} : Enclosure{down(rounded), up(rounded)};
   const auto not_below = [&](double limit) {
@@ -196,7 +199,7 @@ int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
     if (const int sign = sign_beyond(difference.hi, bound)) return ++counts_.in_double_double, sign;
   }
   ++counts_.in_integers;
-  return compare(exact_point(ray_, first).t, exact_point(ray_, second).t);
+  return compare(exact_point(line_, first).t, exact_point(line_, second).t);
 }
 
 RoundedPoint ExactPredicate::round(const Corners& corners) {
@@ -230,7 +233,7 @@ RoundedPoint ExactPredicate::round(const Corners& corners) {
   if (certain)
     return ++counts_.in_double_double, RoundedPoint{point[0].value.hi, rounded[0], rounded[1], rounded[2]};
   ++counts_.in_integers;
-  const ExactPoint exact = exact_point(ray_, corners);
+  const ExactPoint exact = exact_point(line_, corners);
   return {to_double(exact.t), round_to_float(exact.t), round_to_float(exact.u), round_to_float(exact.v)};
 }
 

@@ -42,8 +42,10 @@ struct RoundedPoint {
 /// Decides for one valid ray. Not thread-safe: counts as it goes.
 class ExactPredicate {
  public:
-  /// `ray` must be valid (core/ray.h) and outlive the predicate.
+  /// `ray` must be valid (core/ray.h).
   explicit ExactPredicate(const Ray& ray) noexcept;
+  /// The same ray from another origin, which may have more digits than float32 has (ExactLine).
+  ExactPredicate(const Ray& ray, const std::array<double, 3>& origin) noexcept;
 
   /// Whether the ray meets the closed triangle at a t within the closed interval; then `t` encloses it. The
   /// corners must be finite.
@@ -63,7 +65,7 @@ class ExactPredicate {
   [[nodiscard]] Approximate approximate_t(const Corners& corners) const;
   [[nodiscard]] bool within_interval(const Corners& corners, Enclosure& t);
 
-  const Ray& ray_;
+  ExactLine line_;
   Triple<double> origin_, direction_;
   double tnear_, tfar_;
   double direction_size_;  ///< largest |component|
