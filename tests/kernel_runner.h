@@ -9,6 +9,7 @@
 #include <memory>
 #include <set>
 #include <span>
+#include <sstream>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -29,7 +30,7 @@ namespace arboretum::test {
 /// The rows of the ISAs that are available here, without most that are other rows' code put together anew: an intersector is compiled once and called
 /// by every structure and traversal through the same pointers. The two that most kernels are run with are there everywhere; `pluecker` and
 /// `exact` for single rays everywhere and in one mode of each kind; the others with a BVH, a kd-tree and the reference. Leaves that are
-/// called by the same functions are all there for single rays in bvh8, elsewhere once.
+/// called by the same functions are all there for single rays in bvh8, elsewhere once. Scalar ways of traversal are there with bvh8.
 [[nodiscard]] inline std::vector<KernelRow> runnable_rows() {
   std::vector<KernelRow> rows;
   std::set<std::tuple<std::string_view, std::string_view, std::string_view, std::string_view, Isa, ClosestHitFunction>> seen;
@@ -37,6 +38,7 @@ namespace arboretum::test {
     if (!is_available(row.isa)) continue;
     const bool single = row.traversal == "single", reference = row.structure == "bvh8" || row.structure == "brute_force";
     const bool common = row.intersector == "moller_trumbore" || row.intersector == "watertight";
+    if (row.isa == Isa::scalar && !single && !reference) continue;
     const bool mode = single || (row.structure == "bvh8" && (row.traversal == "packet64" || row.traversal == "queued"));
     if (!common && !mode) continue;
     if (!common && row.intersector != "pluecker" && row.intersector != "exact" && !reference && row.structure != "kdtree") continue;
@@ -82,6 +84,13 @@ class Structures {
   std::vector<std::uint8_t> occluded(rays.size(), 0xee);
   row.any_hit(accel, rays, occluded, counters);
   return occluded;
+}
+
+/// A hit for a message.
+[[nodiscard]] inline std::string text(const Hit& hit) {
+  std::ostringstream out;
+  out << "t " << hit.t << ", primitive " << hit.primitive;
+  return out.str();
 }
 
 /// -0 and 0, and any two NaNs of different bits, are told apart.

@@ -42,6 +42,7 @@ TEST_CASE("a refitted structure answers as brute force on the moved mesh, bit fo
     rays.insert(rays.end(), aimed.begin(), aimed.end());
     Structures reference(moved);
     std::map<std::pair<std::string_view, std::string_view>, std::unique_ptr<Accel>> refitted;
+    std::map<const KernelRow*, std::pair<std::vector<Hit>, std::vector<std::uint8_t>>> wanted;
     for (const KernelRow& row : runnable_rows()) {
       if (row.box != "padded" || !can_refit(row.structure)) continue;
       const KernelRow* brute = find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
@@ -55,8 +56,10 @@ TEST_CASE("a refitted structure answers as brute force on the moved mesh, bit fo
         accel = build_structure(row.structure, scene.mesh, settings, report);
         accel->refit(moved);
       }
-      REQUIRE(same_bits(closest_hit(row, *accel, rays), closest_hit(*brute, reference.get(*brute), rays)));
-      REQUIRE(any_hit(row, *accel, rays) == any_hit(*brute, reference.get(*brute), rays));
+      auto& [hits, occluded] = wanted[brute];
+      if (hits.empty()) hits = closest_hit(*brute, reference.get(*brute), rays), occluded = any_hit(*brute, reference.get(*brute), rays);
+      REQUIRE(same_bits(closest_hit(row, *accel, rays), hits));
+      REQUIRE(any_hit(row, *accel, rays) == occluded);
     }
   }
 }

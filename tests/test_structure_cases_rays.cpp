@@ -163,16 +163,31 @@ TEST_CASE("B22: with 0 to 64 active rays of 64, every traversal gives the single
 }
 
 TEST_CASE("B23: poles where thousands of triangles meet: rays to vertices do not get out") {
-  for (const std::uint32_t n : {64u, 1024u, 16384u}) {
-    INFO(n << " triangles a pole");
-    const TriangleMesh mesh = bipyramid(n);
-    const Vec3f inside{0.03f, -0.02f, 0.11f};
+  const Vec3f inside{0.03f, -0.02f, 0.11f};
+  const auto rays_of = [&](const TriangleMesh& mesh, std::uint32_t n) {
     std::vector<Ray> rays{through(inside, {0, 0, 1}), through(inside, {0, 0, -1}), {{0, 0, 0}, 0, {0, 0, 1}, kInfinity}, {{0, 0, 0}, 0, {-0.0f, 0, -1}, kInfinity}};
     for (const Ray& ray : aimed_rays(mesh, inside, 120, n)) rays.push_back(ray);
+    return rays;
+  };
+  for (const std::uint32_t n : {64u, 2048u}) {
+    INFO(n << " triangles a pole");
+    const TriangleMesh mesh = bipyramid(n);
+    const std::vector<Ray> rays = rays_of(mesh, n);
     for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
       for (const KernelRow* row : combination.rows)
         if (crack_free(*row)) CHECK(std::ranges::all_of(closest_hit(*row, accel, rays), &Hit::is_hit));
     });
+  }
+  // Far more of them, without the oracle, which would look at each exactly, and with the builders that do not clip each to every cell.
+  const TriangleMesh mesh = bipyramid(65536);
+  const std::vector<Ray> rays = rays_of(mesh, 65536);
+  for (const Combination& combination : combinations()) {
+    if (combination.builder != "binned_sah" || combination.is("kdtree")) continue;
+    const auto accel = combination.build(mesh);
+    for (const KernelRow* row : combination.rows) {
+      INFO(name_of(*row));
+      if (crack_free(*row)) CHECK(std::ranges::all_of(closest_hit(*row, *accel, rays), &Hit::is_hit));
+    }
   }
 }
 
@@ -188,19 +203,20 @@ TEST_CASE("B24: through vertices of nested cylinders: an eleventh one outside ch
     for (const KernelRow* row : combination.rows) {
       if (row->box != "padded") continue;
       INFO(name_of(*row) << ", " << combination.builder);
-      for (std::size_t i = 0; i < rays.size(); ++i) {  // from cylinder to cylinder, each hit's t the next one's tnear
+      // From cylinder to cylinder, each hit's t the next one's tnear.
+      const auto same_way = [&](std::size_t i) {
         Ray ray = rays[i];
         for (int step = 0; step < 12; ++step) {
           const Hit hit = closest_hit(*row, *a, std::span(&ray, 1))[0];
           const Hit with = closest_hit(*row, *b, std::span(&ray, 1))[0];
-          INFO("ray " << i << " step " << step);
-          if (hit.is_hit()) REQUIRE(same_bits(std::span(&hit, 1), std::span(&with, 1)));
-          if (!hit.is_hit() && with.is_hit()) REQUIRE(with.primitive >= ten.size());
-          if (crack_free(*row) && step == 0) REQUIRE(hit.is_hit());
-          if (!hit.is_hit()) break;
+          if (hit.is_hit() && !same_bits(std::span(&hit, 1), std::span(&with, 1))) return false;
+          if (!hit.is_hit() && with.is_hit() && with.primitive < ten.size()) return false;
+          if (!hit.is_hit()) return step > 0 || !crack_free(*row);
           ray.tnear = std::nextafter(hit.t, kInfinity);
         }
-      }
+        return true;
+      };
+      require_each(rays.size(), same_way, [](std::size_t) { return "the eleventh changes it"; });
     }
   }
 }
