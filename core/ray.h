@@ -43,11 +43,21 @@ static_assert(sizeof(Hit) == 16);
          (ray.direction.x != 0.0f || ray.direction.y != 0.0f || ray.direction.z != 0.0f) && ray.tnear <= ray.tfar;
 }
 
+/// What may be chosen of a way of traversal; kOwn: what the way itself has found best. No answer depends on it.
+struct TraversalSettings {
+  static constexpr unsigned kOwn = ~0u;
+  unsigned hybrid_threshold = kOwn;  ///< of hybrid4, 8, 16: so many rays in a node, or fewer, go on alone; 0: none ever
+  unsigned rays_in_flight = kOwn;    ///< of queued: 1 to 64
+  [[nodiscard]] static constexpr unsigned chosen(unsigned set, unsigned own) noexcept { return set == kOwn ? own : set; }
+  friend bool operator==(const TraversalSettings&, const TraversalSettings&) = default;
+};
+
 /// What a kernel is handed: rays, where the scene moves the time of each, and what is known of them all.
 struct RayBatch {
   std::span<const Ray> rays;
   std::span<const float> times;  ///< within [0, 1], the time of the key frames; one a ray, or empty: 0 for all
   bool coherent = false;         ///< a hint: neighbours in `rays` take much the same way, as primary rays in tile order do
+  TraversalSettings settings;
 
   RayBatch() = default;
   RayBatch(const Ray* first, std::size_t count) noexcept : rays(first, count) {}
@@ -61,7 +71,7 @@ struct RayBatch {
   /// `count` rays from ray `begin` on.
   [[nodiscard]] RayBatch part(std::size_t begin, std::size_t count) const noexcept {
     RayBatch b(rays.subspan(begin, count), times.empty() ? times : times.subspan(begin, count));
-    b.coherent = coherent;
+    b.coherent = coherent, b.settings = settings;
     return b;
   }
   [[nodiscard]] float time(std::size_t i) const noexcept { return times.empty() ? 0.0f : times[i]; }

@@ -69,6 +69,7 @@ struct Experiment {
   std::vector<SceneChoice> scenes;
   AxisLists axes;  ///< every axis has a value
   ParameterSweep parameters;
+  std::map<std::string, std::string> parameter_places;  ///< file:line of each
   RaySettings rays;
   std::vector<CellChoice> include, exclude;
   MeasureSettings measure;

@@ -18,7 +18,7 @@ void any_hit_excluding(const KernelRow& kernel, const Accel& accel, RayBatch ray
     own.push_back(excluded[i]);
   }
   std::vector<Hit> found(rest.rays.size());
-  if (!found.empty()) closest_hit_excluding(kernel, accel, rest.batch(), own, found, counters);
+  if (!found.empty()) closest_hit_excluding(kernel, accel, rest.batch(rays), own, found, counters);
   for (std::size_t k = 0; k < found.size(); ++k) occluded[rest.places[k]] = found[k].is_hit();
 }
 

@@ -31,7 +31,12 @@ struct RaysThatGoOn {
     rays.push_back(ray), places.push_back(place);
     if (!of.times.empty()) times.push_back(of.times[place]);
   }
-  [[nodiscard]] RayBatch batch() const { return {rays, times}; }
+  /// To be traced as those of the batch that they are of are.
+  [[nodiscard]] RayBatch batch(const RayBatch& of) const {
+    RayBatch b(rays, times);
+    b.settings = of.settings;
+    return b;
+  }
 };
 
 /// `trace(rays, answers)` finds closest hits; Answer is Hit or ExactHit. One excluded primitive a ray.
@@ -50,7 +55,7 @@ void trace_excluding(RayBatch rays, std::span<const std::uint32_t> excluded, std
   std::vector<Answer> found;
   while (!rest.rays.empty()) {
     found.resize(rest.rays.size());
-    trace(rest.batch(), std::span<Answer>(found));
+    trace(rest.batch(rays), std::span<Answer>(found));
     RaysThatGoOn next;
     for (std::size_t k = 0; k < found.size(); ++k) {
       answers[rest.places[k]] = found[k];

@@ -13,6 +13,7 @@ struct Field {
   std::string_view name;
   double low, high;  ///< inclusive
   unsigned BuilderParameters::*integer = nullptr;
+  unsigned TraversalSettings::*setting = nullptr;  ///< of a way of traversal; `auto` is its own
   float BuilderParameters::*real = nullptr;
   std::string BuilderParameters::*word = nullptr;
   std::span<const std::string_view> words = {};
@@ -21,6 +22,7 @@ struct Field {
 
 constexpr std::string_view kCollapses[] = {"optimal", "greedy"};
 constexpr unsigned kMortonBits[] = {30, 63};
+constexpr std::string_view kOwn = "auto";
 
 /// What may stand below another structure, and what cannot: the plan says why not.
 std::span<const std::string_view> structure_names() {
@@ -49,6 +51,8 @@ const std::vector<Field>& fields() {
       {.name = "grid_density", .low = 0.01, .high = 64, .real = &BuilderParameters::grid_density},
       {.name = "below", .low = 0, .high = 0, .word = &BuilderParameters::below, .words = structure_names()},
       {.name = "collapse", .low = 0, .high = 0, .word = &BuilderParameters::collapse, .words = kCollapses},
+      {.name = "hybrid_threshold", .low = 0, .high = 16, .setting = &TraversalSettings::hybrid_threshold},
+      {.name = "rays_in_flight", .low = 1, .high = 64, .setting = &TraversalSettings::rays_in_flight},
   };
   return table;
 }
@@ -60,6 +64,7 @@ const Field& field(std::string_view name) {
 std::string expectation(const Field& f) {
   if (f.word) return fmt::format("one of {}", fmt::join(f.words, ", "));
   if (!f.choices.empty()) return fmt::format("one of {}", fmt::join(f.choices, ", "));
+  if (f.setting) return fmt::format("{} or an integer from {} to {}", kOwn, f.low, f.high);
   return fmt::format("{} from {} to {}", f.integer ? "an integer" : "a number", f.low, f.high);
 }
 
@@ -84,14 +89,20 @@ std::vector<std::string> parameter_names() {
 std::string default_parameter(std::string_view name) {
   const BuilderParameters defaults;
   const Field& f = field(name);
+  if (f.setting) return std::string(kOwn);
   if (f.word) return defaults.*f.word;
   return f.integer ? fmt::format("{}", defaults.*f.integer) : fmt::format("{}", defaults.*f.real);
 }
 
-std::string set_parameter(BuilderParameters& parameters, std::string_view name, const std::string& value) {
+std::string set_parameter(Parameters& all, std::string_view name, const std::string& value) {
   const Field& f = field(name);
+  BuilderParameters& parameters = all.builder;
   bool done = false;
-  if (f.word) {
+  if (f.setting) {
+    unsigned& setting = all.traversal.*f.setting;
+    done = value == kOwn || parse_within(value, f.low, f.high, setting);
+    if (value == kOwn) setting = TraversalSettings::kOwn;
+  } else if (f.word) {
     done = std::ranges::find(f.words, value) != f.words.end();
     if (done) parameters.*f.word = value;
   } else if (!f.choices.empty()) {
@@ -105,6 +116,19 @@ std::string set_parameter(BuilderParameters& parameters, std::string_view name, 
   return done ? std::string() : expectation(f);
 }
 
+bool is_of_traversal(std::string_view name) { return field(name).setting != nullptr; }
+
+bool concerns(std::string_view name, std::string_view traversal) {
+  return name == "hybrid_threshold" ? traversal.starts_with("hybrid") : name == "rays_in_flight" && traversal == "queued";
+}
+
+void drop_label(std::string& label, std::string_view name) {
+  const std::size_t begin = label.find(fmt::format(":{}=", name));
+  if (begin == std::string::npos) return;
+  const std::size_t end = label.find(':', begin + 1);
+  label.erase(begin, end == std::string::npos ? end : end - begin);
+}
+
 std::vector<ParameterPoint> parameter_points(const ParameterSweep& sweep) {
   std::vector<ParameterPoint> points(1);
   for (const auto& [name, values] : sweep) {
@@ -113,7 +137,7 @@ std::vector<ParameterPoint> parameter_points(const ParameterSweep& sweep) {
       for (const std::string& value : values) {
         next.push_back(point);
         (void)set_parameter(next.back().parameters, name, value);
-        if (values.size() > 1) next.back().label += ":" + name + "=" + value;
+        if (values.size() > 1) (is_of_traversal(name) ? next.back().traversal_label : next.back().label) += ":" + name + "=" + value;
       }
     }
     points = std::move(next);

@@ -1,5 +1,5 @@
-// Builder parameters by name: what the YAML's `parameters:` may hold, one table for reading, defaults and
-// cell names.
+// Parameters by name, of builders and of ways of traversal: what the YAML's `parameters:` may hold, one table for reading,
+// defaults and cell names.
 #pragma once
 
 #include <map>
@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/ray.h"
 #include "structures/accel.h"
 
 namespace arboretum {
@@ -14,17 +15,27 @@ namespace arboretum {
 /// Values to sweep of each parameter that the configuration names, as written.
 using ParameterSweep = std::map<std::string, std::vector<std::string>>;
 
+struct Parameters {
+  BuilderParameters builder;
+  TraversalSettings traversal;
+};
+
 [[nodiscard]] std::vector<std::string> parameter_names();
 /// The default as text.
 [[nodiscard]] std::string default_parameter(std::string_view name);
 /// Sets one parameter. Returns why not ("an integer from 4 to 64"), or empty when it is set.
-[[nodiscard]] std::string set_parameter(BuilderParameters& parameters, std::string_view name,
-                                        const std::string& value);
+[[nodiscard]] std::string set_parameter(Parameters& parameters, std::string_view name, const std::string& value);
+/// Whether it is of the ways of traversal, and means something to that one; builders read theirs as they concern them.
+[[nodiscard]] bool is_of_traversal(std::string_view name);
+[[nodiscard]] bool concerns(std::string_view name, std::string_view traversal);
+/// Takes ":name=value" out of a label.
+void drop_label(std::string& label, std::string_view name);
 
-/// One point of a sweep. `label` names what is swept (more than one value): ":bins=16:collapse=greedy".
+/// One point of a sweep. The labels name what is swept (more than one value): ":bins=16:collapse=greedy".
 struct ParameterPoint {
-  BuilderParameters parameters;
-  std::string label;
+  Parameters parameters;
+  std::string label;            ///< of the builder's
+  std::string traversal_label;  ///< of the way of traversal's
 };
 /// The product of all lists; one point with the defaults for an empty sweep. The values must have been
 /// accepted by set_parameter.

@@ -14,7 +14,7 @@ namespace arboretum {
 
 std::string Cell::name() const {
   return fmt::format("{}/{}/{}/{}/{}/{}/{}/{}/{}/{}/threads:{}", to_string(metric), scene, structure,
-                     builder_name(), leaf, intersector, box, traversal, to_string(isa), workload_name(), threads);
+                     builder_name(), leaf, intersector, box, traversal_name(), to_string(isa), workload_name(), threads);
 }
 
 namespace {
@@ -64,7 +64,8 @@ class Planner {
                           cell.intersector = intersector, cell.box = box, cell.traversal = traversal;
                           cell.isa = *parse_isa(isa), cell.workload = workload;
                           cell.threads = static_cast<unsigned>(std::stoul(threads));
-                          cell.parameters = point.parameters, cell.parameter_label = point.label;
+                          cell.parameters = point.parameters.builder, cell.parameter_label = point.label;
+                          cell.settings = point.parameters.traversal, cell.setting_label = point.traversal_label;
                           cell.start = {start, experiment_.rays.epsilon};
                           if (starts_of(workload).size() > 1) cell.start_label = fmt::format(":self_intersection={}", to_string(start));
                           add(std::move(cell), out);
@@ -92,6 +93,7 @@ class Planner {
   /// Fills in `auto` and the ISA's own widths, as far as the structure is known.
   void resolve(Cell& cell, const StructureEntry* entry) const {
     cell.traversal = resolve_traversal(cell.traversal, cell.isa);
+    keep_settings(cell);
     if (cell.box == kAuto) cell.box = default_box(cell.intersector);
     if (entry && !entry->info.uses_parameters) cell.parameters = {}, cell.parameter_label.clear();
     // What stands above another structure takes that one's defaults.
@@ -112,10 +114,27 @@ class Planner {
   /// The structure takes none below: the parameter means nothing to it.
   static void drop_below(Cell& cell) {
     cell.parameters.below = BuilderParameters{}.below;
-    const std::size_t begin = cell.parameter_label.find(":below=");
-    if (begin == std::string::npos) return;
-    const std::size_t end = cell.parameter_label.find(':', begin + 1);
-    cell.parameter_label.erase(begin, end == std::string::npos ? end : end - begin);
+    drop_label(cell.parameter_label, "below");
+  }
+
+  /// Those that concern the cell's way of traversal: to the others they mean nothing.
+  static void keep_settings(Cell& cell) {
+    const auto keep = [&](std::string_view name, unsigned& setting) {
+      if (concerns(name, cell.traversal)) return;
+      setting = TraversalSettings::kOwn;
+      drop_label(cell.setting_label, name);
+    };
+    keep("hybrid_threshold", cell.settings.hybrid_threshold);
+    keep("rays_in_flight", cell.settings.rays_in_flight);
+  }
+
+  /// Why the cell's way of traversal cannot be set so; empty where it can.
+  static std::string impossible_setting(const Cell& cell) {
+    const unsigned threshold = cell.settings.hybrid_threshold;
+    if (threshold == TraversalSettings::kOwn) return {};
+    const auto rays = static_cast<unsigned>(std::stoul(cell.traversal.substr(std::string_view("hybrid").size())));
+    if (threshold <= rays) return {};
+    return fmt::format("{} has packets of {} rays: no threshold of {}", cell.traversal, rays, threshold);
   }
 
   /// Why the structure below cannot be, or not so; empty where it can.
@@ -155,6 +174,7 @@ class Planner {
                                                       cell.traversal, cell.isa);
       return why.empty() ? "no such kernel in this build" : why;
     }
+    if (std::string why = impossible_setting(cell); !why.empty()) return why;
     if (!registry_.has(cell.isa)) return fmt::format("no {}", to_string(cell.isa));
     return {};
   }
@@ -198,6 +218,7 @@ class Planner {
     std::string name = cell.name();
     if (!names_.insert(name).second) return;
     ++added_;
+    traversals_.insert(cell.traversal);
     const std::string& missing = experiment_.scenes[cell.scene_index].missing;
     const std::string reason = missing.empty() ? impossible(cell, entry) : missing;
     cell.metric = Cell::Metric::trace;
@@ -245,6 +266,7 @@ class Planner {
       cell.kernel = nullptr;
       cell.intersector = cell.box = cell.traversal = cell.workload = kNone;
       cell.start = {}, cell.start_label.clear();
+      cell.settings = {}, cell.setting_label.clear();
       if (seen.insert(cell.name()).second) plan_.cells.push_back(std::move(cell));
     }
   }
@@ -263,13 +285,18 @@ class Planner {
                         ": this exclude takes no cell away: nothing of it is in the sweep; take it out");
       }
     }
+    for (const auto& [name, where] : experiment_.parameter_places) {
+      if (!is_of_traversal(name) || std::ranges::any_of(traversals_, [&](const std::string& t) { return concerns(name, t); })) continue;
+      throw UserError(fmt::format("{}: {} has no effect: no cell's traversal is {}; add one to the axis, or take it out", where, name,
+                                  name == "rays_in_flight" ? "queued" : "a hybrid"));
+    }
   }
 
   const Experiment& experiment_;
   const Registry& registry_;
   std::vector<ParameterPoint> points_;
   Plan plan_;
-  std::set<std::string> names_;
+  std::set<std::string> names_, traversals_;
   std::set<std::size_t> used_includes_, used_excludes_;
   std::size_t added_ = 0;
 };

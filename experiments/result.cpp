@@ -106,6 +106,27 @@ void add_facts(Json& facts, const Counters& c) {
   facts["triangles_per_ray"] = static_cast<double>(c.triangles) / rays;
   if (c.lanes > 0)
     facts["simd_utilization"] = static_cast<double>(c.lanes_active) / static_cast<double>(c.lanes);
+  const auto share = [](std::uint64_t part, std::uint64_t whole) { return static_cast<double>(part) / static_cast<double>(whole); };
+  if (c.nodes > 0) {
+    Json& children = facts["children_hit"] = Json::array();
+    for (std::uint64_t visits : c.children_hit) children.push_back(share(visits, c.nodes));
+  }
+  if (!c.depths.empty()) {
+    Json &visits = facts["visits_by_depth"] = Json::array(), &lanes = facts["lane_utilization_by_depth"] = Json::array();
+    for (const Counters::Depth& d : c.depths) {
+      visits.push_back(static_cast<double>(d.visits) / rays);
+      lanes.push_back(d.lanes > 0 ? Json(share(d.lanes_active, d.lanes)) : Json(nullptr));
+    }
+  }
+  if (c.packets > 0) {
+    facts["packet_share"] = share(c.rays_in_packets, c.rays);
+    facts["switches_per_packet"] = share(c.switches, c.packets);
+    if (c.switches > 0) facts["rays_per_switch"] = share(c.rays_alone, c.switches);
+  }
+  if (c.queue_rounds > 0) {
+    facts["node_queue_length"] = share(c.nodes_queued, c.queue_rounds);
+    facts["leaf_queue_length"] = share(c.leaves_queued, c.queue_rounds);
+  }
 }
 
 void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit) {
@@ -142,7 +163,7 @@ std::string seen_points_file(const std::string& scene) {
 void add_axes(Json& json, const Cell& cell) {
   json["metric"] = to_string(cell.metric), json["scene"] = cell.scene, json["structure"] = cell.structure;
   json["builder"] = cell.builder_name(), json["leaf"] = cell.leaf, json["intersector"] = cell.intersector;
-  json["box"] = cell.box, json["traversal"] = cell.traversal, json["isa"] = to_string(cell.isa);
+  json["box"] = cell.box, json["traversal"] = cell.traversal_name(), json["isa"] = to_string(cell.isa);
   json["workload"] = cell.workload_name(), json["threads"] = cell.threads;
 }
 

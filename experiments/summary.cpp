@@ -65,7 +65,7 @@ Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
           c.leaf,
           c.intersector,
           c.box,
-          c.traversal,
+          c.traversal_name(),
           std::string(to_string(c.isa)),
           std::to_string(c.threads),
           fmt::format("{:.2f}", rate.median * 1e-6),

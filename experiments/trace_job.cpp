@@ -45,9 +45,15 @@ void TraceJob::any(RayBatch rays, std::size_t first, Counters* counters) const {
     cell_.kernel->any_hit(accel_, rays, occluded, counters);
 }
 
+RayBatch TraceJob::batch() const {
+  RayBatch rays = workload_.batch();
+  rays.settings = cell_.settings;
+  return rays;
+}
+
 void TraceJob::trace(std::size_t rays) const {
   const auto range = [&](std::size_t begin, std::size_t end) {
-    const RayBatch batch = workload_.batch().part(begin, end - begin);
+    const RayBatch batch = this->batch().part(begin, end - begin);
     if (workload_.query == Query::closest_hit)
       closest(batch, begin, nullptr);
     else
@@ -62,7 +68,7 @@ void TraceJob::trace(std::size_t rays) const {
 
 Counters TraceJob::count() const {
   Counters counters;
-  const RayBatch rays = workload_.batch();
+  const RayBatch rays = batch();
   if (!cell_.kernel->counts()) return counters;
   if (workload_.query == Query::closest_hit)
     closest(rays, 0, &counters);

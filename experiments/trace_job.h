@@ -32,6 +32,7 @@ class TraceJob {
   [[nodiscard]] Repetition measure(TimedLoop& loop) const;
 
  private:
+  [[nodiscard]] RayBatch batch() const;
   void trace(std::size_t rays) const;
   /// Of `rays`, which begin with ray `first` of the workload, into the buffers.
   void closest(RayBatch rays, std::size_t first, Counters* counters) const;

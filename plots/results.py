@@ -56,6 +56,10 @@ class Cell:
         values = self.values(name)
         return float(np.median(values)) if values else None
 
+    def series(self, name):
+        """The numbers that a row holds as a list under `name`, the same in all of them; empty where none does."""
+        return next((row[name] for row in self.rows if isinstance(row.get(name), list)), [])
+
     def estimate(self, name):
         """The median with its confidence interval; None where no row has `name`."""
         if name not in self._estimates:

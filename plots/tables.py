@@ -77,8 +77,12 @@ def throughput_table(results):
     reference = embree_rates(results, metric)
     counts = [(name, label) for name, label in PER_MILLION if any(c.per_million(name) is not None for c in cells)]
     extra = [(name, label) for name, label in (("nodes_per_ray", "nodes/ray"), ("triangles_per_ray", "tri/ray"),
-                                               ("simd_utilization", "lane use"), ("t_error_ulp_p99", "t error p99, ulp"))
+                                               ("simd_utilization", "lane use"), ("t_error_ulp_p99", "t error p99, ulp"),
+                                               ("packet_share", "rays in packets"), ("switches_per_packet", "switches/packet"),
+                                               ("rays_per_switch", "rays/switch"), ("node_queue_length", "nodes queued"),
+                                               ("leaf_queue_length", "leaves queued"))
              if any(c.value(name) is not None for c in cells)]
+    children = any(cell.series("children_hit") for cell in cells)
     best = {}
     for cell in cells:
         best[beside(cell)] = max(best.get(beside(cell), 0.0), cell.value(metric))
@@ -86,7 +90,7 @@ def throughput_table(results):
     heads = [(a, False) for a in axes] + [("Mray/s", True), ("95 % interval", False), ("wrong per million", True)]
     heads += [("× embree", True)] if reference else []
     heads += [("ns/ray", True)] + [(f"{label} per million", True) for name, label in counts if name != "wrong_answers"]
-    heads += [(label, True) for _, label in extra]
+    heads += [(label, True) for _, label in extra] + ([("children hit: 0, 1, 2, 3, 4+, %", False)] if children else [])
     rows = []
     for cell in cells:
         rate = cell.estimate(metric)
@@ -100,6 +104,8 @@ def throughput_table(results):
         out.append(number(1e9 / rate.median, "{:.1f}"))
         out += [number(cell.per_million(name), "{:.4g}") for name, _ in counts if name != "wrong_answers"]
         out += [number(cell.value(name)) for name, _ in extra]
+        if children:
+            out.append(text(" ".join(f"{100 * share:.0f}" for share in cell.series("children_hit"))))
         rows.append((out, "best" if rate.median == best[beside(cell)] else ""))
     note = constant_axes(cells, [a for a in THROUGHPUT_AXES if a not in axes])
     return (f'<p class="soft">Throughput: {escape(unit)}, the median of the repetitions. Wrong answers are missed hits, false '

@@ -1,11 +1,25 @@
 #include "traversal/counting.h"
 
+#include <algorithm>
+
 namespace arboretum {
 
 void WithCounters::node(unsigned boxes, unsigned lanes, unsigned hit) const noexcept {
   ++counters.nodes;
   counters.boxes += boxes, counters.lanes_active += boxes;
   counters.boxes_hit += hit, counters.lanes += lanes;
+  ++counters.children_hit[std::min<std::size_t>(hit, counters.children_hit.size() - 1)];
+}
+
+void WithCounters::at_depth(Depth depth, unsigned lanes, unsigned active) const {
+  if (counters.depths.size() <= depth.value) counters.depths.resize(depth.value + 1);
+  counters.depths[depth.value] += {1, lanes, active};
+}
+
+void WithCounters::Depths::push(std::ptrdiff_t begin, std::ptrdiff_t end) {
+  const auto first = static_cast<std::size_t>(begin), last = static_cast<std::size_t>(end);
+  if (waiting_.size() < last) waiting_.resize(last);
+  for (std::size_t i = first; i < last; ++i) waiting_[i] = current_ + 1;
 }
 
 void WithCounters::leaf(const LeafForm& form, const std::byte* blocks, unsigned count) const noexcept {

@@ -4,6 +4,7 @@
 // table of leaf tests (intersectors/leaf_tests.h). A function pointer takes a whole batch of rays: below it all is templates.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,7 +20,8 @@ namespace arboretum {
 class Accel;
 struct LeafTests;
 
-/// Work done by a batch; filled by the counting kernels alone (the timed ones carry no counters).
+/// Work done by a batch; filled by the counting kernels alone (the timed ones carry no counters). What a packet visits
+/// counts once for each of its rays that are there.
 struct Counters {
   std::uint64_t rays = 0;
   std::uint64_t nodes = 0;          ///< inner nodes visited
@@ -30,6 +32,23 @@ struct Counters {
   std::uint64_t triangles = 0;      ///< ray/triangle tests, empty lanes not counted
   std::uint64_t lanes = 0;          ///< SIMD lanes spent on boxes and triangles
   std::uint64_t lanes_active = 0;   ///< of them, those that held a box or triangle that exists
+
+  std::array<std::uint64_t, 5> children_hit{};  ///< node visits in which the ray met 0, 1, 2, 3, 4 or more children
+  /// What nodes at one depth, the root's 0, were tested with: the rays of a packet, or the children that one ray is tested against.
+  struct Depth {
+    std::uint64_t visits = 0;  ///< by a packet or by one ray
+    std::uint64_t lanes = 0, lanes_active = 0;
+    Depth& operator+=(const Depth& o) noexcept;
+  };
+  std::vector<Depth> depths;  ///< of trees whose kernels follow their depth (the BVHs, the kd-tree), else empty
+
+  std::uint64_t packets = 0;
+  std::uint64_t rays_in_packets = 0;
+  std::uint64_t switches = 0;        ///< times that a packet had its rays go on alone in a node
+  std::uint64_t rays_alone = 0;      ///< the rays that did, at all switches
+  std::uint64_t queue_rounds = 0;    ///< of rays in flight: once through the queue of nodes and that of leaves
+  std::uint64_t nodes_queued = 0;    ///< lengths of the queues when their turn comes, added up
+  std::uint64_t leaves_queued = 0;
   Counters& operator+=(const Counters& o) noexcept;
 };
 

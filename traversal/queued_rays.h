@@ -18,13 +18,10 @@
 //   void finish(State&) const;                                      before a ray's closest hit is reported
 #pragma once
 
-#include "traversal/kernel_rows.h"
+#include "traversal/queued_functions.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
-
-/// Rays in flight at most.
-inline constexpr unsigned kMostInFlight = 64;
 
 template <class Walk>
 class QueuedRays {
@@ -34,11 +31,13 @@ class QueuedRays {
       : in_flight_(in_flight), walk_(accel, row), rays_(rays), stride_(stride_of(walk_.stack_entries())), stacks_(stride_ * in_flight) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
-  template <class Report>
-  void run(Report&& report) {
+  template <class Report, class Counting>
+  void run(Report&& report, const Counting& counting) {
     for (unsigned slot = 0; slot < in_flight_; ++slot) start(slot, report);
     while (counts_[0] | counts_[1] | counts_[2]) {
+      counting.node_queue(counts_[0]);
       step_nodes();
+      counting.leaf_queue(counts_[1]);
       step_leaves();
       const unsigned done = std::exchange(counts_[2], 0u);
       for (unsigned i = 0; i < done; ++i) {
@@ -133,47 +132,6 @@ class QueuedRays {
   Step pending_[kMostInFlight];
   alignas(64) std::byte slots_[kMostInFlight * sizeof(Slot)];
 };
-
-template <class Walk>
-void queued_closest_hit(const Accel& a, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<Hit> hits) {
-  QueuedRays<Walk> queued(a, row, rays, in_flight);
-  queued.run([&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-}
-
-template <class Walk>
-void queued_any_hit(const Accel& a, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded) {
-  QueuedRays<Walk> queued(a, row, rays, in_flight);
-  queued.run([&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-}
-
-/// Walk<Leaves, Padded, AnyHit>; `Closest` and `Any` rays in flight for the two kinds of query. A ray visits the same nodes and leaves in
-/// the same order as alone, so the counting functions of `Single` count for it.
-template <template <class, bool, bool> class Walk, class Single, unsigned Closest, unsigned Any = Closest>
-struct QueuedFunctions {
-  template <class Leaves, bool Padded>
-  static RowFunctions timed() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters*) {
-              queued_closest_hit<Walk<Leaves, Padded, false>>(a, row, rays, Closest, hits);
-            },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters*) {
-              queued_any_hit<Walk<Leaves, Padded, true>>(a, row, rays, Any, occluded);
-            }};
-  }
-  template <bool Padded>
-  static RowFunctions counting() {
-    return Single::template counting<Padded>();
-  }
-};
-
-/// `queued` with the numbers of rays in flight that paid most (docs/performance.md), and rows with fixed numbers.
-template <class Structure, template <class, bool, bool> class Walk, class Single, class... Compiled>
-void add_queued_rows(KernelRows& rows, TypeList<Compiled...> leaves) {
-  add_rows<Structure, QueuedFunctions<Walk, Single, 32, 64>>(rows, "queued", leaves);
-  add_rows<Structure, QueuedFunctions<Walk, Single, 8>>(rows, "queued8", leaves);
-  add_rows<Structure, QueuedFunctions<Walk, Single, 16>>(rows, "queued16", leaves);
-  add_rows<Structure, QueuedFunctions<Walk, Single, 32>>(rows, "queued32", leaves);
-  add_rows<Structure, QueuedFunctions<Walk, Single, 64>>(rows, "queued64", leaves);
-}
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -19,7 +19,7 @@ struct BvhAuto {
   using Packets = BvhPacketFunctions<SoaPacketNodes<N>, 64, 6>;
   /// Rays in flight pay where children are pushed in registers (docs/performance.md).
   static constexpr bool kQueues = ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512 ? N >= 4 : ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2 && N == 8;
-  using Incoherent = std::conditional_t<kQueues, BvhQueued<N, 32, 64>, typename BvhSingle<SoaTests<N>::template Nodes>::Functions>;
+  using Incoherent = std::conditional_t<kQueues, QueuedFunctions<BvhQueue<N>::template Of, typename BvhQueue<N>::Single, 32, 64>, typename BvhQueue<N>::Single>;
 
   [[nodiscard]] static bool coherent(const Ray* rays, std::size_t count) {
     if (count < kTile / 4) return false;

@@ -15,7 +15,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_rows<bvh::Bvh<N>, typename BvhSingle<SoaTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
-  add_queued_rows<N>(rows);
+  add_queued_rows<bvh::Bvh<N>, BvhQueue<N>::template Of, typename BvhQueue<N>::Single>(rows, BatchLeaves{});
   add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, BatchLeaves{});
   add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", BatchLeaves{});
   add_stream_rows<N>(rows);

@@ -57,7 +57,8 @@ struct SoaPacketNodes {
 /// One ray through what hangs below `root`, with what it has met already.
 template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
 __attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Leaves& leaves, const LeafForm& form,
-                                           const Counting& counting, StackEntry* stack, const Ray& ray, typename Leaves::RayData& data, NearestHit& best) {
+                                           const Counting& counting, StackEntry* stack, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
+                                           typename Counting::Depth depth) {
   typename Format::template Single<Padded> nodes(ray, max_coordinate);
   if constexpr (!AnyHit) nodes.shorten(best.t);
   return walk_bvh<AnyHit>(base, root, nodes, stack, best.t, counting, [&](bvh::NodeReference r) {
@@ -67,7 +68,7 @@ __attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeRefer
     if constexpr (AnyHit) return leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar);
     if (leaves.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
     return false;
-  });
+  }, depth);
 }
 
 /// W rays a register. `fast` and `padded` are one class: they differ in what rays bring with them (compile time).
@@ -81,6 +82,7 @@ class BvhPackets {
   /// Traces `count` rays, 1 to kMostPacketRays; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
     rays_ = rays, threshold_ = threshold;
+    if constexpr (Counting::kCounting) ++counting_.counters.packets, lanes_ = unsigned(count);
     chunks_ = (count + W - 1) / W;
     std::uint64_t octants[8] = {};
     prepare(count, octants);
@@ -283,11 +285,13 @@ class BvhPackets {
     float tfar = farthest(group);
     Entry* const stack = stack_.data();
     Entry* top = stack;
+    typename Counting::Depths depths{typename Counting::Depth{}};
     Entry e{root_, interval.tnear, group};
     for (;;) {
       while (!bvh::is_leaf(e.reference)) {
         if (__builtin_popcountll(e.mask) <= threshold_) {
-          for (std::uint64_t rest = e.mask; rest; rest &= rest - 1) alone(__builtin_ctzll(rest), e.reference);
+          if constexpr (Counting::kCounting) ++counting_.counters.switches, counting_.counters.rays_alone += unsigned(__builtin_popcountll(e.mask));
+          for (std::uint64_t rest = e.mask; rest; rest &= rest - 1) alone(__builtin_ctzll(rest), e.reference, depths.current());
           if constexpr (!AnyHit) tfar = farthest(group);
           goto pop;
         }
@@ -303,12 +307,12 @@ class BvhPackets {
         alignas(64) float t[kLanes];
         entry.store(t);
         Entry* const bottom = top;
-        [[maybe_unused]] unsigned taken = 0;
+        [[maybe_unused]] MetChildren met;
         for (; hit; hit &= hit - 1) {
           const int i = __builtin_ctz(hit);
           const std::uint64_t mask = rays_met(interval.near, node, i, e.mask);
           if (mask == 0) continue;
-          ++taken;
+          met.add(mask);
           const bvh::NodeReference child = Format::child(node, i);
           const auto* target = reinterpret_cast<const char*>(base_ + bvh::offset_of(child));
           for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
@@ -318,9 +322,11 @@ class BvhPackets {
           }
           *p = {child, t[i], mask};
         }
-        if constexpr (Counting::kCounting) count(node, unsigned(__builtin_popcountll(e.mask)), taken);
+        if constexpr (Counting::kCounting) count(node, e.mask, met, depths.current());
         if (top == bottom) goto pop;
+        depths.push(bottom - stack, top - stack);
         e = *--top;
+        depths.pop(top - stack);
       }
       leaf(e);
       if constexpr (!AnyHit) tfar = farthest(group);
@@ -328,16 +334,17 @@ class BvhPackets {
       for (;;) {
         if (top == stack) return;
         e = *--top;
+        depths.pop(top - stack);
         if constexpr (AnyHit) e.mask &= active_;
         if (e.mask != 0 && (AnyHit || e.t <= tfar)) break;
       }
     }
   }
 
-  void alone(int i, bvh::NodeReference reference) {
+  void alone(int i, bvh::NodeReference reference, typename Counting::Depth depth) {
     const auto below = padded_ ? &trace_below<Format, Leaves, true, AnyHit, Counting> : &trace_below<Format, Leaves, false, AnyHit, Counting>;
     auto&& ray = data(i);
-    const bool hit = below(base_, reference, max_coordinate_, leaves_, form_, counting_, single_stack_.data(), rays_[i], ray, best_[i]);
+    const bool hit = below(base_, reference, max_coordinate_, leaves_, form_, counting_, single_stack_.data(), rays_[i], ray, best_[i], depth);
     if constexpr (AnyHit) {
       if (hit) occluded(i);
     }
@@ -426,10 +433,23 @@ class BvhPackets {
     }
   }
 
+  /// How many children of a node each ray meets.
+  struct WithMetChildren {
+    std::uint8_t of_ray[kMostPacketRays] = {};
+    void add(std::uint64_t mask) {
+      for (; mask; mask &= mask - 1) ++of_ray[__builtin_ctzll(mask)];
+    }
+  };
+  struct NoMetChildren {
+    ARBORETUM_INLINE void add(std::uint64_t) const {}
+  };
+  using MetChildren = std::conditional_t<Counting::kCounting, WithMetChildren, NoMetChildren>;
+
   /// A node visit of a packet counts as one of each of its rays.
-  void count(const std::byte* node, unsigned rays, unsigned taken) const {
+  void count(const std::byte* node, std::uint64_t mask, const MetChildren& met, typename Counting::Depth depth) const {
     const unsigned boxes = Format::boxes(node);
-    for (unsigned i = 0; i < rays; ++i) counting_.node(boxes, kLanes, taken);
+    counting_.at_depth(depth, lanes_, unsigned(__builtin_popcountll(mask)));
+    for (; mask; mask &= mask - 1) counting_.node(boxes, kLanes, met.of_ray[__builtin_ctzll(mask)]);
   }
 
   const std::byte* base_;
@@ -442,6 +462,7 @@ class BvhPackets {
   const Ray* rays_ = nullptr;
   int threshold_ = 0, chunks_ = 0;
   std::uint64_t active_ = 0, valid_ = 0, overflown_ = 0;
+  unsigned lanes_ = 0;  ///< rays of the packet, where it is counted
   PacketRays soa_;
   alignas(64) float r_[3][kMostPacketRays], near_[3][kMostPacketRays], far_[3][kMostPacketRays], tnear_[kMostPacketRays], t_[kMostPacketRays];
   NearestHit best_[kMostPacketRays];
@@ -478,19 +499,22 @@ struct PacketBatch {
       packet.trace(&rays[begin], count, threshold);
       for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
     }
-    if constexpr (Counting::kCounting) counters->rays += rays.size();
+    if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_packets += rays.size();
   }
 };
 
-/// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone.
-template <class Format, int Rays, int Threshold>
+/// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone. Of `Hybrid` ones the batch may set it.
+template <class Format, int Rays, int Threshold, bool Hybrid = false>
 struct BvhPacketFunctions {
   static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
 
   template <class Batch>
   static RowFunctions functions() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) { Batch::closest_hit(a, row, rays, hits, c, Rays, Threshold); },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* c) { Batch::any_hit(a, row, rays, occluded, c, Rays, Threshold); }};
+    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) { Batch::closest_hit(a, row, rays, hits, c, Rays, threshold(rays)); },
+            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* c) { Batch::any_hit(a, row, rays, occluded, c, Rays, threshold(rays)); }};
+  }
+  static int threshold(const RayBatch& rays) {
+    return Hybrid ? int(std::min(TraversalSettings::chosen(rays.settings.hybrid_threshold, Threshold), unsigned(Rays))) : Threshold;
   }
   template <class Leaves, bool>
   static RowFunctions timed() {
@@ -511,9 +535,9 @@ void add_packet_rows(KernelRows& rows, Compiled compiled) {
   add_rows<Structure, BvhPacketFunctions<Format, 16, 0>>(rows, "packet16", TypeList<>{});
   add_rows<Structure, BvhPacketFunctions<Format, 32, 4>>(rows, "packet32", compiled);
   add_rows<Structure, BvhPacketFunctions<Format, 64, 6>>(rows, "packet64", compiled);
-  add_rows<Structure, BvhPacketFunctions<Format, 4, 1>>(rows, "hybrid4", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 8, 2>>(rows, "hybrid8", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 16, 3>>(rows, "hybrid16", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 4, 1, true>>(rows, "hybrid4", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 8, 2, true>>(rows, "hybrid8", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 16, 3, true>>(rows, "hybrid16", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -8,7 +8,7 @@
 
 #include "traversal/usual_leaves.h"
 #include "structures/bvh/bvh_single.h"
-#include "traversal/kernel_rows.h"
+#include "traversal/queued_functions.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -103,23 +103,23 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
   push_in_scalars<N, AnyHit>(child, key, hit, top);
 }
 
-/// Rays in flight at most.
-inline constexpr unsigned kMostInFlight = 64;
-
 template <int N, class Leaves, bool Padded, bool AnyHit>
 class Queued {
  public:
   /// `in_flight`: 1 to kMostInFlight.
+  Queued(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight) : Queued(static_cast<const bvh::BvhBase&>(accel), row, rays, in_flight) {}
   Queued(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, unsigned in_flight)
       : in_flight_(in_flight), base_(tree.base()), leaves_(row, tree.vertices()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), rays_(rays),
         stride_(((tree.stack_entries() + 6 + 7) / 8 | 1) * 8), stacks_(stride_ * in_flight) {}
 
-  /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
-  template <class Report>
-  void run(Report&& report) {
+  /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit. Of `counting` the queues' lengths alone.
+  template <class Report, class Counting>
+  void run(Report&& report, const Counting& counting) {
     for (unsigned slot = 0; slot < in_flight_; ++slot) start(slot, report);
     while (counts_[0] | counts_[1]) {
+      counting.node_queue(counts_[0]);
       step_nodes();
+      counting.leaf_queue(counts_[1]);
       step_leaves();
       const unsigned done = std::exchange(counts_[2], 0u);
       for (unsigned i = 0; i < done; ++i) {
@@ -256,42 +256,13 @@ class Queued {
   alignas(64) std::byte states_[kMostInFlight * sizeof(State)];
 };
 
-template <int N, class Leaves, bool Padded>
-void queued_closest_hit(const Accel& a, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<Hit> hits) {
-  Queued<N, Leaves, Padded, false> queued(static_cast<const bvh::Bvh<N>&>(a), row, rays, in_flight);
-  queued.run([&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-}
-
-template <int N, class Leaves, bool Padded>
-void queued_any_hit(const Accel& a, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded) {
-  Queued<N, Leaves, Padded, true> queued(static_cast<const bvh::Bvh<N>&>(a), row, rays, in_flight);
-  queued.run([&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-}
-
-/// `Closest` and `Any` rays in flight for the two kinds of query.
-template <int N, unsigned Closest, unsigned Any = Closest>
-struct BvhQueued {
-  template <class Leaves, bool Padded>
-  static RowFunctions timed() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters*) { queued_closest_hit<N, Leaves, Padded>(a, row, rays, Closest, hits); },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters*) { queued_any_hit<N, Leaves, Padded>(a, row, rays, Any, occluded); }};
-  }
-  /// A ray visits the same nodes and leaves in the same order as alone, so the single rays' counting functions count for it.
-  template <bool Padded>
-  static RowFunctions counting() {
-    return BvhSingle<SoaTests<N>::template Nodes>::Functions::template counting<Padded>();
-  }
-};
-
-/// The rows of queued traversal: `queued` with the numbers that paid most (docs/performance.md), and fixed ones.
+/// As traversal/queued_functions.h takes it.
 template <int N>
-void add_queued_rows(KernelRows& rows) {
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 32, 64>>(rows, "queued", BatchLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 8>>(rows, "queued8", BatchLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 16>>(rows, "queued16", BatchLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 32>>(rows, "queued32", BatchLeaves{});
-  add_rows<bvh::Bvh<N>, BvhQueued<N, 64>>(rows, "queued64", BatchLeaves{});
-}
+struct BvhQueue {
+  template <class Leaves, bool Padded, bool AnyHit>
+  using Of = Queued<N, Leaves, Padded, AnyHit>;
+  using Single = typename BvhSingle<SoaTests<N>::template Nodes>::Functions;
+};
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -48,19 +48,26 @@ struct SoaTests {
 };
 
 /// Depth first, children near to far; for any hit in whatever order, since an occluder may be anywhere. `leaf(reference)` returns true to stop; where it finds a nearer hit it lowers `nearest`, beyond which
-/// nothing is visited, and shortens `nodes`. Returns whether it was stopped.
+/// nothing is visited, and shortens `nodes`. Returns whether it was stopped. `depth`: of the root, where it is counted.
 template <bool AnyHit, class Nodes, class Counting, class Leaf>
 ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, Nodes& nodes, StackEntry* stack, const float& nearest,
-                               const Counting& counting, const Leaf& leaf) {
+                               const Counting& counting, const Leaf& leaf, typename Counting::Depth depth = {}) {
   StackEntry* top = stack;
+  typename Counting::Depths depths(depth);
   bvh::NodeReference reference = root;
   for (;;) {
     while (!bvh::is_leaf(reference)) {
       const std::byte* node = base + bvh::offset_of(reference);
       vf<Nodes::W> entry;
       const unsigned hit = nodes.test(node, entry);
-      if constexpr (Counting::kCounting) counting.node(Nodes::boxes(node), Nodes::kSlots, unsigned(__builtin_popcount(hit)));
+      if constexpr (Counting::kCounting) {
+        const unsigned boxes = Nodes::boxes(node), met = unsigned(__builtin_popcount(hit));
+        counting.node(boxes, Nodes::kSlots, met);
+        counting.at_depth(depths.current(), Nodes::kSlots, boxes);
+        if (met > 1) depths.push(top - stack, top - stack + met - 1);
+      }
       if (hit == 0) goto pop;
+      depths.descend();
       const bvh::NodeReference* child = Nodes::children(node);
       if ((hit & (hit - 1)) == 0) {
         reference = child[__builtin_ctz(hit) * Nodes::kStride];
@@ -79,6 +86,7 @@ ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, N
     for (;;) {
       if (top == stack) return false;
       const StackEntry e = *--top;
+      depths.pop(top - stack);
       reference = bvh::NodeReference(e);
       if (AnyHit || __builtin_bit_cast(float, std::uint32_t(e >> 32)) <= nearest) break;
     }

@@ -103,17 +103,22 @@ class Stream {
   void octant(const List& root, Vec3f direction, unsigned free) {
     const Box& box = states_[ray_of(entries_[root.begin])].box;
     const unsigned near[6] = {box.near_x, box.near_x ^ Box::kSide, box.near_y, 5 * Box::kSide - box.near_y, box.near_z, 9 * Box::kSide - box.near_z};
-    List* top = lists_.data();
+    List* const bottom = lists_.data();
+    List* top = bottom;
     *top++ = root;
-    while (top != lists_.data()) {
+    typename Counting::Depths depths{typename Counting::Depth{}};
+    while (top != bottom) {
       List list = *--top;
+      if (list.target != root.target) depths.pop(top - bottom);
       drop(list);
       if (list.count <= kFewRays) {
-        for (unsigned i = 0; i < list.count; ++i) alone(ray_of(entries_[list.begin + i]), list.target);
+        for (unsigned i = 0; i < list.count; ++i) alone(ray_of(entries_[list.begin + i]), list.target, depths.current());
       } else if (bvh::is_leaf(list.target)) {
         leaf(list);
       } else {
-        node(list, near, direction, list.begin < free ? free : list.begin, top);
+        List* const first = top;
+        node(list, near, direction, list.begin < free ? free : list.begin, top, depths.current());
+        depths.push(first - bottom, top - bottom);
       }
     }
   }
@@ -133,7 +138,7 @@ class Stream {
     list.count = unsigned(out - first);
   }
 
-  void node(const List& list, const unsigned (&side)[6], Vec3f direction, unsigned free, List*& top) {
+  void node(const List& list, const unsigned (&side)[6], Vec3f direction, unsigned free, List*& top, typename Counting::Depth depth) {
     const std::byte* const node = base_ + bvh::offset_of(list.target);
     const F planes[6] = {F::load(node + side[0]), F::load(node + side[1]), F::load(node + side[2]),
                          F::load(node + side[3]), F::load(node + side[4]), F::load(node + side[5])};
@@ -148,7 +153,10 @@ class Stream {
       box.near_x = 0, box.near_y = 2 * Box::kSide, box.near_z = 4 * Box::kSide;
       F entry;
       unsigned hit = box.test_planes([&](unsigned offset) { return planes[offset / Box::kSide]; }, F(s.first), F(s.nearest), entry);
-      if constexpr (Counting::kCounting) counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
+      if constexpr (Counting::kCounting) {
+        counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
+        counting_.at_depth(depth, Test::kSlots, Test::boxes(node));
+      }
       entry.store(key);
       // Two without a branch, which most rays need no more than; what is not there goes to the list behind the last.
       const auto append = [&] {
@@ -215,14 +223,14 @@ class Stream {
   }
 
   /// One ray from `target` on.
-  void alone(unsigned ray, bvh::NodeReference target) {
+  void alone(unsigned ray, bvh::NodeReference target, typename Counting::Depth depth) {
     State& s = states_[ray];
     Test nodes(s.box, s.first, s.nearest);
     walk_bvh<AnyHit>(base_, target, nodes, stack_.data(), leaf_states_[ray].best.t, counting_, [&](bvh::NodeReference reference) {
       if (!leaf(ray, base_ + bvh::offset_of(reference), bvh::block_count(reference))) return false;
       if constexpr (!AnyHit) nodes.shorten(s.nearest);
       return AnyHit;
-    });
+    }, depth);
   }
 
   const std::byte* const base_;

@@ -107,7 +107,7 @@ class KdQueuedWalk {
 
 /// `fast` and `padded` are one walk with other constants.
 template <class Leaves, bool, bool AnyHit>
-using KdQueued = KdQueuedWalk<Leaves, AnyHit>;
+using KdQueued = QueuedRays<KdQueuedWalk<Leaves, AnyHit>>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

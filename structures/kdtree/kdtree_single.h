@@ -101,6 +101,7 @@ class KdSingle {
     KdStackEntry* const stack = stack_.data();
     KdStackEntry* top = stack;
     std::uint64_t node = root_;
+    typename Counting::Depths depths{typename Counting::Depth{}};
     for (;;) {
       for (;;) {
         const auto link = std::uint32_t(node >> 32);
@@ -115,6 +116,11 @@ class KdSingle {
         const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell), skip_far = (enter > end) | (far == kdtree::kEmptyCell);
         // A plane decides about two cells; a lane each.
         counting_.node(2, 2, 2u - skip_near - skip_far);
+        counting_.at_depth(depths.current(), 2, 2);
+        if constexpr (Counting::kCounting) {
+          if (!skip_near && !skip_far) depths.push(top - stack, top - stack + 1);
+        }
+        depths.descend();
         const float far_begin = enter > begin ? enter : begin;
         if (skip_near) {
           if (skip_far) goto pop;
@@ -139,6 +145,7 @@ class KdSingle {
         if (top == stack) return false;
         --top;
       } while (!AnyHit && top->begin > best.t);
+      depths.pop(top - stack);
       node = top->node, begin = top->begin;
       end = top->end < best.t ? top->end : best.t;
     }

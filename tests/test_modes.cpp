@@ -1,0 +1,381 @@
+// Settings of the ways of traversal, from the configuration to the kernel, and what the counting pass says of packets, hybrids and queues:
+// answers that no setting changes, settings that do what they say, and counts of a tree small enough to know them by hand.
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include <unistd.h>
+
+#include "core/error.h"
+#include "experiments/config.h"
+#include "experiments/effective.h"
+#include "experiments/plan.h"
+#include "experiments/result.h"
+#include "tests/catch.h"
+#include "tests/kernel_runner.h"
+#include "tests/kernel_scenes.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+namespace {
+
+unsigned rays_of(const KernelRow& row) { return unsigned(std::stoul(std::string(row.traversal.substr(6)))); }
+
+std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, TraversalSettings settings, Counters* counters = nullptr) {
+  std::vector<Hit> hits(rays.size(), Hit{-1.0f, 0, 0, 0});
+  RayBatch batch(rays);
+  batch.settings = settings;
+  row.closest_hit(accel, batch, hits, counters);
+  return hits;
+}
+std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, TraversalSettings settings, Counters* counters = nullptr) {
+  std::vector<std::uint8_t> occluded(rays.size(), 0xee);
+  RayBatch batch(rays);
+  batch.settings = settings;
+  row.any_hit(accel, batch, occluded, counters);
+  return occluded;
+}
+
+/// Rows of `traversals` with padded boxes and the two usual intersectors, on each ISA of this machine, once a kernel.
+std::vector<KernelRow> rows_of(std::string_view prefix) {
+  std::vector<KernelRow> rows;
+  for (const KernelRow& row : runnable_rows())
+    if (row.box == "padded" && row.traversal.starts_with(prefix) && row.structure != "embree") rows.push_back(row);
+  return rows;
+}
+
+/// Coherent rays, incoherent ones and some that are none.
+std::vector<Ray> mixed_rays(const TriangleMesh& mesh) {
+  const Vec3f centre = mesh.bounds().center();
+  std::vector<Ray> rays = aimed_rays(mesh, centre + mesh.bounds().extent() * 2.0f, 40, 61);
+  const std::vector<Ray> generic = generic_rays(mesh, 30, 62);
+  rays.insert(rays.end(), generic.begin(), generic.end());
+  std::size_t place = 3;
+  for (const Ray& ray : invalid_rays()) rays.insert(rays.begin() + std::ptrdiff_t(place % rays.size()), ray), place += 9;
+  return rays;
+}
+
+/// The best instruction set of this machine that the build has kernels for.
+Isa some_isa() {
+  Isa best = Isa::scalar;
+  for (Isa isa : kAllIsas)
+    if (is_available(isa) && find_kernel("bvh2", "triangle1", "moller_trumbore", "padded", "single", isa)) best = isa;
+  return best;
+}
+const KernelRow& kernel(std::string_view traversal) {
+  const KernelRow* row = find_kernel("bvh2", "triangle1", "moller_trumbore", "padded", traversal, some_isa());
+  REQUIRE(row);
+  return *row;
+}
+
+/// Four triangles across the x axis at x = 0, 1, 20, 21, two by two in the nodes of a binary tree: the root, two nodes, four leaves. The first of
+/// each pair is half as high as the others, which reach from -1 to 1 in y and z.
+struct SmallTree {
+  TriangleMesh mesh;
+  std::unique_ptr<Accel> accel;
+  SmallTree() {
+    for (const auto& [x, size] : {std::pair{0.0f, 0.5f}, {1.0f, 1.0f}, {20.0f, 0.5f}, {21.0f, 1.0f}}) {
+      const auto first = std::uint32_t(mesh.vertices.size());
+      mesh.vertices.insert(mesh.vertices.end(), {{x, -size, -size}, {x, size, -size}, {x, -size, size}});
+      mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    BuildSettings settings;
+    settings.leaf = "triangle1", settings.isa = some_isa(), settings.parameters.max_leaf_blocks = 1;
+    BuildReport report;
+    accel = build_structure("bvh2", mesh, settings, report);
+  }
+};
+constexpr Ray kThroughAll{{-5, -0.25f, -0.25f}, 0, {1, 0, 0}, kInfinity};       // meets both nodes, then the first triangle
+constexpr Ray kPastAll{{-5, 0.4f, 0.4f}, 0, {1, 0, 0}, kInfinity};              // within all boxes, past all triangles
+constexpr Ray kFarPair{{30, -0.75f, -0.75f}, 0, {-1, 0, 0}, 15};                // meets one node and in it one leaf
+constexpr Ray kNothing{{-5, 3, 0}, 0, {1, 0, 0}, kInfinity};                    // meets no box
+
+std::vector<std::uint64_t> visits_of(const Counters& c) {
+  std::vector<std::uint64_t> visits;
+  for (const Counters::Depth& d : c.depths) visits.push_back(d.visits);
+  return visits;
+}
+
+using Five = std::array<std::uint64_t, 5>;
+
+}  // namespace
+
+TEST_CASE("no threshold of a hybrid and no number of rays in flight changes a bit of an answer") {
+  const TriangleMesh mesh = random_triangles(400, 0.2f, 3);
+  const std::vector<Ray> rays = mixed_rays(mesh);
+  Structures structures(mesh);
+  std::size_t compared = 0;
+  const auto compare = [&](const KernelRow& row, TraversalSettings settings, std::size_t size, std::span<const Hit> alone, std::span<const std::uint8_t> occluded) {
+    INFO(name_of(row) << ", threshold " << int(settings.hybrid_threshold) << ", in flight " << int(settings.rays_in_flight) << ", batch of " << size);
+    const std::span<const Ray> batch = std::span(rays).first(size);
+    REQUIRE(same_bits(closest_hit(row, structures.get(row), batch, settings), alone.first(size)));
+    REQUIRE(std::ranges::equal(any_hit(row, structures.get(row), batch, settings), occluded.first(size)));
+    ++compared;
+  };
+  for (std::string_view way : {"hybrid", "queued"}) {
+    for (const KernelRow& row : rows_of(way)) {
+      if (way == "queued" && row.traversal != "queued") continue;
+      if (way == "hybrid" && row.structure != "bvh8" && row.structure != "bvh4_aos" && row.structure != "bvh2") continue;
+      const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+      REQUIRE(single);
+      const std::vector<Hit> alone = test::closest_hit(*single, structures.get(row), rays);
+      const std::vector<std::uint8_t> occluded = test::any_hit(*single, structures.get(row), rays);
+      if (way == "hybrid") {
+        const unsigned width = rays_of(row);
+        for (unsigned threshold = 0; threshold <= width; ++threshold)
+          for (std::size_t size = 1; size <= 2 * width + 1; ++size) compare(row, {.hybrid_threshold = threshold}, size, alone, occluded);
+      } else {
+        for (unsigned flight : {1u, 2u, 3u, 7u, 33u, 64u})
+          for (std::size_t size : {std::size_t(1), std::size_t(flight), 2 * std::size_t(flight) + 1, rays.size()})
+            compare(row, {.rays_in_flight = flight}, std::min(size, rays.size()), alone, occluded);
+      }
+    }
+  }
+  CHECK(compared > 1000);
+}
+
+TEST_CASE("a hybrid's threshold and the rays in flight do what they say") {
+  const TriangleMesh mesh = sphere(24);
+  const std::vector<Ray> rays = generic_rays(mesh, 256, 9);
+  Structures structures(mesh);
+  for (const KernelRow& row : rows_of("hybrid")) {
+    if (row.structure != "bvh8") continue;
+    INFO(name_of(row));
+    const unsigned width = rays_of(row);
+    double last = -1;
+    for (unsigned threshold = 0; threshold <= width; ++threshold) {
+      INFO("threshold " << threshold);
+      Counters c;
+      (void)closest_hit(row, structures.get(row), rays, {.hybrid_threshold = threshold}, &c);
+      CHECK(c.rays_alone <= c.switches * threshold);
+      CHECK(c.packets == (rays.size() + width - 1) / width);
+      CHECK(c.rays_in_packets == rays.size());
+      if (threshold == 0) CHECK(c.switches == 0);
+      if (threshold == width) CHECK(c.rays_alone == rays.size());  // each at the root, and once
+      const double of_packets = c.depths.empty() ? 0 : double(c.depths[0].lanes_active) / double(c.depths[0].lanes);
+      CHECK(of_packets > 0);
+      const double mean = c.switches ? double(c.rays_alone) / double(c.switches) : 0;
+      CHECK(mean >= last);  // the higher the threshold, the more rays go on alone at once
+      last = mean;
+    }
+    Counters own, same;
+    (void)closest_hit(row, structures.get(row), rays, {}, &own);
+    (void)closest_hit(row, structures.get(row), rays, {.rays_in_flight = 5}, &same);
+    CHECK(own.switches > 0);
+    CHECK(own.switches == same.switches);
+  }
+  std::size_t queues = 0;
+  for (const KernelRow& row : rows_of("queued")) {
+    if (row.intersector != "moller_trumbore") continue;
+    INFO(name_of(row));
+    ++queues;
+    const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+    Counters alone;
+    (void)closest_hit(*single, structures.get(row), rays, {}, &alone);
+    double last = 0;
+    for (unsigned flight : {1u, 4u, 16u, 64u}) {
+      Counters c;
+      (void)closest_hit(row, structures.get(row), rays, {.rays_in_flight = flight}, &c);
+      const bool set = row.traversal == "queued";
+      const double most = set ? flight : std::stoul(std::string(row.traversal.substr(6)));
+      CHECK(c.nodes == alone.nodes);
+      // An empty cell of the kd-tree is no leaf to the counters, but the queue passes none either.
+      CHECK(c.nodes_queued == c.nodes);
+      CHECK(c.leaves_queued == c.leaves);
+      const double mean = double(c.nodes_queued) / double(c.queue_rounds);
+      CHECK(mean <= most);
+      CHECK(double(c.leaves_queued) / double(c.queue_rounds) <= most);
+      if (set) CHECK(mean > last);
+      last = set ? mean : 0;
+    }
+  }
+  CHECK(queues >= 5);
+}
+
+TEST_CASE("children hit a node visit, visits by depth: single rays of a tree known by hand") {
+  const SmallTree tree;
+  const KernelRow& row = kernel("single");
+  struct Case {
+    Ray ray;
+    Five children;
+    std::vector<std::uint64_t> visits;
+    std::uint64_t leaves;
+  };
+  for (const Case& c : {Case{kThroughAll, {0, 0, 2, 0, 0}, {1, 1}, 1}, Case{kPastAll, {0, 0, 3, 0, 0}, {1, 2}, 4},
+                        Case{kFarPair, {0, 2, 0, 0, 0}, {1, 1}, 1}, Case{kNothing, {1, 0, 0, 0, 0}, {1}, 0}}) {
+    INFO("from " << c.ray.origin.x << ", " << c.ray.origin.y);
+    Counters counters;
+    (void)closest_hit(row, *tree.accel, std::span(&c.ray, 1), {}, &counters);
+    CHECK(counters.children_hit == c.children);
+    CHECK(visits_of(counters) == c.visits);
+    CHECK(counters.leaves == c.leaves);
+    for (const Counters::Depth& d : counters.depths) CHECK(d.lanes_active == 2 * d.visits);
+    CHECK(counters.packets == 0);
+  }
+}
+
+TEST_CASE("lanes by depth, switches and queue lengths: packets, hybrids and queues of a tree known by hand") {
+  const SmallTree tree;
+  // Three rays past all triangles, one that meets the far node alone, from the same side.
+  const Ray far_node{{15, 0.4f, 0.4f}, 0, {1, 0, 0}, kInfinity};
+  const std::vector<Ray> rays{kPastAll, kPastAll, kPastAll, far_node};
+  Counters packet;
+  (void)closest_hit(kernel("packet4"), *tree.accel, rays, {}, &packet);
+  CHECK(packet.packets == 1);
+  CHECK(packet.rays_in_packets == 4);
+  CHECK(packet.switches == 0);
+  CHECK(visits_of(packet) == std::vector<std::uint64_t>{1, 2});
+  REQUIRE(packet.depths.size() == 2);
+  CHECK(packet.depths[0].lanes == 4);
+  CHECK(packet.depths[0].lanes_active == 4);
+  CHECK(packet.depths[1].lanes == 8);
+  CHECK(packet.depths[1].lanes_active == 7);              // three in the near node, four in the far one
+  CHECK(packet.nodes == 4 + 3 + 4);
+  CHECK(packet.children_hit == Five{0, 1, 3 + 3 + 4, 0, 0});  // each ray's own children, not the packet's
+
+  Counters hybrid;
+  (void)closest_hit(kernel("hybrid4"), *tree.accel, rays, {.hybrid_threshold = 3}, &hybrid);
+  CHECK(hybrid.switches == 1);                            // in the near node; the far one has all four again
+  CHECK(hybrid.rays_alone == 3);
+  CHECK(visits_of(hybrid) == std::vector<std::uint64_t>{1, 3 + 1});
+  CHECK(hybrid.depths[1].lanes_active == 3 * 2 + 4);      // a ray alone: two children in two lanes
+  CHECK(hybrid.nodes == packet.nodes);
+  CHECK(hybrid.children_hit == packet.children_hit);
+
+  // Roots; near nodes, and in the same round the leaves that they lead to; the hits end all.
+  const std::vector<Ray> through(4, kThroughAll);
+  Counters queued;
+  (void)closest_hit(kernel("queued"), *tree.accel, through, {.rays_in_flight = 4}, &queued);
+  CHECK(queued.queue_rounds == 2);
+  CHECK(queued.nodes_queued == 8);
+  CHECK(queued.leaves_queued == 4);
+  Counters two_by_two;
+  (void)closest_hit(kernel("queued"), *tree.accel, through, {.rays_in_flight = 2}, &two_by_two);
+  CHECK(two_by_two.queue_rounds == 4);
+  CHECK(two_by_two.nodes_queued == 8);
+
+  // Sixty-four rays of one direction, then as many in all directions: `auto` takes the first for packets.
+  std::vector<Ray> tiles(64, kThroughAll);
+  for (unsigned i = 0; i < 64; ++i) tiles.push_back({{-5, 0, 0}, 0, {i % 2 ? 1.0f : -1.0f, i % 4 < 2 ? 1.0f : -1.0f, i % 3 ? 1.0f : -1.0f}, kInfinity});
+  Counters chosen;
+  (void)closest_hit(kernel("auto"), *tree.accel, tiles, {}, &chosen);
+  CHECK(chosen.rays == 128);
+  CHECK(chosen.rays_in_packets == 64);
+
+  Counters sum = packet;
+  sum += hybrid, sum += queued;
+  CHECK(visits_of(sum) == std::vector<std::uint64_t>{1 + 1 + 4, 2 + 4 + 4});
+  CHECK(sum.rays_alone == 3);
+  CHECK(sum.queue_rounds == 2);
+
+  Json facts;
+  add_facts(facts, packet);
+  CHECK(facts["children_hit"] == Json({0.0, 1.0 / 11, 10.0 / 11, 0.0, 0.0}));
+  CHECK(facts["lane_utilization_by_depth"] == Json({1.0, 7.0 / 8}));
+  CHECK(facts["visits_by_depth"] == Json({0.25, 0.5}));
+  CHECK(facts["switches_per_packet"] == 0.0);
+  CHECK(facts["packet_share"] == 1.0);
+  facts = Json();
+  add_facts(facts, queued);
+  CHECK(facts["node_queue_length"] == 4.0);
+  CHECK(facts["leaf_queue_length"] == 2.0);
+  CHECK_FALSE(facts.contains("packet_share"));
+}
+
+TEST_CASE("streams and the kd-tree follow their depth too") {
+  const TriangleMesh mesh = sphere(24);
+  const std::vector<Ray> rays = generic_rays(mesh, 300, 9);
+  Structures structures(mesh);
+  std::size_t seen = 0;
+  for (const KernelRow& row : runnable_rows()) {
+    const bool tree = row.structure.starts_with("bvh") || row.structure == "kdtree";
+    if (!tree || row.box != "padded" || row.intersector != "moller_trumbore") continue;
+    INFO(name_of(row));
+    const Accel& accel = structures.get(row);
+    struct Deepest : StructureVisitor {
+      std::vector<std::size_t> nodes;
+      void node(const NodeView& n) override {
+        if (nodes.size() <= n.depth) nodes.resize(n.depth + 1);
+        ++nodes[n.depth];
+      }
+      void leaf(const LeafView&) override {}
+    } shown;
+    REQUIRE(accel.visit(shown));
+    for (bool any : {false, true}) {
+      Counters c;
+      if (any) {
+        (void)any_hit(row, accel, rays, {}, &c);
+      } else {
+        (void)closest_hit(row, accel, rays, {}, &c);
+      }
+      REQUIRE(!c.depths.empty());
+      CHECK(c.depths.size() <= shown.nodes.size());
+      CHECK(c.depths[0].visits <= rays.size());  // the root, once a ray at most
+      std::uint64_t visits = 0, children = 0;
+      for (std::size_t d = 0; d < c.depths.size(); ++d) {
+        CHECK(c.depths[d].visits <= shown.nodes[d] * rays.size());
+        CHECK(c.depths[d].visits > 0);
+        CHECK(c.depths[d].lanes_active <= c.depths[d].lanes);
+        visits += c.depths[d].visits;
+      }
+      for (std::uint64_t n : c.children_hit) children += n;
+      CHECK(children == c.nodes);
+      CHECK(visits <= c.nodes);
+      if (!row.traversal.starts_with("packet") && !row.traversal.starts_with("hybrid") && row.traversal != "auto") CHECK(visits == c.nodes);
+    }
+    ++seen;
+  }
+  CHECK(seen > 20);
+}
+
+TEST_CASE("settings of a way of traversal: in the plan, in the cell's name and in effective.yaml where they mean something, refused elsewhere") {
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("arboretum-modes-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path file = folder / "modes.yaml";
+  const Registry registry = this_registry();
+  const auto experiment = [&](const std::string& axes, const std::string& parameters) {
+    std::ofstream(file) << "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [bvh8, kdtree], intersector: [moller_trumbore], isa: [" << to_string(some_isa())
+                        << "], " << axes << "}\nparameters: {" << parameters << "}\nmetrics: [trace]\n";
+    return read_experiment(file, registry);
+  };
+  const auto message = [&](const std::string& axes, const std::string& parameters) {
+    try {
+      (void)make_plan(experiment(axes, parameters), registry);
+    } catch (const UserError& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+
+  const Experiment swept = experiment("traversal: [single, hybrid8, queued, queued8]", "hybrid_threshold: [auto, 0, 3], rays_in_flight: 24");
+  const Plan plan = make_plan(swept, registry);
+  std::vector<std::string> ways;
+  for (const Cell& cell : plan.cells) {
+    if (cell.structure != "bvh8") continue;
+    ways.push_back(cell.traversal_name());
+    const bool hybrid = cell.traversal == "hybrid8", queued = cell.traversal == "queued";
+    CHECK((cell.settings.rays_in_flight == 24) == queued);
+    if (!hybrid) CHECK(cell.settings.hybrid_threshold == TraversalSettings::kOwn);
+    Json axes;
+    add_axes(axes, cell);
+    CHECK(axes["traversal"] == ways.back());
+    CHECK(cell.name().find("/" + ways.back() + "/") != std::string::npos);
+  }
+  std::ranges::sort(ways);
+  CHECK(ways == std::vector<std::string>{"hybrid8:hybrid_threshold=0", "hybrid8:hybrid_threshold=3", "hybrid8:hybrid_threshold=auto", "queued", "queued8", "single"});
+  CHECK(effective_yaml(swept).find("hybrid_threshold: [auto, 0, 3]") != std::string::npos);
+  CHECK(effective_yaml(swept).find("rays_in_flight: [24]") != std::string::npos);
+  CHECK(effective_yaml(experiment("traversal: [single]", "bins: 16")).find("hybrid_threshold: [auto]") != std::string::npos);
+  CHECK(configuration_hash(swept) != configuration_hash(experiment("traversal: [single, hybrid8, queued, queued8]", "hybrid_threshold: [auto, 0, 3], rays_in_flight: 25")));
+
+  CHECK(message("traversal: [hybrid8]", "hybrid_threshold: 17").find(":3: hybrid_threshold must be auto or an integer from 0 to 16, not '17'") != std::string::npos);
+  CHECK(message("traversal: [queued]", "rays_in_flight: 0").find("rays_in_flight must be auto or an integer from 1 to 64") != std::string::npos);
+  CHECK(message("traversal: [single]", "hybrid_threshold: 2").find(":3: hybrid_threshold has no effect") != std::string::npos);
+  CHECK(message("traversal: [queued8]", "rays_in_flight: 2").find(":3: rays_in_flight has no effect") != std::string::npos);
+  CHECK(message("traversal: [queued8]", "hybrid_treshold: 2").find("did you mean 'hybrid_threshold'") != std::string::npos);
+  CHECK(message("traversal: [hybrid8]", "hybrid_threshold: 8") == "no error");
+  const Plan wide = make_plan(experiment("traversal: [hybrid4]", "hybrid_threshold: [4, 5]"), registry);
+  CHECK(std::ranges::any_of(wide.skipped, [](const SkippedCell& c) { return c.reason == "hybrid4 has packets of 4 rays: no threshold of 5"; }));
+  std::filesystem::remove_all(folder);
+}
