@@ -113,7 +113,7 @@ function(arboretum_registry file)
       foreach(isa IN LISTS ARBORETUM_ISAS)
         set(function rows_of_${s_folder}_${type})
         string(APPEND declarations "namespace isa_${isa} { void ${function}(KernelRows& rows); }\n")
-        string(APPEND calls "  isa_${isa}::${function}(rows);\n")
+        string(APPEND calls "  if (cpu_supports(Isa::${isa})) isa_${isa}::${function}(rows);\n")
       endforeach()
     endforeach()
   endforeach()
@@ -125,6 +125,7 @@ function(arboretum_registry file)
 ${includes}
 namespace arboretum {
 ${declarations}
+// What makes an instruction set's rows is itself compiled for it: elsewhere it must not run.
 std::vector<StructureEntry> registered_structures() { return structure_entries(ConcatLists<${lists}>{}); }
 
 std::vector<KernelRow> registered_kernels() {

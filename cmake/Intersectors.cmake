@@ -40,7 +40,7 @@ void tests_of_${name}(std::vector<LeafTests>& list) { add_leaf_tests<${type}>(li
     arboretum_kernel_options(${unit} ${isa})
     list(APPEND ARBORETUM_INTERSECTOR_UNITS ${unit})
     string(APPEND declarations "namespace isa_${isa} { void tests_of_${name}(std::vector<LeafTests>& list); }\n")
-    string(APPEND calls "  isa_${isa}::tests_of_${name}(list);\n")
+    string(APPEND calls "  if (cpu_supports(Isa::${isa})) isa_${isa}::tests_of_${name}(list);\n")
   endforeach()
 endforeach()
 arboretum_write(${generated}/list.cpp

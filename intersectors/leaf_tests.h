@@ -46,7 +46,7 @@ struct LeafTests {
   void (*finish)(PreparedRay& ray, NearestHit& best) = nullptr;
 };
 
-/// All of this executable, those of instruction sets that the machine lacks included.
+/// All of this executable whose instruction set this machine runs.
 [[nodiscard]] std::span<const LeafTests> leaf_tests();
 /// The same without their form; generated from intersectors/all.h (cmake/Intersectors.cmake).
 [[nodiscard]] std::vector<LeafTests> registered_leaf_tests();

@@ -66,12 +66,13 @@ std::string_view default_leaf(std::string_view structure, std::string_view inter
   // Eight triangles a block trace 5 to 7 % faster than four where a register holds eight (docs/performance.md); edges where the
   // intersector takes them, else vertices, else the form that was made for it.
   const bool wide = native_width(isa) >= 8;
+  const Isa* const of = cpu_supports(isa) ? &isa : nullptr;  // one that the machine lacks has no rows; leaves are alike
   for (std::string_view leaf : {wide ? "triangle8" : "triangle4", wide ? "triangle8v" : "triangle4v", "triangle4", "triangle4v",
                                 wide ? "triangle8w" : "triangle4w", wide ? "triangle8h" : "triangle4h", wide ? "triangle8p" : "triangle4p"}) {
-    if (any_row(structure, leaf, intersector, "", "", &isa)) return leaf;
+    if (any_row(structure, leaf, intersector, "", "", of)) return leaf;
   }
   for (const KernelRow& r : kernel_table()) {
-    if (r.structure == structure && r.intersector == intersector && r.isa == isa) return r.leaf;
+    if (r.structure == structure && r.intersector == intersector && (!of || r.isa == isa)) return r.leaf;
   }
   return {};
 }
@@ -79,6 +80,7 @@ std::string_view default_leaf(std::string_view structure, std::string_view inter
 std::string why_no_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector, std::string_view box,
                           std::string_view traversal, Isa isa) {
   if (find_kernel(structure, leaf, intersector, box, traversal, isa)) return {};
+  if (!cpu_supports(isa)) return "no " + std::string(to_string(isa));
   const std::string s(structure), l(leaf), i(intersector), b(box), t(traversal), a(to_string(isa));
   if (!any_row(structure, "", "", "", "", nullptr)) return "no kernels for " + s;
   if (!any_row(structure, "", "", "", "", &isa)) return s + " has no " + a + " kernels";

@@ -83,7 +83,7 @@ struct KernelRow {
 /// Where a kernel unit puts its rows.
 using KernelRows = std::vector<KernelRow>;
 
-/// Every row of this executable, those of ISAs that this machine lacks included (do not call them).
+/// Every row of this executable whose instruction set this machine runs, those that ARBORETUM_ISA leaves out included.
 [[nodiscard]] std::span<const KernelRow> kernel_table();
 /// nullptr where there is none.
 [[nodiscard]] const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
