@@ -17,7 +17,9 @@ namespace arboretum {
 namespace {
 
 constexpr std::string_view kPlots[] = {"rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time",
-                                       "sah_vs_time", "accuracy_vs_time"};
+                                       "sah_vs_time", "accuracy_vs_time", "lane_utilization", "published_ratios"};
+/// Drawn only where a configuration names them: few experiments have something for them to show.
+constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios"};
 
 std::vector<std::string> strings(std::span<const std::string_view> views) {
   return {views.begin(), views.end()};
@@ -217,7 +219,7 @@ class ConfigReader {
 
   bool plot_has_data(std::string_view plot) const {
     const Metrics& m = experiment_.metrics;
-    if (plot == "rays_per_second" || plot == "rays_by_builder") return m.trace;
+    if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" || plot == "published_ratios") return m.trace;
     if (plot == "build_time") return m.build;
     if (plot == "sah_cost" || plot == "epo") return m.quality;
     if (plot == "bytes_per_triangle") return m.trace || m.build;
@@ -228,7 +230,7 @@ class ConfigReader {
   std::vector<std::string> default_plots() const {
     std::vector<std::string> plots;
     for (std::string_view plot : kPlots)
-      if (plot_has_data(plot)) plots.emplace_back(plot);
+      if (plot_has_data(plot) && std::ranges::find(kOnlyWhenNamed, plot) == std::end(kOnlyWhenNamed)) plots.emplace_back(plot);
     return plots;
   }
 

@@ -12,7 +12,7 @@ PLOTS = Path(__file__).resolve().parent.parent / "plots"
 sys.path.insert(0, str(PLOTS))
 sys.dont_write_bytecode = True
 
-from figures import ALL  # noqa: E402
+from figures import ALL, published_ratios  # noqa: E402
 from figures.accuracy_vs_time import pareto_front  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import linear_fit  # noqa: E402
@@ -48,6 +48,16 @@ def whole():
     rows.append(build("bvh4", "ploc"))
     return rows + [build(s, sah_cost=30.0 + k) if s != "embree" else build(s)
                    for k, s in enumerate(("bvh2", "bvh4", "bvh8", "embree"))]
+
+
+PUBLISHED = "embree_siggraph_2013"  # an experiment with published figures
+
+
+def everything():
+    """What every figure has something to show of, as an experiment called PUBLISHED."""
+    counted = {"lane_utilization_by_depth": [1.0, 0.75, None], "visits_by_depth": [1.0, 0.5, 0.0], "children_hit": [0.25, 0.5, 0.25, 0.0, 0.0]}
+    return whole() + [trace("bvh4", isa, "moller_trumbore", rate + r, r, scene="crown", workload="primary", traversal=traversal, **counted)
+                      for isa, traversal, rate in (("sse", "single", 2e6), ("sse", "packet4", 3e6), ("avx2", "packet8", 5e6)) for r in range(3)]
 
 
 SPACE = tempfile.TemporaryDirectory(prefix="arboretum-plots-")
@@ -163,12 +173,25 @@ class Loading(unittest.TestCase):
 
 class Drawing(unittest.TestCase):
     def test_every_figure_of_whole_results(self):
-        folder = Folder(whole(), files={"effective.yaml": "experiment: quick\n"})
+        folder = Folder(everything(), {"experiment": PUBLISHED}, files={"effective.yaml": "experiment: quick\n"})
         done = folder.plot()
         self.assertEqual((done.returncode, done.stderr), (0, ""), done.stderr)
         for name in ALL:
             self.assertEqual((folder.path / f"{name}.png").read_bytes()[:4], b"\x89PNG", name)
             self.assertIn("</svg>", (folder.path / f"{name}.svg").read_text(), name)
+
+    def test_published_ratios(self):
+        folder = Folder(everything(), {"experiment": PUBLISHED})
+        results = load(folder.path)
+        table = json.loads((PLOTS / "published" / f"{PUBLISHED}.json").read_text())
+        rows = [published_ratios.rows_of(results, c, "rays_per_cpu_second") for c in table["comparisons"]]
+        self.assertEqual([len(r) for r in rows], [1, 1, 0])  # no hybrid was measured, and nothing on the dragon
+        place, published, ours = rows[1][0]
+        self.assertEqual(place, "crown\nprimary")
+        self.assertAlmostEqual(published, 41.5 / 32.0)
+        self.assertAlmostEqual(ours["bvh4"][0], 2.5, places=5)
+        self.assertLessEqual(ours["bvh4"][1], 2.5)
+        self.assertIn("nothing published", Folder(whole()).plot("--no-report", "--only", "published_ratios").stdout)
 
     def test_thin_results_never_crash(self):
         cases = {
@@ -193,7 +216,7 @@ class Drawing(unittest.TestCase):
 
     def test_report_is_well_formed_and_escaped(self):
         evil = "<script>alert(1)</script>&\"'"
-        folder = Folder(whole() + [trace(evil)], {"cpu": evil, "warnings": [evil], "command": f"./arboretum run {evil}", "git_revision": "abc"},
+        folder = Folder(everything() + [trace(evil)], {"experiment": PUBLISHED, "cpu": evil, "warnings": [evil], "command": f"./arboretum run {evil}", "git_revision": "abc"},
                         [{"name": evil, "reason": "no avx512"}, {"name": "b", "reason": "no avx512"}, {"name": "c", "reason": evil}],
                         {"effective.yaml": f"experiment: {evil}\n"})
         self.assertEqual(folder.plot().returncode, 0)
@@ -205,7 +228,7 @@ class Drawing(unittest.TestCase):
         self.assertEqual(reader.tags.count("img"), len(ALL))
         shown = "".join(reader.text)
         self.assertGreaterEqual(shown.count(evil), 6)
-        for words in ("(2 cells)", "git checkout abc", "wrong per million", "× embree"):
+        for words in ("25 50 25 0 0", "(2 cells)", "git checkout abc", "wrong per million", "× embree"):
             self.assertIn(words, shown)
         self.assertNotIn("http", page.replace("http://www.w3.org", ""))
 

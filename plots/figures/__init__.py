@@ -4,4 +4,4 @@ A new figure is a module here and its name in ALL.
 """
 
 ALL = ("rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time", "sah_vs_time",
-       "accuracy_vs_time")
+       "accuracy_vs_time", "lane_utilization", "published_ratios")

@@ -1,0 +1,44 @@
+"""Lane utilisation by depth: how full the lanes are that nodes are tested with, from the root down."""
+
+from figures.modes import Modes
+from results import NoData, ordered
+from style import MARKERS, colour, legends_right, marker_legend, marker_map, panel_grid, structure_legend
+
+TITLE = "Lane utilisation by depth"
+CAPTION = ("Of the lanes that nodes of a depth are tested with, those that hold something: the rays of a packet that are in the node, or the children that a "
+           "single ray is tested against. Depths that fewer than one ray in a thousand reaches are left out. Counted in a pass of its own, untimed.")
+FEWEST_VISITS = 1e-3
+
+
+def draw(results):
+    cells = [c for c in results.traces if c.series("lane_utilization_by_depth")]
+    if not cells:
+        raise NoData("no cell counted lanes by depth")
+    modes = Modes(cells, without=("builder", "leaf", "intersector", "box", "threads"))
+    isas = ordered((c["isa"] for c in cells), "isa")
+    labels = sorted({label(modes, c, isas) for c in cells})
+    if len(labels) > len(MARKERS):
+        raise NoData(f"{len(labels)} modes are too many to tell apart; choose some with --filter")
+    markers = marker_map(labels)
+    scenes, workloads = ordered((c["scene"] for c in cells), "scene"), ordered((c["workload"] for c in cells), "workload")
+    figure, axes = panel_grid(scenes, workloads, 4.6, 2.9, 2)
+    for (scene, workload), axis in axes.items():
+        drawn = set()
+        for cell in (c for c in cells if c["scene"] == scene and c["workload"] == workload):
+            key = (cell["structure"], label(modes, cell, isas))
+            if key in drawn:
+                continue
+            drawn.add(key)
+            points = [(d, 100 * lanes) for d, (lanes, visits) in enumerate(zip(cell.series("lane_utilization_by_depth"), cell.series("visits_by_depth")))
+                      if lanes is not None and visits >= FEWEST_VISITS]
+            axis.plot(*zip(*points), color=colour(cell["structure"]), linewidth=1.1, marker=markers[key[1]], markersize=4, markerfacecolor="white")
+        axis.set_ylim(0, 103)
+        axis.set_xlabel("depth of the node (the root's is 0)")
+        axis.set_ylabel("lanes in use, %")
+        axis.xaxis.get_major_locator().set_params(integer=True)
+    legends_right(figure, [("structure", structure_legend({c["structure"] for c in cells})), ("mode", marker_legend(markers))])
+    return figure
+
+
+def label(modes, cell, isas):
+    return modes.label(cell) + (f", {cell['isa']}" if len(isas) > 1 else "")
