@@ -73,7 +73,7 @@ constexpr Summary kWorkloads[] = {
     {"reflection", "closest hit, from the primary hits along the mirror direction"},
     {"diffuse", "closest hit, from the primary hits, cosine-distributed"},
     {"random", "closest hit, between two uniform points of the bounding sphere"},
-    {"hard", "closest hit, all kinds of hard rays in turn: what accuracy is measured by"},
+    {"hard", "closest hit, all kinds of hard rays but `far` in turn: what accuracy is measured by"},
     {"hard_vertex", "closest hit, aimed at vertices, every fourth exactly"},
     {"hard_edge", "closest hit, aimed at edges that two triangles share"},
     {"hard_border", "closest hit, aimed at edges of one triangle, or of more than two"},

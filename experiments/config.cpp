@@ -17,7 +17,8 @@ namespace arboretum {
 namespace {
 
 constexpr std::string_view kPlots[] = {"rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time",
-                                       "sah_vs_time", "accuracy_vs_time", "lane_utilization", "published_ratios"};
+                                       "sah_vs_time", "accuracy_vs_time", "lane_utilization", "published_ratios", "leaks_vs_distance",
+                                       "leaks_vs_aspect", "leak_picture", "self_intersection"};
 /// Drawn only where a configuration names them: few experiments have something for them to show.
 constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios"};
 
@@ -227,10 +228,26 @@ class ConfigReader {
     return m.accuracy && m.trace;
   }
 
+  /// What a plot needs and the experiment has not, its metrics apart; empty: nothing.
+  std::string plot_lacks(std::string_view plot) const {
+    if ((plot == "leaks_vs_distance" || plot == "leaks_vs_aspect") && !has_workload([](const std::string& w) { return w.starts_with("hard"); }))
+      return "it shows workloads of hard rays, as hard_edge";
+    if (plot == "leak_picture" && !has_workload([](const std::string& w) { return w == "camera_edges"; })) return "it shows the workload camera_edges";
+    if (plot == "self_intersection" && !(has_rays_on_surfaces(experiment_) && experiment_.rays.self_intersection.size() > 1))
+      return "it shows several ways of `rays: self_intersection`";
+    return {};
+  }
+
+  template <class Predicate>
+  bool has_workload(const Predicate& wanted) const {
+    const auto has = [&](const AxisLists& axes) { return std::ranges::any_of(axes[index_of(Axis::workload)], wanted); };
+    return has(experiment_.axes) || std::ranges::any_of(experiment_.include, [&](const CellChoice& c) { return has(c.axes); });
+  }
+
   std::vector<std::string> default_plots() const {
     std::vector<std::string> plots;
     for (std::string_view plot : kPlots)
-      if (plot_has_data(plot) && std::ranges::find(kOnlyWhenNamed, plot) == std::end(kOnlyWhenNamed)) plots.emplace_back(plot);
+      if (plot_has_data(plot) && plot_lacks(plot).empty() && std::ranges::find(kOnlyWhenNamed, plot) == std::end(kOnlyWhenNamed)) plots.emplace_back(plot);
     return plots;
   }
 
@@ -243,6 +260,8 @@ class ConfigReader {
         yaml_.fail(value, unknown_name_message("plot", name, known));
       if (!plot_has_data(name))
         yaml_.fail(value, fmt::format("plot {} has no data: a metric that it shows is not in metrics", name));
+      if (const std::string lack = plot_lacks(name); !lack.empty() && !experiment_.overridden)
+        yaml_.fail(value, fmt::format("plot {} has no data: {}, and there are none", name, lack));
       experiment_.plots.push_back(name);
     }
   }

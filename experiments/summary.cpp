@@ -78,6 +78,16 @@ Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
           build ? fmt::format("{:.1f}", *build) : "-"};
 }
 
+/// What became of rays that leave their surface in one of several ways.
+void add_starts(std::vector<Row>& rows, const std::vector<const CellResult*>& results) {
+  constexpr std::pair<const char*, const char*> kColumns[] = {
+      {"self/1e6", "self_hits_per_million"}, {"near/1e6", "near_hits_per_million"}, {"leaks/1e6", "leaks_per_million"}};
+  for (const auto& [head, fact] : kColumns) {
+    rows[0].emplace_back(head);
+    for (std::size_t i = 0; i < results.size(); ++i) rows[i + 1].push_back(optional_figure(*results[i], fact, "{:.1f}"));
+  }
+}
+
 std::string build_table(const std::vector<CellResult>& all) {
   std::vector<Row> rows{{"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %",
                          "Mtri/s", "bytes/tri", "SAH"}};
@@ -125,6 +135,7 @@ std::string result_tables(const RunOutcome& outcome) {
     std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa",
                            "threads", "Mray/s", "95 %", "x embree", "wrong/1e6", "SAH", "build ms"}};
     for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results));
+    if (!results.front()->cell.start_label.empty()) add_starts(rows, results);
     const CellResult& first = *results.front();
     text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"),
                         first.fact("triangles"), format_table(rows, 8));

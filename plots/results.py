@@ -15,6 +15,7 @@ import numpy as np
 AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
 STRUCTURE_AXES = ("scene", "structure", "builder", "leaf", "isa", "threads")  # what a build depends on at most
 ISA_ORDER = ("scalar", "sse", "avx2", "avx512")
+HARD_PREFIX = "hard"  # workloads of hard rays: hard, hard_edge, ...
 WORKLOAD_ORDER = ("primary", "shadow", "ambient_occlusion", "reflection", "diffuse", "random", "whitted", "path")
 METRICS = ("trace", "build", "quality", "accuracy")
 SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}

@@ -4,6 +4,8 @@ Colours are Paul Tol's `muted` scheme, which readers with any colour vision can 
 hatched, so that it stays apart in print too.
 """
 
+import math
+
 import matplotlib
 
 matplotlib.use("Agg")
@@ -11,6 +13,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator  # noqa: E402
 
 from results import ordered  # noqa: E402
 
@@ -34,6 +37,47 @@ plt.rcParams.update({
 def colour(structure):
     """The structure's own colour; one that is new here gets a spare one by its name, the same in every figure."""
     return COLOURS.get(structure) or SPARE_COLOURS[sum(map(ord, structure)) % len(SPARE_COLOURS)]
+
+
+INTERSECTOR_COLOURS = {  # families near each other: crack-free ones green and black, precomputed ones yellow and brown
+    "watertight": "#117733", "watertight_refined": "#44AA99", "exact": "#000000", "moller_trumbore": "#CC3355",
+    "moller_trumbore_double": "#AA4499", "pluecker": "#332288", "pluecker_double": "#6699DD", "baldwin_weber": "#DDAA33",
+    "havel_herout": "#EE7733", "wald_projection": "#885522",
+}
+
+
+def intersector_colour(intersector):
+    return INTERSECTOR_COLOURS.get(intersector) or SPARE_COLOURS[sum(map(ord, intersector)) % len(SPARE_COLOURS)]
+
+
+def intersector_legend(intersectors):
+    return [Patch(facecolor=intersector_colour(i), edgecolor="white", label=i) for i in intersectors]
+
+
+def log_with_zero(axis, which, values):
+    """A log scale for `values` with a place for zero, which is labelled; linear where all are zero."""
+    smallest, largest = min((v for v in values if v > 0), default=0), max(values, default=0)
+    set_limits = axis.set_ylim if which == "y" else axis.set_xlim
+    ticks = axis.yaxis if which == "y" else axis.xaxis
+    if largest <= 0:
+        set_limits(-0.1, 1.0)
+        ticks.set_major_locator(FixedLocator([0]))
+        return
+    low = 10.0 ** math.floor(math.log10(smallest))
+    (axis.set_yscale if which == "y" else axis.set_xscale)("symlog", linthresh=low, linscale=0.6)
+    set_limits(-0.25 * low, 2.5 * largest)
+    first, last = round(math.log10(low)), math.floor(math.log10(2.5 * largest))
+    step = max(1, -(-(last - first + 1) // 6))
+    ticks.set_major_locator(FixedLocator([0] + [10.0**k for k in range(first, last + 1, step)]))
+    ticks.set_minor_locator(NullLocator())
+    ticks.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
+
+
+def plain(value):
+    """0, 0.01, 1, 1000, 10⁵: as a person writes a power of ten."""
+    if value == 0 or 1e-3 < value < 1e4:
+        return f"{value:g}"
+    return f"$10^{{{round(math.log10(value))}}}$"
 
 
 def hatch(structure):

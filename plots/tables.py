@@ -83,6 +83,9 @@ def throughput_table(results):
                                                ("leaf_queue_length", "leaves queued"))
              if any(c.value(name) is not None for c in cells)]
     children = any(cell.series("children_hit") for cell in cells)
+    if any(":self_intersection=" in c["workload"] for c in cells):  # every secondary ray has these figures: shown where they are the subject
+        extra += [("self_hits_per_million", "own surface met per million"), ("near_hits_per_million", "neighbour met per million"),
+                  ("leaks_per_million", "passed through per million"), ("start_distance", "start's distance, diagonals")]
     best = {}
     for cell in cells:
         best[beside(cell)] = max(best.get(beside(cell), 0.0), cell.value(metric))

@@ -17,13 +17,14 @@ constexpr std::string_view kMixture = "hard", kCameraEdges = "camera_edges", kPr
 constexpr std::array<std::string_view, 12> kNames{kMixture,    "hard_vertex", "hard_edge",  "hard_border", "hard_interior", "hard_grazing",
                                                   "hard_axis", "hard_plane",  "hard_surface", "hard_far",  "hard_interval", kCameraEdges};
 
-/// The kinds that a workload is made of, as far as the mesh has them.
+/// The kinds that a workload is made of, as far as the mesh has them. The mixture is without `far`: from 2^27 radii away every box is within
+/// rounding of the ray, and each such ray visits the whole structure.
 std::vector<HardKind> kinds_of(std::string_view name, const HardRayMaker& maker) {
   std::vector<HardKind> kinds;
   for (std::size_t k = 0; k < kMadeKinds; ++k) {
     const auto kind = static_cast<HardKind>(k);
     if (kind == HardKind::invalid || !maker.has(kind)) continue;
-    if (name == kMixture || name.substr(kPrefix.size()) == to_string(kind)) kinds.push_back(kind);
+    if (name == kMixture ? kind != HardKind::far : name.substr(kPrefix.size()) == to_string(kind)) kinds.push_back(kind);
   }
   return kinds;
 }

@@ -9,7 +9,7 @@
 
 namespace arboretum {
 
-/// `hard`, a mixture of all kinds, and `hard_KIND` for each of them that is a ray at all; `camera_edges`.
+/// `hard`, a mixture of all kinds but `far`, and `hard_KIND` for each of them that is a ray at all; `camera_edges`.
 [[nodiscard]] std::span<const std::string_view> hard_workload_names();
 [[nodiscard]] bool is_hard(std::string_view workload) noexcept;
 

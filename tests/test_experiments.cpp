@@ -162,6 +162,7 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [{generate: sphere, ofset: 1}]\n", ":1", "did you mean 'offset'"},
       {"scenes: [{catalogue: buny, offset: 1}]\n", ":1", "did you mean 'bunny'"},
       {"scenes: [{catalogue: bunny, triangles: 100}]\n", ":1", "no effect without generate"},
+      {"scenes: [bunny]\nmetrics: [trace, accuracy]\nplots: [leak_picture]\n", ":3", "leak_picture has no data: it shows the workload camera_edges"},
       {"scenes: [bunny]\ninclude: [{builder: morton}]\n", ":2", "names its structure"},
       {"scenes: [bunny]\nexclude: {structure: tree}\n", ":2", "must be a list of maps"},
       {"scenes: [bunny]\nexclude: [{scene: dragon}]\n", ":2", "unknown scene"},

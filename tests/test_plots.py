@@ -13,7 +13,9 @@ sys.path.insert(0, str(PLOTS))
 sys.dont_write_bytecode = True
 
 from figures import ALL, published_ratios  # noqa: E402
-from figures.accuracy_vs_time import pareto_front  # noqa: E402
+from figures.accuracy_vs_time import hard_points, pareto_front  # noqa: E402
+from figures.leak_lines import without  # noqa: E402
+from figures.leak_picture import by_test  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import linear_fit  # noqa: E402
 from results import Cell, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
@@ -28,6 +30,31 @@ def trace(structure="bvh8", isa="avx2", intersector="watertight", rate=10e6, rep
     return {"name": name, "run_name": name, "run_type": "iteration", "repetition_index": repetition, "time_unit": "ms",
             "real_time": 1.0, "cpu_time": 1.0, "rays": 1000, "rays_per_second": rate, "rays_per_cpu_second": rate,
             "wrong_answers": 1, **axes, **more}
+
+
+def other(workload, scene="bunny", **more):
+    """A cell of another workload or scene."""
+    row = trace(**{"scene": scene, "workload": workload, **more})
+    row["name"] = row["run_name"] = "/".join(["trace"] + [str(row[a]) for a in AXES])
+    return row
+
+
+def hard():
+    """What the figures of accuracy are drawn from: hard rays, placed scenes, a picture, ways of leaving a surface."""
+    rows = []
+    for k, (intersector, box) in enumerate((("moller_trumbore", "fast"), ("watertight", "padded"), ("a_new_one", "padded"))):
+        ways = {"intersector": intersector, "box": box}
+        rows.append(other("hard", **ways, wrong_answers=10 * k, t_error_ulp_p99=0.5 + k))
+        rows += [other(w, f"ball:size=100:offset={x:g}", **ways, cracks=k * n, offset=x, radius=173.2) for w in ("hard_edge", "hard_vertex")
+                 for n, x in enumerate((1, 1e4, 1e8))]
+        rows += [other("hard_edge", f"ball:stretch={x}", **ways, cracks=k, offset=0, triangle_aspect_median=2.5 * x) for x in (1, 100)]
+        rows += [other("camera_edges", s, **ways, structure=s2, cracks=1, leak_points=[[3.5, 4], [10, 12]]) for s in ("ball",) for s2 in ("bvh8", "embree")]
+        rows += [other(f"diffuse:self_intersection={way}", **ways, self_intersection=way, self_hits_per_million=4e5 * (way == "none"), near_hits_per_million=k,
+                       leaks_per_million=0.0) for way in ("none", "error_bound")]
+    return rows
+
+
+SEEN = {"camera_edges-ball.json": json.dumps({"scene": "ball", "width": 32, "height": 32, "points": [[1, 2], [3.5, 4], [30, 20]]})}
 
 
 def build(structure="bvh8", builder="binned_sah", **more):
@@ -50,11 +77,12 @@ def whole():
                    for k, s in enumerate(("bvh2", "bvh4", "bvh8", "embree"))]
 
 
+HARD = [name for name in ALL if name.startswith("leak") or name == "self_intersection"]
 PUBLISHED = "embree_siggraph_2013"  # an experiment with published figures
 
 
 def everything():
-    """What every figure has something to show of, as an experiment called PUBLISHED."""
+    """What every figure but those of HARD has something to show of, as an experiment called PUBLISHED."""
     counted = {"lane_utilization_by_depth": [1.0, 0.75, None], "visits_by_depth": [1.0, 0.5, 0.0], "children_hit": [0.25, 0.5, 0.25, 0.0, 0.0]}
     return whole() + [trace("bvh4", isa, "moller_trumbore", rate + r, r, scene="crown", workload="primary", traversal=traversal, **counted)
                       for isa, traversal, rate in (("sse", "single", 2e6), ("sse", "packet4", 3e6), ("avx2", "packet8", 5e6)) for r in range(3)]
@@ -171,14 +199,52 @@ class Loading(unittest.TestCase):
         self.assertIn("--resume", (folder.path / "report.html").read_text())
 
 
+class Hard(unittest.TestCase):
+    def test_accuracy_is_of_hard_rays_and_time_of_ordinary_ones(self):
+        results = load(Folder(whole() + hard()).path)
+        points = hard_points(results, "rays_per_cpu_second")
+        self.assertEqual({(c["workload"], h["workload"]) for c, _, h in points}, {("diffuse", "hard")})
+        self.assertTrue(all(h["intersector"] == c["intersector"] and h["box"] == c["box"] for c, _, h in points))
+        watertight = next(p for p in points if p[0]["intersector"] == "watertight")
+        self.assertEqual(watertight[2].per_million("wrong_answers"), 10000)
+        self.assertAlmostEqual(watertight[1], 1e9 / watertight[0].value("rays_per_cpu_second"))
+
+    def test_scenes_without_a_part_of_their_placing(self):
+        self.assertEqual(without("ball:size=100:offset=1e4", "offset"), ("ball:size=100", True))
+        self.assertEqual(without("ball:size=100", "offset"), ("ball:size=100", False))
+
+    def test_a_panel_of_the_picture_is_a_test_with_both_boxes(self):
+        cells = load(Folder(hard()).path).traces
+        panels = by_test([c for c in cells if c["workload"] == "camera_edges"])
+        self.assertEqual(list(panels), sorted(panels))
+        self.assertEqual({k: list(v) for k, v in panels.items() if k[0] == ""}, {("", "a_new_one"): ["padded"], ("", "moller_trumbore"): ["fast"],
+                                                                               ("", "watertight"): ["padded"]})
+
+    def test_a_scale_with_a_place_for_zero(self):
+        import matplotlib.pyplot as plt
+        from style import log_with_zero, plain
+        figure, axis = plt.subplots()
+        axis.plot([1, 2, 3], [0, 15, 2e6])
+        log_with_zero(axis, "y", [0, 15, 2e6])
+        at = [axis.transData.transform((1, v))[1] for v in (0, 15, 2e6)]
+        self.assertTrue(axis.bbox.y0 < at[0] < at[1] < at[2] < axis.bbox.y1)
+        figure.canvas.draw()
+        self.assertEqual([t.get_text() for t in axis.get_yticklabels()][:2], ["0", "10"])
+        log_with_zero(axis, "x", [0, 0])
+        plt.close(figure)
+        self.assertEqual([plain(v) for v in (0, 0.01, 1, 1000, 1e5)], ["0", "0.01", "1", "1000", "$10^{5}$"])
+
+
 class Drawing(unittest.TestCase):
     def test_every_figure_of_whole_results(self):
-        folder = Folder(everything(), {"experiment": PUBLISHED}, files={"effective.yaml": "experiment: quick\n"})
-        done = folder.plot()
-        self.assertEqual((done.returncode, done.stderr), (0, ""), done.stderr)
-        for name in ALL:
-            self.assertEqual((folder.path / f"{name}.png").read_bytes()[:4], b"\x89PNG", name)
-            self.assertIn("</svg>", (folder.path / f"{name}.svg").read_text(), name)
+        whole_folder = Folder(everything(), {"experiment": PUBLISHED, "plots": [n for n in ALL if n not in HARD]}, files={"effective.yaml": "experiment: quick\n"})
+        hard_folder = Folder(hard() + [trace(intersector="watertight", rate=4e6)], {"plots": ["accuracy_vs_time", *HARD]}, files=SEEN)
+        for folder in (whole_folder, hard_folder):
+            done = folder.plot()
+            self.assertEqual((done.returncode, done.stderr), (0, ""), done.stderr)
+            for name in load(folder.path).context["plots"]:
+                self.assertEqual((folder.path / f"{name}.png").read_bytes()[:4], b"\x89PNG", name)
+                self.assertIn("</svg>", (folder.path / f"{name}.svg").read_text(), name)
 
     def test_published_ratios(self):
         folder = Folder(everything(), {"experiment": PUBLISHED})
@@ -204,6 +270,10 @@ class Drawing(unittest.TestCase):
             "zero rays and speed": [trace(rate=0.0, rays=0)],
             "not finite": [trace(rate=float("nan")), trace("bvh4"), build(sah_cost=float("inf"))],
             "text for a number": [trace(rate="fast"), trace("bvh4", wrong_answers="none")],
+            "hard rays without ordinary ones": [other("hard", t_error_ulp_p99=1.0)],
+            "one place": [other("hard_edge", "ball:offset=1", cracks=2, offset=1)],
+            "leaks nowhere": [other("camera_edges", "ball", cracks=0, leak_points=[])],
+            "one way": [other("diffuse", self_intersection="none", self_hits_per_million=1.0)],
             "strange names": [trace("$x_1$ <&>"), build("$x_1$ <&>"), trace("bvh8", intersector="$")],
         }
         for case, rows in cases.items():
@@ -225,7 +295,7 @@ class Drawing(unittest.TestCase):
         reader.feed(page)
         self.assertEqual(reader.open, [])
         self.assertEqual(reader.tags.count("script"), 1)
-        self.assertEqual(reader.tags.count("img"), len(ALL))
+        self.assertEqual(reader.tags.count("img"), len(ALL) - len(HARD))
         shown = "".join(reader.text)
         self.assertGreaterEqual(shown.count(evil), 6)
         for words in ("25 50 25 0 0", "(2 cells)", "git checkout abc", "wrong per million", "× embree"):

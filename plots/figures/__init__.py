@@ -1,7 +1,7 @@
 """One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, or raises NoData.
 
-A new figure is a module here and its name in ALL.
+A new figure is a module here and its name in ALL. Other modules here (bars, modes, leak_lines) are what figures share.
 """
 
 ALL = ("rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time", "sah_vs_time",
-       "accuracy_vs_time", "lane_utilization", "published_ratios")
+       "accuracy_vs_time", "lane_utilization", "published_ratios", "leaks_vs_distance", "leaks_vs_aspect", "leak_picture", "self_intersection")

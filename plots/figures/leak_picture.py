@@ -1,0 +1,76 @@
+"""Where the leaks are: a picture of a closed mesh, its edges and vertices dotted by the rays aimed at them, leaks marked."""
+
+import json
+
+from matplotlib.lines import Line2D
+
+from results import NoData, axis_sort_key, ordered
+from style import legends_right, panels, short
+
+TITLE = "Where the leaks are"
+CAPTION = ("Rays from the camera at points of edges and at vertices (workload camera_edges): grey where they are aimed, as far as the camera sees it, "
+           "in colour where a ray passes through the surface unnoticed. What leaks with padded boxes too, the triangle test loses; what "
+           "leaks with fast boxes alone, the boxes lose. The first two scenes are shown. A panel shows at most 4000 leaks a box test; the numbers count all, per million rays.")
+BOXES = (("fast", "#3377CC", 5.0), ("padded", "#CC2222", 2.2))  # the second above the first
+WORKLOAD = "camera_edges"
+MOST_SCENES = 2
+
+
+def draw(results):
+    cells = [c for c in results.traces if c["workload"] == WORKLOAD and leak_points(c) is not None]
+    scenes = [s for s in ordered((c["scene"] for c in cells), "scene") if seen_points(results.folder, s)][:MOST_SCENES]
+    if not scenes:
+        raise NoData("no cell of the workload camera_edges tells where its leaks are")
+    found = {scene: by_test([c for c in cells if c["scene"] == scene]) for scene in scenes}
+    columns = min(4, max(len(f) for f in found.values()))
+    rows = [(scene, keys[i:i + columns]) for scene, f in found.items() for keys in [list(f)] for i in range(0, len(keys), columns)]
+    figure, axes = panels(len(rows), columns, 2.9, 3.05)
+    for axis in axes.flat:
+        axis.set_axis_off()
+    for row, (scene, keys) in zip(axes, rows):
+        seen = seen_points(results.folder, scene)
+        for axis, key in zip(row, keys):
+            panel(axis, seen, scene, key, found[scene][key], len(scenes) > 1)
+    legends_right(figure, [("leaks with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=tint, label=f"{box} boxes")
+                                           for box, tint, size in BOXES])])
+    return figure
+
+
+def by_test(cells):
+    """(structure, intersector) -> box -> cell. Of several structures of ours, ISAs or ways of traversal the first stands for all; embree's apart."""
+    found = {}
+    for cell in sorted(cells, key=lambda c: (c["structure"] == "embree", axis_sort_key("structure")(c["structure"]), axis_sort_key("isa")(c["isa"]))):
+        key = ("embree" if cell["structure"] == "embree" else "", cell["intersector"])
+        found.setdefault(key, {}).setdefault(cell["box"], cell)
+    return dict(sorted(found.items()))
+
+
+def panel(axis, seen, scene, key, boxes, name_scene):
+    points = seen["points"]
+    # Dots as pixels: thousands of them would make a drawing of megabytes.
+    axis.plot([p[0] for p in points], [p[1] for p in points], ",", color="#AAAAAA", rasterized=True, zorder=1)
+    counts = []
+    for box, tint, size in BOXES:
+        if box not in boxes:
+            continue
+        leaks = leak_points(boxes[box])
+        counts.append(f"{box} {boxes[box].per_million('cracks') or 0:,.0f}".replace(",", " "))
+        axis.plot([p[0] for p in leaks], [p[1] for p in leaks], "o", color=tint, markersize=size, markeredgewidth=0, rasterized=True, zorder=2)
+    xs, ys = [p[0] for p in points], [p[1] for p in points]
+    axis.set_xlim(min(xs) - 6, max(xs) + 6)
+    axis.set_ylim(max(ys) + 6, min(ys) - 6)
+    axis.set_aspect("equal")
+    head = " ".join(([short(scene) + ","] if name_scene else []) + [word for word in key if word])
+    axis.set_title(f"{head}\n{', '.join(counts)}", fontsize=9.5)
+
+
+def leak_points(cell):
+    return next((row["leak_points"] for row in cell.rows if isinstance(row.get("leak_points"), list)), None)
+
+
+def seen_points(folder, scene):
+    try:
+        seen = json.loads((folder / f"{WORKLOAD}-{scene}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return seen if isinstance(seen, dict) and seen.get("points") else None

@@ -1,0 +1,67 @@
+"""How secondary rays leave their surface: what each way loses, and what it costs. A row a scene; a column a fault, the last one time."""
+
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
+
+from results import NoData, ordered
+from style import MARKERS, intersector_colour, intersector_legend, legends_right, log_with_zero, panels, plain, short
+
+TITLE = "Leaving a surface"
+CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass through what "
+           "they should meet, against the exact answer of the ray that starts at the hit point itself, its own primitive left out. "
+           "Time is of thread CPU where the run has one thread; a ray that meets its own surface ends there, and is quick. Zero stands on the left line.")
+WAYS = ("none", "epsilon", "integer_offset", "error_bound", "exclusion")
+FAULTS = (("self_hits_per_million", "own surface met,\nper million"), ("near_hits_per_million", "neighbour met too early,\nper million"),
+          ("leaks_per_million", "passed through,\nper million"))
+
+
+def draw(results):
+    metric, _ = results.throughput()
+    cells = [c for c in results.traces if way_of(c) and c.value("self_hits_per_million") is not None and c.value(metric)]
+    if len({way_of(c) for c in cells}) < 2:
+        raise NoData("no workload is measured with several ways of leaving a surface")
+    scenes, ways = ordered((c["scene"] for c in cells), "scene"), [w for w in WAYS if any(way_of(c) == w for c in cells)]
+    workloads = ordered({base(c) for c in cells}, "workload")
+    intersectors = sorted({c["intersector"] for c in cells})
+    markers = {w: MARKERS[i % len(MARKERS)] for i, w in enumerate(workloads)}
+    columns = [f for f in FAULTS if any(c.value(f[0]) is not None for c in cells)] + [(None, "time,\nns a ray")]
+    figure, axes = panels(len(scenes), len(columns), 2.7, 0.9 + 0.4 * len(ways), sharey=True, sharex="col")
+    slots = [(i, w) for i in intersectors for w in workloads]
+    for row, scene in enumerate(scenes):
+        for column, (name, label) in enumerate(columns):
+            axis = axes[row][column]
+            for cell in (c for c in cells if c["scene"] == scene):
+                value = cell.value(name) if name else 1e9 / cell.value(metric)
+                if value is None:
+                    continue
+                own = intersector_colour(cell["intersector"])
+                place = ways.index(way_of(cell)) + 0.7 * ((slots.index((cell["intersector"], base(cell))) + 0.5) / len(slots) - 0.5)
+                axis.plot(value, place, markers[base(cell)], color=own, markersize=4.5, markerfacecolor="white", markeredgewidth=1.1, clip_on=False)
+            if row == len(scenes) - 1:
+                axis.set_xlabel(label)
+            if column == 0:
+                axis.set_title(short(scene), loc="left")
+            axis.set_yticks(range(len(ways)), [w.replace("_", " ") for w in ways])
+            axis.set_ylim(len(ways) - 0.5, -0.5)
+            axis.grid(axis="y", visible=False)
+            for between in range(len(ways) - 1):
+                axis.axhline(between + 0.5, color="#DDDDDD", linewidth=0.7, zorder=0)
+    for column, (name, _) in enumerate(columns):
+        if name:
+            log_with_zero(axes[0][column], "x", [v for c in cells for v in [c.value(name)] if v is not None])
+        else:
+            axes[0][column].set_xscale("log")
+            axes[0][column].xaxis.set_minor_locator(NullLocator())
+            axes[0][column].xaxis.set_major_formatter(lambda v, _: plain(v))
+    handles = [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="white", markersize=5, label=w.replace("_", " ")) for w, m in markers.items()]
+    legends_right(figure, [("intersector", intersector_legend(intersectors)), ("workload", handles)])
+    return figure
+
+
+def way_of(cell):
+    return next((row["self_intersection"] for row in cell.rows if isinstance(row.get("self_intersection"), str)), None)
+
+
+def base(cell):
+    """The workload without the way."""
+    return cell["workload"].split(":")[0]
