@@ -137,8 +137,8 @@ class ConfigReader {
     yaml_.check_map(map, "parameters", parameter_names());
     for (const auto& entry : map) {
       const std::string key = entry.first.Scalar();
-      experiment_.parameter_places[key] = yaml_.where(entry.first);
       for (const YAML::Node& node : yaml_.list(entry.second, "parameters: " + key)) {
+        if (node.Scalar() != kAuto) experiment_.parameter_places[key] = yaml_.where(entry.first);  // `auto` asks for nothing
         Parameters scratch;
         if (const std::string wrong = set_parameter(scratch, key, node.Scalar()); !wrong.empty()) {
           yaml_.fail(node, fmt::format("{} must be {}, not '{}'", key, wrong, node.Scalar()));

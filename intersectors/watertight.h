@@ -55,17 +55,18 @@ struct Watertight {
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
     constexpr int W = Block::kWidth;
     using F = vf<W>;
-    const auto load = [&](const float(&p)[3][W]) { return vf3<W>{F::load(p[ray.kx]), F::load(p[ray.ky]), F::load(p[ray.kz])}; };
-    const Sheared<W> s({F(ray.ox), F(ray.oy), F(ray.oz)}, F(ray.sx), F(ray.sy), load(block.v0), load(block.v1), load(block.v2));
+    const Sheared<W> s = sheared(ray, block);
     vm<W> inside = s.inside();
     if (any(inside)) {
       const vm<W> undecided = s.hits(inside, F(ray.sz), hits);
+      // What the rare functions are handed is read from memory again, and copied: a reference to the vectors here would keep all of them in memory.
       if (__builtin_expect(any(undecided), 0)) {
-        inside = inside & ~undecided;
-        inside = inside | decide_in_double<W>(undecided, ray.sz, s.a, s.b, s.c, hits);
+        TriangleHits<W> decided = hits;
+        inside = (inside & ~undecided) | decide_in_double(undecided, ray, block, decided);
+        hits = decided;
       }
       const vm<W> near = inside & s.near(F(ray.tnear), F(ray.sz), hits.t);
-      if (__builtin_expect(any(near), 0)) plane_distance_in_double(near, ray, block, hits);
+      if (__builtin_expect(any(near), 0)) hits.t = plane_distance_in_double(near, ray, block, hits.t);
     }
     return inside;
   }
@@ -154,12 +155,22 @@ struct Watertight {
     }
   };
 
+  template <class Block>
+  static ARBORETUM_INLINE Sheared<Block::kWidth> sheared(const RayData& ray, const Block& block) {
+    constexpr int W = Block::kWidth;
+    using F = vf<W>;
+    const auto load = [&](const float(&p)[3][W]) { return vf3<W>{F::load(p[ray.kx]), F::load(p[ray.ky]), F::load(p[ray.kz])}; };
+    return Sheared<W>({F(ray.ox), F(ray.oy), F(ray.oz)}, F(ray.sx), F(ray.sy), load(block.v0), load(block.v1), load(block.v2));
+  }
+
   /// The lanes of `undecided` that are hit when the edge functions are computed in double; sets their hits.
-  template <int W>
-  static __attribute__((noinline)) vm<W> decide_in_double(vm<W> undecided, float sz, const vf3<W>& a, const vf3<W>& b,
-                                                          const vf3<W>& c, TriangleHits<W>& hits) {
+  template <class Block>
+  static __attribute__((noinline)) vm<Block::kWidth> decide_in_double(vm<Block::kWidth> undecided, const RayData& ray, const Block& block,
+                                                                      TriangleHits<Block::kWidth>& hits) {
+    constexpr int W = Block::kWidth;
+    const Sheared<W> s = sheared(ray, block);
     float p[9][W], out[4][W];
-    const vf<W> in[9] = {a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z};
+    const vf<W> in[9] = {s.a.x, s.a.y, s.a.z, s.b.x, s.b.y, s.b.z, s.c.x, s.c.y, s.c.z};
     for (int i = 0; i < 9; ++i) in[i].store(p[i]);
     hits.t.store(out[0]), hits.u_numerator.store(out[1]), hits.v_numerator.store(out[2]), hits.denominator.store(out[3]);
     unsigned hit = 0;
@@ -172,20 +183,19 @@ struct Watertight {
       const bool one_side = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
       if (!one_side || det == 0) continue;
       hit |= 1u << i;
-      out[0][i] = float((u * p[2][i] + v * p[5][i] + w * p[8][i]) / det * sz);
+      out[0][i] = float((u * p[2][i] + v * p[5][i] + w * p[8][i]) / det * ray.sz);
       out[1][i] = float(v / det), out[2][i] = float(w / det), out[3][i] = 1.0f;
     }
     hits = {vf<W>::load(out[0]), vf<W>::load(out[1]), vf<W>::load(out[2]), vf<W>::load(out[3])};
     return vm<W>::from_bits(hit);
   }
 
-  /// Sets t of `lanes` to N.(a - o) / N.d, computed in double.
+  /// `distances`, in `lanes` N.(a - o) / N.d, computed in double.
   template <class Block>
-  static __attribute__((noinline)) void plane_distance_in_double(vm<Block::kWidth> lanes, const RayData& ray, const Block& block,
-                                                                 TriangleHits<Block::kWidth>& hits) {
+  static __attribute__((noinline)) vf<Block::kWidth> plane_distance_in_double(vm<Block::kWidth> lanes, const RayData& ray, const Block& block, vf<Block::kWidth> distances) {
     constexpr int W = Block::kWidth;
     float t[W];
-    hits.t.store(t);
+    distances.store(t);
     const int k[3] = {ray.kx, ray.ky, ray.kz};
     const double o[3] = {ray.ox, ray.oy, ray.oz}, d[3] = {ray.dx, ray.dy, ray.dz};
     for (unsigned rest = lanes.bits(); rest; rest &= rest - 1) {
@@ -206,7 +216,7 @@ struct Watertight {
       const double plane = (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]) / along;
       t[i] = float(plane < least ? least : plane > most ? most : plane);
     }
-    hits.t = vf<W>::load(t);
+    return vf<W>::load(t);
   }
 };
 

@@ -14,6 +14,25 @@ template <int W> ARBORETUM_INLINE vi<W> sign_bits(vf<W> a) { return a.as_int() &
 template <int W> ARBORETUM_INLINE vf<W> xor_sign(vf<W> a, vi<W> sign) { return vf<W>::from_int_bits(a.as_int() ^ sign); }
 template <int W> ARBORETUM_INLINE vf<W> operator-(vf<W> a) { return xor_sign(a, vi<W>(std::numeric_limits<std::int32_t>::min())); }
 
+/// Lane I of four.
+template <int I>
+ARBORETUM_INLINE float lane(vf<4> a) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  return a.lane[I];
+#else
+  return _mm_cvtss_f32(I == 0 ? a.v : _mm_shuffle_ps(a.v, a.v, I * 0x55));
+#endif
+}
+
+/// Bit i: the sign of lane i.
+ARBORETUM_INLINE unsigned sign_mask(vf<4> a) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  return (sign_bits(a) < vi<4>(0)).bits();
+#else
+  return unsigned(_mm_movemask_ps(a.v));
+#endif
+}
+
 /// Three vectors of lanes: as many points or directions.
 template <class F>
 struct vec3 {

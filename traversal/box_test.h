@@ -28,73 +28,77 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Where a ray enters boxes at the earliest: tnear, and 0 for -0, since distances are ordered by their bits.
 [[nodiscard]] ARBORETUM_INLINE float first_distance(const Ray& ray) { return ray.tnear > 0.0f ? ray.tnear : 0.0f; }
 
-/// One ray's constants for boxes: near[axis] is the byte offset of the near planes within a node of N children.
+/// One ray's constants for boxes.
 template <int N, bool Padded>
 struct BoxRay {
   static constexpr int W = N < 4 ? 4 : N;
   static constexpr unsigned kSide = N * sizeof(float);
 
-  float rx, ry, rz;
-  float fx, fy, fz;  ///< for the near planes: o * r (FMA) or the origin (no FMA), padded
-  float gx, gy, gz;  ///< the same for the far planes
-  unsigned near_x, near_y, near_z;
+  Vec3f r;  ///< reciprocal direction
+  Vec3f f;  ///< for the near planes: o * r (FMA) or the origin (no FMA), padded
+  Vec3f g;  ///< the same for the far planes
+  unsigned octant;  ///< bit a: the direction is negative along axis a, or is -0
 
+  /// The axes stand in lanes: some forty instructions fewer a ray than one axis after the other.
   ARBORETUM_INLINE BoxRay(const Ray& ray, float max_coordinate) {
-    const Vec3f o = ray.origin, d = ray.direction;
+    using F = vf<4>;
+    const F o = F::load(&ray.origin), d = F::load(&ray.direction);
+    F rs, fs, gs;
+    constants<Padded>(o, d, F(largest(ray.direction)), F(max_coordinate), rs, fs, gs);
+    r = axes(rs), f = axes(fs), g = axes(gs);
+    if (__builtin_expect((overflows(fs, gs).bits() & 7u) != 0, 0)) leave_out(r.x, f.x, g.x), leave_out(r.y, f.y, g.y), leave_out(r.z, f.z, g.z);
+    octant = sign_mask(rs) & 7u;
+  }
+  /// Where a node's near planes lie: in bytes from its begin.
+  ARBORETUM_INLINE unsigned near_x() const { return (octant & 1u) * kSide; }
+  ARBORETUM_INLINE unsigned near_y() const { return (2 + (octant >> 1 & 1u)) * kSide; }
+  ARBORETUM_INLINE unsigned near_z() const { return (4 + (octant >> 2)) * kSide; }
+
+  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest`: the largest |component| of the ray's direction.
+  template <bool Pad, class F>
+  static ARBORETUM_INLINE void constants(F o, F d, F largest, F max_coordinate, F& r, F& f, F& g) {
     if constexpr (kHasFma) {
-      const float dmax = largest(d);
-      const float tiny = dmax * 0x1p-60f;
-      const float limit = 0x1p60f / dmax;
-      rx = reciprocal(d.x, tiny, limit), ry = reciprocal(d.y, tiny, limit), rz = reciprocal(d.z, tiny, limit);
-      fx = gx = o.x * rx, fy = gy = o.y * ry, fz = gz = o.z * rz;
-      if constexpr (Padded) {
-        const float ex = pad(o.x, rx, max_coordinate), ey = pad(o.y, ry, max_coordinate), ez = pad(o.z, rz, max_coordinate);
-        fx += ex, fy += ey, fz += ez;
-        gx -= ex, gy -= ey, gz -= ez;
+      r = F(1.0f) / d;
+      // A branch, rarely taken: no division waits for `largest`.
+      const auto tiny = ~(abs(d) > largest * F(0x1p-60f));
+      if (__builtin_expect(any(tiny), 0)) r = select(tiny, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
+      f = g = o * r;
+      if constexpr (Pad) {
+        const F e = F(0x1p-21f) * (max_coordinate + abs(o)) * abs(r) + F(0x1p-100f);
+        f = f + e, g = g - e;
       }
     } else {
-      rx = 1.0f / d.x, ry = 1.0f / d.y, rz = 1.0f / d.z;
-      fx = gx = o.x, fy = gy = o.y, fz = gz = o.z;
-      if constexpr (Padded) {
-        const float ex = shift(o.x, rx, max_coordinate), ey = shift(o.y, ry, max_coordinate), ez = shift(o.z, rz, max_coordinate);
-        fx += ex, fy += ey, fz += ez;
-        gx -= ex, gy -= ey, gz -= ez;
+      r = F(1.0f) / d;
+      f = g = o;
+      if constexpr (Pad) {
+        const F e = xor_sign(F(0x1p-21f) * (max_coordinate + abs(o)) + F(0x1p-100f), sign_bits(r));
+        f = f + e, g = g - e;
       }
     }
-    if (__builtin_expect(!(size(fx, gx) + size(fy, gy) + size(fz, gz) < kLargest), 0))
-      leave_out(rx, fx, gx), leave_out(ry, fy, gy), leave_out(rz, fz, gz);
-    near_x = __builtin_signbit(rx) ? kSide : 0u;
-    near_y = 2 * kSide + (__builtin_signbit(ry) ? kSide : 0u);
-    near_z = 4 * kSide + (__builtin_signbit(rz) ? kSide : 0u);
+  }
+  /// Where such constants are too large, or NaN, and must be mended.
+  template <class F>
+  static ARBORETUM_INLINE auto overflows(F f, F g) {
+    return ~(abs(f) + abs(g) < F(kTooLarge));
   }
 
-  /// Constants whose sizes add up to this much are mended axis by axis; packets ask the same (bvh_packet.h).
-  static constexpr float kLargest = 0x1p125f;
-
  private:
+  static constexpr float kTooLarge = 0x1p124f;
+
+  static ARBORETUM_INLINE Vec3f axes(vf<4> a) { return {lane<0>(a), lane<1>(a), lane<2>(a)}; }
   static ARBORETUM_INLINE float largest(Vec3f d) {
     const float x = __builtin_fabsf(d.x), y = __builtin_fabsf(d.y), z = __builtin_fabsf(d.z);
     const float xy = x > y ? x : y;
     return xy > z ? xy : z;
   }
-  static ARBORETUM_INLINE float size(float f, float g) { return __builtin_fabsf(f) + __builtin_fabsf(g); }
   /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN. Its interval becomes
   /// all t for boxes that exist, and stays empty for others.
   static void leave_out(float& r, float& f, float& g) {
-    if (size(f, g) < kLargest / 4) return;
+    if (__builtin_fabsf(f) + __builtin_fabsf(g) < kTooLarge) return;
     constexpr float largest = std::numeric_limits<float>::max();
     r = __builtin_copysignf(1.0f, r);
     f = kHasFma ? largest : __builtin_copysignf(largest, r);
     g = -f;
-  }
-  static ARBORETUM_INLINE float reciprocal(float d, float tiny, float limit) {
-    return __builtin_fabsf(d) > tiny ? 1.0f / d : __builtin_copysignf(limit, d);
-  }
-  static ARBORETUM_INLINE float shift(float o, float r, float max_coordinate) {
-    return __builtin_copysignf(0x1p-21f * (max_coordinate + __builtin_fabsf(o)) + 0x1p-100f, r);
-  }
-  static ARBORETUM_INLINE float pad(float o, float r, float max_coordinate) {
-    return 0x1p-21f * (max_coordinate + __builtin_fabsf(o)) * __builtin_fabsf(r) + 0x1p-100f;
   }
 };
 
@@ -108,8 +112,8 @@ struct BoxLanes {
   unsigned near_x, near_y, near_z;
 
   ARBORETUM_INLINE explicit BoxLanes(const BoxRay<N, Padded>& b)
-      : rx(b.rx), ry(b.ry), rz(b.rz), fx(b.fx), fy(b.fy), fz(b.fz), gx(b.gx), gy(b.gy), gz(b.gz),
-        near_x(b.near_x), near_y(b.near_y), near_z(b.near_z) {}
+      : rx(b.r.x), ry(b.r.y), rz(b.r.z), fx(b.f.x), fy(b.f.y), fz(b.f.z), gx(b.g.x), gy(b.g.y), gz(b.g.z),
+        near_x(b.near_x()), near_y(b.near_y()), near_z(b.near_z()) {}
 
   /// Entry distances (at least tnear) and, as bits, the children whose interval within [tnear, tfar] is not empty.
   ARBORETUM_INLINE unsigned test(const std::byte* node, F tnear, F tfar, F& entry) const {

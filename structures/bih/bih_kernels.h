@@ -19,9 +19,9 @@ struct IntervalRay {
 
   ARBORETUM_INLINE IntervalRay(const Ray& ray, float max_coordinate) {
     const BoxRay<2, Padded> b(ray, max_coordinate);
-    r[0] = b.rx, r[1] = b.ry, r[2] = b.rz;
-    begin[0] = b.fx, begin[1] = b.fy, begin[2] = b.fz;
-    end[0] = b.gx, end[1] = b.gy, end[2] = b.gz;
+    r[0] = b.r.x, r[1] = b.r.y, r[2] = b.r.z;
+    begin[0] = b.f.x, begin[1] = b.f.y, begin[2] = b.f.z;
+    end[0] = b.g.x, end[1] = b.g.y, end[2] = b.g.z;
     for (int a = 0; a < 3; ++a) negative[a] = unsigned(__builtin_signbit(r[a]) != 0);
   }
   /// Where an interval begins that a plane begins.

@@ -103,6 +103,7 @@ class BvhPackets {
   using F = vf<W>;
   static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
   using Children = vf<kLanes>;
+  using Box = BoxRay<N, true>;
 
   struct Entry {
     bvh::NodeReference reference;
@@ -155,30 +156,19 @@ class BvhPackets {
       valid_ |= std::uint64_t(valid.bits()) << k;
       max_x86(tnear, F(0.0f)).store(tnear_ + k);
       if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(soa_, k);
-      F size(0.0f);
-      const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest, M(max_coordinate_);
+      vm<W> overflows(false);
       for (int a = 0; a < 3; ++a) {
         F r, f, g;
-        if constexpr (kHasFma) {
-          r = select(abs(d[a]) > tiny, F(1.0f) / d[a], xor_sign(limit, sign_bits(d[a])));
-          f = g = o[a] * r;
-          if (padded_) {
-            const F e = F(0x1p-21f) * (M + abs(o[a])) * abs(r) + F(0x1p-100f);
-            f = f + e, g = g - e;
-          }
+        if (padded_) {
+          Box::template constants<true>(o[a], d[a], largest, F(max_coordinate_), r, f, g);
         } else {
-          r = F(1.0f) / d[a];
-          f = g = o[a];
-          if (padded_) {
-            const F e = xor_sign(F(0x1p-21f) * (M + abs(o[a])) + F(0x1p-100f), sign_bits(r));
-            f = f + e, g = g - e;
-          }
+          Box::template constants<false>(o[a], d[a], largest, F(max_coordinate_), r, f, g);
         }
         r.store(r_[a] + k), f.store(near_[a] + k), g.store(far_[a] + k);
-        size = size + (abs(f) + abs(g));
+        overflows = overflows | Box::overflows(f, g);
         negative[a] |= std::uint64_t((sign_bits(r) < vi<W>(0)).bits()) << k;
       }
-      const unsigned overflown = (~(size < F(BoxRay<N, true>::kLargest)) & valid).bits();
+      const unsigned overflown = (overflows & valid).bits();
       if (__builtin_expect(overflown != 0, 0)) set_one_by_one(overflown, k);
     }
     for (unsigned octant = 0; octant < 8; ++octant) {
@@ -198,9 +188,9 @@ class BvhPackets {
   __attribute__((noinline)) void set_one_by_one(unsigned lanes, int k) {
     overflown_ |= std::uint64_t(lanes) << k;
     const auto set = [&](int i, const auto& box) {
-      r_[0][i] = box.rx, r_[1][i] = box.ry, r_[2][i] = box.rz;
-      near_[0][i] = box.fx, near_[1][i] = box.fy, near_[2][i] = box.fz;
-      far_[0][i] = box.gx, far_[1][i] = box.gy, far_[2][i] = box.gz;
+      r_[0][i] = box.r.x, r_[1][i] = box.r.y, r_[2][i] = box.r.z;
+      near_[0][i] = box.f.x, near_[1][i] = box.f.y, near_[2][i] = box.f.z;
+      far_[0][i] = box.g.x, far_[1][i] = box.g.y, far_[2][i] = box.g.z;
     };
     for (; lanes; lanes &= lanes - 1) {
       const int i = k + __builtin_ctz(lanes);

@@ -107,7 +107,7 @@ struct BvhSingle {
       Nodes<Padded> nodes(ray, max_coordinate_);
       typename Leaves::RayData data = leaves_.prepare(ray);
       const std::byte* const base = base_;
-      const bool hit = walk_bvh<AnyHit>(base, root_, nodes, stack_.data(), best.t, counting_, [&](bvh::NodeReference reference) {
+      const bool hit = walk_bvh<AnyHit>(base, root_, nodes, stack_.data(), best.t, counting_, [&](bvh::NodeReference reference) __attribute__((always_inline)) {
         const std::byte* const blocks = base + bvh::offset_of(reference);
         const unsigned count = bvh::block_count(reference);
         if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);

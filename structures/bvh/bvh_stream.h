@@ -51,7 +51,6 @@ class Stream {
     Box box;
     float first;    ///< distance from which boxes count
     float nearest;  ///< beyond which they do not; -inf when the search is over
-    std::uint32_t octant;
     std::uint32_t place;  ///< in the group
   };
   static_assert(sizeof(State) == 64);
@@ -80,15 +79,14 @@ class Stream {
         report(index_of(i), NearestHit{ray.tfar});
         continue;
       }
-      State& s = *new (&states_[rays]) State{Box(ray, max_coordinate_), first_distance(ray), ray.tfar, 0, std::uint32_t(i - begin)};
-      s.octant = unsigned(s.box.near_x != 0) | unsigned(s.box.near_y != 2 * Box::kSide) << 1 | unsigned(s.box.near_z != 4 * Box::kSide) << 2;
+      State& s = *new (&states_[rays]) State{Box(ray, max_coordinate_), first_distance(ray), ray.tfar, std::uint32_t(i - begin)};
       new (&leaf_states_[rays++]) LeafState(ray, leaves_);
-      ++of_octant[s.octant];
-      direction[s.octant] = direction[s.octant] + ray.direction;
+      ++of_octant[s.box.octant];
+      direction[s.box.octant] = direction[s.box.octant] + ray.direction;
     }
     unsigned at[8] = {};
     for (int o = 1; o < 8; ++o) at[o] = at[o - 1] + of_octant[o - 1];
-    for (unsigned i = 0; i < rays; ++i) entries_[at[states_[i].octant]++] = stack_entry(__builtin_bit_cast(std::uint32_t, states_[i].first), i);
+    for (unsigned i = 0; i < rays; ++i) entries_[at[states_[i].box.octant]++] = stack_entry(__builtin_bit_cast(std::uint32_t, states_[i].first), i);
     for (int o = 0; o < 8; ++o) {
       if (of_octant[o]) octant({root_, at[o] - of_octant[o], of_octant[o]}, direction[o], rays);
     }
@@ -102,7 +100,8 @@ class Stream {
   /// Everything that the rays of `root` meet. They have the same octant. Entries from `free` on are unused.
   void octant(const List& root, Vec3f direction, unsigned free) {
     const Box& box = states_[ray_of(entries_[root.begin])].box;
-    const unsigned near[6] = {box.near_x, box.near_x ^ Box::kSide, box.near_y, 5 * Box::kSide - box.near_y, box.near_z, 9 * Box::kSide - box.near_z};
+    const unsigned x = box.near_x(), y = box.near_y(), z = box.near_z();
+    const unsigned near[6] = {x, x ^ Box::kSide, y, 5 * Box::kSide - y, z, 9 * Box::kSide - z};
     List* const bottom = lists_.data();
     List* top = bottom;
     *top++ = root;

@@ -25,10 +25,10 @@ struct AosNodeTest {
 
   ARBORETUM_INLINE AosNodeTest(const Ray& ray, float max_coordinate) {
     const BoxRay<4, Padded> b(ray, max_coordinate);
-    r = repeat_four<16>(four(b.rx, b.ry, b.rz, 1.0f));
-    f = repeat_four<16>(four(b.fx, b.fy, b.fz, -ray.tnear));
-    g = repeat_four<16>(four(b.gx, b.gy, b.gz, -ray.tfar));
-    const unsigned negative = (__builtin_signbit(b.rx) ? 1u : 0u) | (__builtin_signbit(b.ry) ? 2u : 0u) | (__builtin_signbit(b.rz) ? 4u : 0u);
+    r = repeat_four<16>(four(b.r.x, b.r.y, b.r.z, 1.0f));
+    f = repeat_four<16>(four(b.f.x, b.f.y, b.f.z, -ray.tnear));
+    g = repeat_four<16>(four(b.g.x, b.g.y, b.g.z, -ray.tfar));
+    const unsigned negative = (__builtin_signbit(b.r.x) ? 1u : 0u) | (__builtin_signbit(b.r.y) ? 2u : 0u) | (__builtin_signbit(b.r.z) ? 4u : 0u);
     upper_is_near = vm<16>::from_bits((negative | 8u) * 0x1111u), upper_is_far = vm<16>::from_bits((~negative & 15u) * 0x1111u);
   }
 

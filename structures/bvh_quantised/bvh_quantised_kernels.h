@@ -60,8 +60,8 @@ struct QuantisedNodeTest {
 
  private:
   ARBORETUM_INLINE QuantisedNodeTest(const Ray& ray, const BoxRay<N, Padded>& b)
-      : rx(b.rx), ry(b.ry), rz(b.rz), fx(b.fx), fy(b.fy), fz(b.fz), gx(b.gx), gy(b.gy), gz(b.gz), tnear(first_distance(ray)), tfar(ray.tfar),
-        near_x(b.near_x / sizeof(float)), near_y(b.near_y / sizeof(float)), near_z(b.near_z / sizeof(float)),
+      : rx(b.r.x), ry(b.r.y), rz(b.r.z), fx(b.f.x), fy(b.f.y), fz(b.f.z), gx(b.g.x), gy(b.g.y), gz(b.g.z), tnear(first_distance(ray)), tfar(ray.tfar),
+        near_x(b.near_x() / sizeof(float)), near_y(b.near_y() / sizeof(float)), near_z(b.near_z() / sizeof(float)),
         far_x(N - near_x), far_y(5 * N - near_y), far_z(9 * N - near_z) {}
 };
 

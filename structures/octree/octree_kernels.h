@@ -30,8 +30,8 @@ struct OctreeRay {
   ARBORETUM_INLINE OctreeRay(const Ray& ray, float max_coordinate)
       : reciprocal(0.0f), near_constant(0.0f), far_constant(0.0f), negative(false), octant(0) {
     const BoxRay<8, Padded> box(ray, max_coordinate);
-    const float r[4] = {box.rx, box.ry, box.rz, 0}, f[4] = {box.fx, box.fy, box.fz, 0},
-                g[4] = {box.gx, box.gy, box.gz, 0};
+    const float r[4] = {box.r.x, box.r.y, box.r.z, 0}, f[4] = {box.f.x, box.f.y, box.f.z, 0},
+                g[4] = {box.g.x, box.g.y, box.g.z, 0};
     reciprocal = F::load(r), near_constant = F::load(f), far_constant = F::load(g);
     negative = reciprocal.as_int() < vi<4>(0);
     octant = negative.bits() & 7u;
