@@ -11,5 +11,5 @@ CAPTION = ("A leak is a ray that passes through a closed surface, away from its 
 def draw(results):
     def label(family, of):
         radii = [c.value("radius") for c in of.traces if without(c["scene"], "offset")[0] == family and c.value("radius")]
-        return "distance of the scene from the origin" + (f" (its radius: {min(radii):.3g})" if radii else "")
+        return "distance of the scene from the origin" + (f" (half its diagonal: {max(radii):.3g})" if radii else "")
     return draw_lines(results, "offset", lambda cell: cell.value("offset"), label, "no scene is placed at several offsets and met by hard rays")
