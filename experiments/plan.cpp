@@ -286,7 +286,7 @@ class Planner {
       }
     }
     for (const auto& [name, where] : experiment_.parameter_places) {
-      if (!is_of_traversal(name) || std::ranges::any_of(traversals_, [&](const std::string& t) { return concerns(name, t); })) continue;
+      if (!is_of_traversal(name) || std::ranges::any_of(traversals_, [&key = name](const std::string& t) { return concerns(key, t); })) continue;
       throw UserError(fmt::format("{}: {} has no effect: no cell's traversal is {}; add one to the axis, or take it out", where, name,
                                   name == "rays_in_flight" ? "queued" : "a hybrid"));
     }
