@@ -31,7 +31,7 @@ def draw(results):
         seen = seen_points(results.folder, scene)
         for axis, key in zip(row, keys):
             panel(axis, seen, scene, key, found[scene][key], len(scenes) > 1)
-    legends_right(figure, [("leaks with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=tint, label=f"{box} boxes")
+    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=tint, label=f"{box} boxes")
                                            for box, tint, size in BOXES])])
     return figure
 
