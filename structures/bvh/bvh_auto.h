@@ -5,7 +5,7 @@
 // latency. What a mode costs for the wrong rays is in docs/performance.md. Every way gives the same hits, so the choice changes no answer.
 #pragma once
 
-#include "structures/bvh/bvh_packet.h"
+#include "structures/bvh/bvh_packet_rows.h"
 #include "structures/bvh/bvh_queued.h"
 
 namespace arboretum {

@@ -3,7 +3,7 @@
 
 #include "traversal/usual_leaves.h"
 #include "structures/bvh/bvh_auto.h"
-#include "structures/bvh/bvh_packet.h"
+#include "structures/bvh/bvh_packet_rows.h"
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
 #include "structures/bvh/bvh_stream.h"

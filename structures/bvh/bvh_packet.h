@@ -14,62 +14,15 @@
 // the answers are those of single rays, bit for bit.
 #pragma once
 
-#include "structures/bvh/bvh_single.h"
+#include "structures/bvh/bvh_packet_nodes.h"
 #include "traversal/packet_interval.h"
-#include "traversal/kernel_rows.h"
-#include "traversal/usual_leaves.h"
+#include "traversal/leaves.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// Rays of a packet at most.
 inline constexpr int kMostPacketRays = PacketRays::kMost;
-
-/// Where rays with the constants r and c (BoxRay) meet a plane.
-template <class F>
-[[nodiscard]] ARBORETUM_INLINE F plane_distance(F plane, F r, F c) {
-  if constexpr (kHasFma) {
-    return msub(plane, r, c);
-  } else {
-    return (plane - c) * r;
-  }
-}
-
-/// How packets read the nodes of bvh::SoaNodes<N>: planes k = 2 * axis + side, side 0 lower and 1 upper, of all children; where rays meet that of child i,
-/// as their own box test computes it.
-template <int N>
-struct SoaPacketNodes {
-  static constexpr int kBranching = N, kLanes = N < 4 ? 4 : N;
-  template <bool Padded>
-  using Single = SoaNodeTest<N, Padded>;
-
-  static ARBORETUM_INLINE vf<kLanes> planes(const std::byte* node, unsigned k) { return vf<kLanes>::load(node + k * (N * sizeof(float))); }
-  template <class F>
-  static ARBORETUM_INLINE F distance(const std::byte* node, unsigned k, int i, F r, F c) {
-    float p;
-    std::memcpy(&p, node + (k * N + unsigned(i)) * sizeof(float), sizeof p);
-    return plane_distance(F(p), r, c);
-  }
-  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) { return Single<true>::children(node)[i]; }
-  static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
-};
-
-/// One ray through what hangs below `root`, with what it has met already.
-template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
-__attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Leaves& leaves, const LeafForm& form,
-                                           const Counting& counting, StackEntry* stack, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
-                                           typename Counting::Depth depth) {
-  typename Format::template Single<Padded> nodes(ray, max_coordinate);
-  if constexpr (!AnyHit) nodes.shorten(best.t);
-  return walk_bvh<AnyHit>(base, root, nodes, stack, best.t, counting, [&](bvh::NodeReference r) {
-    const std::byte* const blocks = base + bvh::offset_of(r);
-    const unsigned count = bvh::block_count(r);
-    if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
-    if constexpr (AnyHit) return leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar);
-    if (leaves.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
-    return false;
-  }, depth);
-}
 
 /// W rays a register. `fast` and `padded` are one class: they differ in what rays bring with them (compile time).
 template <class Format, int W, class Leaves, bool AnyHit, class Counting>
@@ -468,67 +421,6 @@ class BvhPackets {
   BatchStack<Entry, 512> stack_;
   TraversalStack single_stack_;
 };
-
-/// A batch as packets of `rays_each` rays that follow each other.
-template <class Format, int W, class Leaves, class Counting>
-struct PacketBatch {
-  static __attribute__((noinline)) void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
-    packets<false>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-  }
-  static __attribute__((noinline)) void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters, int rays_each,
-                                                int threshold) {
-    packets<true>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-  }
-
- private:
-  template <bool AnyHit, class Report>
-  static ARBORETUM_INLINE void packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
-    BvhPackets<Format, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
-    for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
-      const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
-      packet.trace(&rays[begin], count, threshold);
-      for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
-    }
-    if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_packets += rays.size();
-  }
-};
-
-/// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone. Of `Hybrid` ones the batch may set it.
-template <class Format, int Rays, int Threshold, bool Hybrid = false>
-struct BvhPacketFunctions {
-  static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
-
-  template <class Batch>
-  static RowFunctions functions() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) { Batch::closest_hit(a, row, rays, hits, c, Rays, threshold(rays)); },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* c) { Batch::any_hit(a, row, rays, occluded, c, Rays, threshold(rays)); }};
-  }
-  static int threshold(const RayBatch& rays) {
-    return Hybrid ? int(std::min(TraversalSettings::chosen(rays.settings.hybrid_threshold, Threshold), unsigned(Rays))) : Threshold;
-  }
-  template <class Leaves, bool>
-  static RowFunctions timed() {
-    return functions<PacketBatch<Format, (Rays < kNative ? Rays : kNative), Leaves, NoCounters>>();
-  }
-  /// What is visited does not depend on the lanes.
-  template <bool>
-  static RowFunctions counting() {
-    return functions<PacketBatch<Format, kNative, CalledLeaves, WithCounters>>();
-  }
-};
-
-/// `Compiled`: what packet64 has compiled in.
-template <class Structure, class Format, class Compiled>
-void add_packet_rows(KernelRows& rows, Compiled compiled) {
-  add_rows<Structure, BvhPacketFunctions<Format, 4, 0>>(rows, "packet4", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 8, 0>>(rows, "packet8", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 16, 0>>(rows, "packet16", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 32, 4>>(rows, "packet32", compiled);
-  add_rows<Structure, BvhPacketFunctions<Format, 64, 6>>(rows, "packet64", compiled);
-  add_rows<Structure, BvhPacketFunctions<Format, 4, 1, true>>(rows, "hybrid4", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 8, 2, true>>(rows, "hybrid8", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 16, 3, true>>(rows, "hybrid16", TypeList<>{});
-}
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -7,7 +7,7 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
-#include "structures/bvh/bvh_packet.h"
+#include "structures/bvh/bvh_packet_rows.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/kernel_rows.h"
 
@@ -65,7 +65,7 @@ struct AosNodeTest {
   }
 };
 
-/// How packets read a node (structures/bvh/bvh_packet.h).
+/// How packets read a node (structures/bvh/bvh_packet_nodes.h).
 struct AosPacketNodes {
   static constexpr int kBranching = 4, kLanes = 4;
   template <bool Padded>

@@ -11,7 +11,7 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
-#include "structures/bvh/bvh_packet.h"
+#include "structures/bvh/bvh_packet_rows.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/kernel_rows.h"
 
@@ -71,7 +71,7 @@ struct QuantisedTests {
   using Nodes = QuantisedNodeTest<N, Padded>;
 };
 
-/// How packets read a node (structures/bvh/bvh_packet.h).
+/// How packets read a node (structures/bvh/bvh_packet_nodes.h).
 template <int N>
 struct QuantisedPacketNodes {
   static constexpr int kBranching = N, kLanes = N;

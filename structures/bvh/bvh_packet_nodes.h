@@ -1,0 +1,56 @@
+// How packets read nodes, and how one of their rays goes on alone.
+#pragma once
+
+#include "structures/bvh/bvh_single.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// Where rays with the constants r and c (BoxRay) meet a plane.
+template <class F>
+[[nodiscard]] ARBORETUM_INLINE F plane_distance(F plane, F r, F c) {
+  if constexpr (kHasFma) {
+    return msub(plane, r, c);
+  } else {
+    return (plane - c) * r;
+  }
+}
+
+/// How packets read the nodes of bvh::SoaNodes<N>: planes k = 2 * axis + side, side 0 lower and 1 upper, of all children; where rays meet that of child i,
+/// as their own box test computes it.
+template <int N>
+struct SoaPacketNodes {
+  static constexpr int kBranching = N, kLanes = N < 4 ? 4 : N;
+  template <bool Padded>
+  using Single = SoaNodeTest<N, Padded>;
+
+  static ARBORETUM_INLINE vf<kLanes> planes(const std::byte* node, unsigned k) { return vf<kLanes>::load(node + k * (N * sizeof(float))); }
+  template <class F>
+  static ARBORETUM_INLINE F distance(const std::byte* node, unsigned k, int i, F r, F c) {
+    float p;
+    std::memcpy(&p, node + (k * N + unsigned(i)) * sizeof(float), sizeof p);
+    return plane_distance(F(p), r, c);
+  }
+  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) { return Single<true>::children(node)[i]; }
+  static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
+};
+
+/// One ray through what hangs below `root`, with what it has met already.
+template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
+__attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Leaves& leaves, const LeafForm& form,
+                                           const Counting& counting, StackEntry* stack, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
+                                           typename Counting::Depth depth) {
+  typename Format::template Single<Padded> nodes(ray, max_coordinate);
+  if constexpr (!AnyHit) nodes.shorten(best.t);
+  return walk_bvh<AnyHit>(base, root, nodes, stack, best.t, counting, [&](bvh::NodeReference r) {
+    const std::byte* const blocks = base + bvh::offset_of(r);
+    const unsigned count = bvh::block_count(r);
+    if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
+    if constexpr (AnyHit) return leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar);
+    if (leaves.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
+    return false;
+  }, depth);
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

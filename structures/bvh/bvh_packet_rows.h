@@ -1,0 +1,73 @@
+// Packets as rows of the kernel table: packet4 to packet64, hybrid4 to hybrid16.
+#pragma once
+
+#include "structures/bvh/bvh_packet.h"
+#include "traversal/kernel_rows.h"
+#include "traversal/usual_leaves.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// A batch as packets of `rays_each` rays that follow each other.
+template <class Format, int W, class Leaves, class Counting>
+struct PacketBatch {
+  static __attribute__((noinline)) void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
+    packets<false>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+  }
+  static __attribute__((noinline)) void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters, int rays_each,
+                                                int threshold) {
+    packets<true>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
+  }
+
+ private:
+  template <bool AnyHit, class Report>
+  static ARBORETUM_INLINE void packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
+    BvhPackets<Format, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
+    for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
+      const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
+      packet.trace(&rays[begin], count, threshold);
+      for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
+    }
+    if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_packets += rays.size();
+  }
+};
+
+/// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone. Of `Hybrid` ones the batch may set it.
+template <class Format, int Rays, int Threshold, bool Hybrid = false>
+struct BvhPacketFunctions {
+  static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
+
+  template <class Batch>
+  static RowFunctions functions() {
+    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) { Batch::closest_hit(a, row, rays, hits, c, Rays, threshold(rays)); },
+            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* c) { Batch::any_hit(a, row, rays, occluded, c, Rays, threshold(rays)); }};
+  }
+  static int threshold(const RayBatch& rays) {
+    return Hybrid ? int(std::min(TraversalSettings::chosen(rays.settings.hybrid_threshold, Threshold), unsigned(Rays))) : Threshold;
+  }
+  template <class Leaves, bool>
+  static RowFunctions timed() {
+    return functions<PacketBatch<Format, (Rays < kNative ? Rays : kNative), Leaves, NoCounters>>();
+  }
+  /// What is visited does not depend on the lanes.
+  template <bool>
+  static RowFunctions counting() {
+    return functions<PacketBatch<Format, kNative, CalledLeaves, WithCounters>>();
+  }
+};
+
+/// `Compiled`: what packet64 has compiled in.
+template <class Structure, class Format, class Compiled>
+void add_packet_rows(KernelRows& rows, Compiled compiled) {
+  add_rows<Structure, BvhPacketFunctions<Format, 4, 0>>(rows, "packet4", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 8, 0>>(rows, "packet8", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 16, 0>>(rows, "packet16", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 32, 4>>(rows, "packet32", compiled);
+  add_rows<Structure, BvhPacketFunctions<Format, 64, 6>>(rows, "packet64", compiled);
+  add_rows<Structure, BvhPacketFunctions<Format, 4, 1, true>>(rows, "hybrid4", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 8, 2, true>>(rows, "hybrid8", TypeList<>{});
+  add_rows<Structure, BvhPacketFunctions<Format, 16, 3, true>>(rows, "hybrid16", TypeList<>{});
+}
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,169 @@
+// Samples, journal, results and verdict of a run; Google Benchmark's flags and interleaving.
+#include "experiments/append_file.h"
+#include "experiments/benchmark_flags.h"
+#include "experiments/config.h"
+#include "experiments/interleave.h"
+#include "experiments/journal.h"
+#include "experiments/results_writer.h"
+#include "experiments/runner.h"
+#include "experiments/sampling.h"
+#include "experiments/summary.h"
+#include "tests/catch.h"
+#include "tests/experiments_on_paper.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+namespace fs = std::filesystem;
+
+TEST_CASE("median and bootstrap interval") {
+  CHECK(median(std::vector{3.0, 1.0, 2.0}) == 2.0);
+  CHECK(median(std::vector{4.0, 1.0, 2.0, 3.0}) == 2.5);
+  const Interval two = bootstrap_median(std::vector{1.0, 3.0});
+  CHECK((two.low == 1.0 && two.median == 2.0 && two.high == 3.0));
+  const Interval many = bootstrap_median(std::vector{9.8, 10.1, 10.0, 9.9, 10.2, 10.0, 50.0});
+  CHECK(many.median == 10.0);
+  CHECK((many.low >= 9.8 && many.low <= 10.0 && many.high >= 10.0 && many.high <= 50.0));
+}
+
+TEST_CASE("files of lines: a torn last line is dropped, an impossible write is one clear line") {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write("lines", "{\"a\":1}\n{\"b\":");
+  CHECK(read_lines(file).size() == 1);
+  AppendFile(file, true).append("{\"c\":3}");
+  CHECK(read_lines(file) == std::vector<std::string>{"{\"a\":1}", "{\"c\":3}"});
+  if (fs::exists("/dev/full")) {
+    const std::string message = error_of([] { AppendFile("/dev/full", true).append("x"); });
+    CHECK(message.find("No space left") != std::string::npos);
+    CHECK(message.find("--resume") != std::string::npos);
+  }
+  CHECK(error_of([&] { write_whole(folder.path / "none" / "file", "x"); }).find("cannot be written") !=
+        std::string::npos);
+  CHECK(error_of([&] { make_output_folder(file / "below"); }).find("output folder") != std::string::npos);
+  write_whole(file, "whole");
+  CHECK(read_lines(file).empty());
+}
+
+namespace {
+
+Repetition repetition(unsigned index, double seconds) {
+  return {.index = index, .iterations = 2, .wall_seconds = seconds, .cpu_seconds = seconds / 2, .phases = {}};
+}
+
+CellResult result_of(const Cell& cell) {
+  CellResult result{.cell = cell, .repetitions = {}, .facts = {}};
+  for (unsigned i = 0; i < 3; ++i) result.repetitions.push_back(repetition(i, 0.5 + 0.25 * i));
+  result.facts["rays"] = 1000, result.facts["triangles"] = 500, result.facts["hits"] = 700,
+  result.facts["wrong_answers"] = 0;
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("the journal gives back what it was told, and refuses another configuration") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  REQUIRE(plan.cells.size() == 2);
+  const std::string first = plan.cells[0].name(), second = plan.cells[1].name();
+  {
+    Journal journal(folder.path, "hash", plan, false);
+    journal.add(first, repetition(0, 1.0));
+    journal.finish(result_of(plan.cells[0]));
+    journal.add(second, repetition(2, 3.0));
+    journal.add(second, repetition(0, 2.0));
+  }
+  std::ofstream(folder.path / "repetitions.jsonl", std::ios::app) << "{\"name\":\"torn";
+  {
+    Journal journal(folder.path, "hash", plan, true);
+    REQUIRE(journal.done().size() == 1);
+    const CellResult& done = journal.done().at(first);
+    CHECK(done.repetitions.size() == 3);
+    CHECK(done.repetitions[2].wall_seconds == 1.0);
+    CHECK(done.facts == result_of(plan.cells[0]).facts);
+    const auto started = journal.started(second);
+    REQUIRE(started.size() == 2);
+    CHECK((started[0].index == 0 && started[1].index == 2));
+  }
+  CHECK(error_of([&] { Journal(folder.path, "other", plan, true); }).find("another configuration") !=
+        std::string::npos);
+  CHECK(Journal(folder.path, "other", plan, false).done().empty());
+}
+
+TEST_CASE("results.json has what Google Benchmark's compare.py reads; the verdict follows the answers") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  plan.skipped.push_back({"some/cell", "no avx512"});
+  RunOutcome outcome;
+  for (const Cell& cell : plan.cells) outcome.results.push_back(result_of(cell));
+  const Json document = Json::parse(results_json(outcome, plan, Json::object()));
+  REQUIRE(document["benchmarks"].size() == 2 * (3 + 4));
+  const Json& first = document["benchmarks"][7];  // the trace cell's first repetition
+  CHECK(first["name"] == plan.cells[1].name());
+  CHECK(first["run_name"] == first["name"]);
+  CHECK(first["run_type"] == "iteration");
+  CHECK(first["repetitions"] == 3);
+  CHECK(first["real_time"].get<double>() == Approx(250.0));
+  CHECK(first["cpu_time"].get<double>() == Approx(125.0));
+  CHECK(first["time_unit"] == "ms");
+  CHECK(first["rays_per_second"].get<double>() == Approx(4000.0));
+  CHECK(first["rays_per_cpu_second"].get<double>() == Approx(8000.0));
+  CHECK(first["structure"] == "tree");
+  CHECK(first["threads"] == 1);
+  const Json& median_entry = document["benchmarks"][11];
+  CHECK(median_entry["run_type"] == "aggregate");
+  CHECK(median_entry["aggregate_name"] == "median");
+  CHECK(median_entry["name"] == plan.cells[1].name() + "_median");
+  CHECK(document["skipped"][0]["reason"] == "no avx512");
+  CHECK(results_csv(outcome).starts_with("name,run_name,run_type"));
+
+  CHECK(verdict(outcome).first == ExitStatus::kDone);
+  outcome.results[1].facts["wrong_answers"] = 2;
+  CHECK(verdict(outcome).first == ExitStatus::kWrongAnswers);
+  CHECK(verdict({}).first == ExitStatus::kNothingMeasured);
+}
+
+TEST_CASE("Google Benchmark's flags: ours are taken, wrong ones are named") {
+  std::vector<std::string> words{"run",
+                                 "a.yaml",
+                                 "--benchmark_repetitions=3",
+                                 "--benchmark_min_time=0.5s",
+                                 "--benchmark_filter=bvh8",
+                                 "--benchmark_v=1"};
+  const BenchmarkFlags flags = take_benchmark_flags(words);
+  CHECK(words == std::vector<std::string>{"run", "a.yaml"});
+  CHECK(flags.repetitions == 3u);
+  CHECK(flags.min_time == 0.5);
+  CHECK(flags.filter == "bvh8");
+  CHECK(flags.others == std::vector<std::string>{"--benchmark_v=1"});
+  std::vector<std::string> wrong{"--benchmark_repetitions=many"};
+  CHECK(error_of([&] { (void)take_benchmark_flags(wrong); }).find("a number from 1") != std::string::npos);
+  std::vector<std::string> format{"--benchmark_format=xml"};
+  CHECK(error_of([&] { (void)take_benchmark_flags(format); }).find("one of console, json, csv") !=
+        std::string::npos);
+}
+
+TEST_CASE("interleaved jobs run each of their repetitions once, and an error comes out") {
+  initialize_benchmark({});
+  std::map<std::string, std::vector<unsigned>> ended;
+  std::map<std::string, int> loops;
+  std::vector<InterleavedJob> jobs;
+  for (const char* name : {"a/b:1", "c"}) {
+    jobs.push_back({.name = name,
+                    .indices = {0, 2, 5},
+                    .iterations = 4,
+                    .measure =
+                        [&loops, name](TimedLoop& loop) {
+                          while (loop.next()) ++loops[name];
+                          return Repetition{};
+                        },
+                    .ended = [&ended, name](const Repetition& r) { ended[name].push_back(r.index); }});
+  }
+  run_interleaved(jobs);
+  CHECK(ended["a/b:1"] == std::vector<unsigned>{0, 2, 5});
+  CHECK(ended["c"] == std::vector<unsigned>{0, 2, 5});
+  CHECK(loops["a/b:1"] == 12);
+  jobs[0].ended = [](const Repetition&) { throw UserError("disk full"); };
+  CHECK(error_of([&] { run_interleaved(jobs); }) == "disk full");
+  CHECK_THROWS_AS(initialize_benchmark({"--benchmark_nonsense=1"}), UserError);
+}
