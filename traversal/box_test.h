@@ -49,6 +49,10 @@ struct BoxRay {
     if (__builtin_expect((overflows(fs, gs).bits() & 7u) != 0, 0)) leave_out(r.x, f.x, g.x), leave_out(r.y, f.y, g.y), leave_out(r.z, f.z, g.z);
     octant = sign_mask(rs) & 7u;
   }
+  /// Of constants that are known: those of such a BoxRay.
+  ARBORETUM_INLINE BoxRay(Vec3f known_r, Vec3f known_f, Vec3f known_g)
+      : r(known_r), f(known_f), g(known_g), octant(sign_bit(r.x) | sign_bit(r.y) << 1 | sign_bit(r.z) << 2) {}
+
   /// Where a node's near planes lie: in bytes from its begin.
   ARBORETUM_INLINE unsigned near_x() const { return (octant & 1u) * kSide; }
   ARBORETUM_INLINE unsigned near_y() const { return (2 + (octant >> 1 & 1u)) * kSide; }
@@ -85,6 +89,7 @@ struct BoxRay {
  private:
   static constexpr float kTooLarge = 0x1p124f;
 
+  static ARBORETUM_INLINE unsigned sign_bit(float a) { return __builtin_bit_cast(std::uint32_t, a) >> 31; }
   static ARBORETUM_INLINE Vec3f axes(vf<4> a) { return {lane<0>(a), lane<1>(a), lane<2>(a)}; }
   static ARBORETUM_INLINE float largest(Vec3f d) {
     const float x = __builtin_fabsf(d.x), y = __builtin_fabsf(d.y), z = __builtin_fabsf(d.z);

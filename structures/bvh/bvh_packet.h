@@ -284,10 +284,16 @@ class BvhPackets {
     }
   }
 
+  template <class Axes>
+  static ARBORETUM_INLINE Vec3f of(const Axes& axes, int i) { return {axes[0][i], axes[1][i], axes[2][i]}; }
+
   void alone(int i, bvh::NodeReference reference, typename Counting::Depth depth) {
-    const auto below = padded_ ? &trace_below<Format, Leaves, true, AnyHit, Counting> : &trace_below<Format, Leaves, false, AnyHit, Counting>;
     auto&& ray = data(i);
-    const bool hit = below(base_, reference, max_coordinate_, leaves_, form_, counting_, single_stack_.data(), rays_[i], ray, best_[i], depth);
+    const auto below = [&](auto padded) {
+      const BoxRay<N, decltype(padded)::value> box(of(r_, i), of(near_, i), of(far_, i));
+      return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(base_, reference, box, tnear_[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_, counting_, depth);
+    };
+    const bool hit = padded_ ? below(std::true_type{}) : below(std::false_type{});
     if constexpr (AnyHit) {
       if (hit) occluded(i);
     }

@@ -35,21 +35,13 @@ struct SoaPacketNodes {
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
 
-/// One ray through what hangs below `root`, with what it has met already.
+/// One ray through what hangs below `root`, with what it has met already; `box` and `first` are of the packet's arrays.
 template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
-__attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root, float max_coordinate, const Leaves& leaves, const LeafForm& form,
-                                           const Counting& counting, StackEntry* stack, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
-                                           typename Counting::Depth depth) {
-  typename Format::template Single<Padded> nodes(ray, max_coordinate);
-  if constexpr (!AnyHit) nodes.shorten(best.t);
-  return walk_bvh<AnyHit>(base, root, nodes, stack, best.t, counting, [&](bvh::NodeReference r) {
-    const std::byte* const blocks = base + bvh::offset_of(r);
-    const unsigned count = bvh::block_count(r);
-    if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
-    if constexpr (AnyHit) return leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar);
-    if (leaves.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
-    return false;
-  }, depth);
+__attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root, const BoxRay<Format::kBranching, Padded>& box, float first, const Ray& ray,
+                                           const Leaves& leaves, typename Leaves::RayData& data, NearestHit& best, StackEntry* stack, const LeafForm& form,
+                                           const Counting& counting, typename Counting::Depth depth) {
+  typename Format::template Single<Padded> nodes(box, first, best.t);
+  return search_bvh<AnyHit>(base, root, nodes, stack, ray, leaves, data, best, form, counting, depth);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -2,6 +2,7 @@
 //
 // `Nodes` is one ray and how it meets the nodes of a format:
 //   Nodes(ray, max_coordinate): the ray's constants, its interval [tnear, tfar] among them;
+//   Nodes(box, first, last): the same where the constants are known (BoxRay), between two distances;
 //   kSlots: children that a node has room for; W: lanes of a test; test(node, entry): the children whose box the ray meets within its interval, as bits, and in those lanes of
 //     `entry` the distances at which it enters them, at least tnear;
 //   children(node): an array in which bit i's child has its reference at [i * kStride];
@@ -25,8 +26,7 @@ struct SoaNodeTest {
 
   /// `max_coordinate`: the largest of the scene, what padded boxes scale their pad with.
   ARBORETUM_INLINE SoaNodeTest(const Ray& ray, float max_coordinate)
-      : box(BoxRay<N, Padded>(ray, max_coordinate)), tnear(first_distance(ray)), tfar(ray.tfar) {}
-  /// Of a ray whose constants are known, between the distances `first` and `last`.
+      : SoaNodeTest(BoxRay<N, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
   ARBORETUM_INLINE SoaNodeTest(const BoxRay<N, Padded>& constants, float first, float last) : box(constants), tnear(first), tfar(last) {}
   ARBORETUM_INLINE unsigned test(const std::byte* node, F& entry) const { return box.test(node, tnear, tfar, entry); }
   ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
@@ -93,6 +93,23 @@ ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, N
   }
 }
 
+/// The same with the tests of `leaves` and what they keep for the ray, `data`: the search of one ray below `root`. GCC makes a function of the leaf's
+/// part unless it is forced not to, and no vector register survives a call (docs/performance.md).
+template <bool AnyHit, class Nodes, class Leaves, class Counting>
+ARBORETUM_INLINE bool search_bvh(const std::byte* base, bvh::NodeReference root, Nodes& nodes, StackEntry* stack, const Ray& ray, const Leaves& leaves,
+                                 typename Leaves::RayData& data, NearestHit& best, const LeafForm& form, const Counting& counting,
+                                 typename Counting::Depth depth = {}) {
+  const auto leaf = [&](bvh::NodeReference reference) __attribute__((always_inline)) {
+    const std::byte* const blocks = base + bvh::offset_of(reference);
+    const unsigned count = bvh::block_count(reference);
+    if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
+    if constexpr (AnyHit) return leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar);
+    if (leaves.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
+    return false;
+  };
+  return walk_bvh<AnyHit>(base, root, nodes, stack, best.t, counting, leaf, depth);
+}
+
 /// Kernels (traversal/single_rays.h) of single rays through nodes that `Nodes<Padded>` tests.
 template <template <bool> class Nodes>
 struct BvhSingle {
@@ -106,15 +123,7 @@ struct BvhSingle {
     ARBORETUM_INLINE bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
       Nodes<Padded> nodes(ray, max_coordinate_);
       typename Leaves::RayData data = leaves_.prepare(ray);
-      const std::byte* const base = base_;
-      const bool hit = walk_bvh<AnyHit>(base, root_, nodes, stack_.data(), best.t, counting_, [&](bvh::NodeReference reference) __attribute__((always_inline)) {
-        const std::byte* const blocks = base + bvh::offset_of(reference);
-        const unsigned count = bvh::block_count(reference);
-        if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
-        if constexpr (AnyHit) return leaves_.any_hit(data, blocks, count, ray.tnear, ray.tfar);
-        if (leaves_.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
-        return false;
-      });
+      const bool hit = search_bvh<AnyHit>(base_, root_, nodes, stack_.data(), ray, leaves_, data, best, form_, counting_);
       if constexpr (!AnyHit) leaves_.finish(data, best);
       return hit;
     }

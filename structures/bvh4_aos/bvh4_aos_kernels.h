@@ -23,14 +23,10 @@ struct AosNodeTest {
   Lanes r, f, g;
   vm<16> upper_is_near, upper_is_far;  ///< in lane w both: there the maximum's is a number, the minimum's a reference
 
-  ARBORETUM_INLINE AosNodeTest(const Ray& ray, float max_coordinate) {
-    const BoxRay<4, Padded> b(ray, max_coordinate);
-    r = repeat_four<16>(four(b.r.x, b.r.y, b.r.z, 1.0f));
-    f = repeat_four<16>(four(b.f.x, b.f.y, b.f.z, -ray.tnear));
-    g = repeat_four<16>(four(b.g.x, b.g.y, b.g.z, -ray.tfar));
-    const unsigned negative = (__builtin_signbit(b.r.x) ? 1u : 0u) | (__builtin_signbit(b.r.y) ? 2u : 0u) | (__builtin_signbit(b.r.z) ? 4u : 0u);
-    upper_is_near = vm<16>::from_bits((negative | 8u) * 0x1111u), upper_is_far = vm<16>::from_bits((~negative & 15u) * 0x1111u);
-  }
+  ARBORETUM_INLINE AosNodeTest(const Ray& ray, float max_coordinate) : AosNodeTest(BoxRay<4, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
+  ARBORETUM_INLINE AosNodeTest(const BoxRay<4, Padded>& b, float first, float last)
+      : r(repeat_four<16>(four(b.r.x, b.r.y, b.r.z, 1.0f))), f(repeat_four<16>(four(b.f.x, b.f.y, b.f.z, -first))), g(repeat_four<16>(four(b.g.x, b.g.y, b.g.z, -last))),
+        upper_is_near(vm<16>::from_bits((b.octant | 8u) * 0x1111u)), upper_is_far(vm<16>::from_bits((~b.octant & 15u) * 0x1111u)) {}
 
   ARBORETUM_INLINE unsigned test(const std::byte* node, vf<W>& entry) const {
     const Lanes lower = Lanes::load(node), upper = Lanes::load(node + 64);

@@ -26,7 +26,12 @@ struct QuantisedNodeTest {
   F rx, ry, rz, fx, fy, fz, gx, gy, gz, tnear, tfar;
   std::size_t near_x, near_y, near_z, far_x, far_y, far_z;  ///< offsets within Node::planes
 
-  ARBORETUM_INLINE QuantisedNodeTest(const Ray& ray, float max_coordinate) : QuantisedNodeTest(ray, BoxRay<N, Padded>(ray, max_coordinate)) {}
+  ARBORETUM_INLINE QuantisedNodeTest(const Ray& ray, float max_coordinate)
+      : QuantisedNodeTest(BoxRay<N, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
+  ARBORETUM_INLINE QuantisedNodeTest(const BoxRay<N, Padded>& b, float first, float last)
+      : rx(b.r.x), ry(b.r.y), rz(b.r.z), fx(b.f.x), fy(b.f.y), fz(b.f.z), gx(b.g.x), gy(b.g.y), gz(b.g.z), tnear(first), tfar(last),
+        near_x(b.near_x() / sizeof(float)), near_y(b.near_y() / sizeof(float)), near_z(b.near_z() / sizeof(float)),
+        far_x(N - near_x), far_y(5 * N - near_y), far_z(9 * N - near_z) {}
 
   ARBORETUM_INLINE unsigned test(const std::byte* at, F& entry) const {
     const auto* node = reinterpret_cast<const Node*>(at);
@@ -57,12 +62,6 @@ struct QuantisedNodeTest {
   ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
   static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) { return reinterpret_cast<const Node*>(node)->child; }
   static unsigned boxes(const std::byte* node) { return unsigned(__builtin_popcount(reinterpret_cast<const Node*>(node)->children)); }
-
- private:
-  ARBORETUM_INLINE QuantisedNodeTest(const Ray& ray, const BoxRay<N, Padded>& b)
-      : rx(b.r.x), ry(b.r.y), rz(b.r.z), fx(b.f.x), fy(b.f.y), fz(b.f.z), gx(b.g.x), gy(b.g.y), gz(b.g.z), tnear(first_distance(ray)), tfar(ray.tfar),
-        near_x(b.near_x() / sizeof(float)), near_y(b.near_y() / sizeof(float)), near_z(b.near_z() / sizeof(float)),
-        far_x(N - near_x), far_y(5 * N - near_y), far_z(9 * N - near_z) {}
 };
 
 template <int N>
