@@ -56,9 +56,10 @@ constexpr Summary kTraversals[] = {
     {"queued", "32 rays in flight (any hit: 64), their next steps in queues"},
     {"packet", "rays in the lanes, as many as the instruction set has"},
     {"hybrid", "packets that fall apart into single rays, as wide as the instruction set"},
-    {"stream", "groups of rays go down together, sorted into a list for each child"},
+    {"stream", "groups of up to 64 rays of an octant share nodes, each with a mask of its rays"},
     {"stream_sorted", "stream, of rays sorted by octant and origin within the measured time"},
-    {"auto", "looks at the rays, tile by tile: packets of 64 where they are coherent, else rays in flight"},
+    {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
+    {"auto", "looks at the rays, tile by tile: packets of 64 where they hold together, else streams"},
 };
 constexpr Summary kIsas[] = {
     {"scalar", "no vector instructions: the reference that every machine runs"},

@@ -79,6 +79,67 @@ ARBORETUM_INLINE vf<4> four(float x, float y, float z, float w) {
 #endif
 }
 
+/// Rows to columns: lane k of row i becomes lane i of row k.
+ARBORETUM_INLINE void transpose(vf<4> (&row)[4]) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  float from[4][4], to[4][4];
+  for (int i = 0; i < 4; ++i) row[i].store(from[i]);
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 4; ++k) to[k][i] = from[i][k];
+  for (int i = 0; i < 4; ++i) row[i] = vf<4>::load(to[i]);
+#else
+  const __m128 a = _mm_unpacklo_ps(row[0].v, row[1].v), b = _mm_unpackhi_ps(row[0].v, row[1].v);
+  const __m128 c = _mm_unpacklo_ps(row[2].v, row[3].v), d = _mm_unpackhi_ps(row[2].v, row[3].v);
+  row[0].v = _mm_movelh_ps(a, c), row[1].v = _mm_movehl_ps(c, a), row[2].v = _mm_movelh_ps(b, d), row[3].v = _mm_movehl_ps(d, b);
+#endif
+}
+
+/// 64 bytes in registers, to be asked which of them have a bit.
+class SixtyFourBytes {
+ public:
+  ARBORETUM_INLINE explicit SixtyFourBytes(const std::uint8_t* bytes) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+    std::memcpy(v_, bytes, sizeof v_);
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+    for (int i = 0; i < 4; ++i) v_[i] = _mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes) + i);
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
+    for (int i = 0; i < 2; ++i) v_[i] = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(bytes) + i);
+#else
+    v_[0] = _mm512_loadu_si512(bytes);
+#endif
+  }
+  /// Bit i of the result: whether byte i has bit `bit`, 0 to 7.
+  [[nodiscard]] ARBORETUM_INLINE std::uint64_t with_bit(int bit) const {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+    std::uint64_t all = 0;
+    for (int i = 0; i < 64; ++i) all |= std::uint64_t(v_[i] >> bit & 1) << i;
+    return all;
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+    return _mm512_test_epi8_mask(v_[0], _mm512_set1_epi8(char(1 << bit)));
+#else
+    const __m128i up = _mm_cvtsi32_si128(7 - bit);  // the bit becomes each byte's sign
+    std::uint64_t all = 0;
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+    for (int i = 0; i < 4; ++i) all |= std::uint64_t(unsigned(_mm_movemask_epi8(_mm_sll_epi16(v_[i], up)))) << (16 * i);
+#else
+    for (int i = 0; i < 2; ++i) all |= std::uint64_t(unsigned(_mm256_movemask_epi8(_mm256_sll_epi16(v_[i], up)))) << (32 * i);
+#endif
+    return all;
+#endif
+  }
+
+ private:
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  std::uint8_t v_[64];
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+  __m128i v_[4];
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
+  __m256i v_[2];
+#else
+  __m512i v_[1];
+#endif
+};
+
 /// W unsigned bytes at `p`, one a lane.
 template <int W>
 ARBORETUM_INLINE vi<W> load_bytes(const void* p) {

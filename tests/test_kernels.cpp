@@ -261,6 +261,47 @@ TEST_CASE("streams of one to many groups give the single ray's answers, bit for 
   }
 }
 
+// Packets bound rays that end in one place from there (structures/bvh/bvh_packet.h): no occluder may be lost by it.
+TEST_CASE("rays that end in one place are occluded in packets as they are alone") {
+  for (const TriangleMesh& mesh : {random_triangles(3000, 0.1f, 2), sphere(40)}) {
+    const Vec3f center = mesh.bounds().center();
+    std::vector<Ray> rays;
+    std::uint64_t drawn = 0;
+    const auto jitter = [&](float size) {
+      const std::uint64_t i = drawn++;
+      return Vec3f{random_float(77, i, 0) - 0.5f, random_float(77, i, 1) - 0.5f, random_float(77, i, 2) - 0.5f} * size;
+    };
+    for (const Vec3f& end : {center, mesh.vertices[5], center + Vec3f{0.3f, 2.5f, 0.1f}, center + Vec3f{2e3f, -1e4f, 3e3f}}) {
+      for (int tile = 0; tile < 12; ++tile) {
+        const Vec3f place = center + jitter(2.0f);
+        for (int i = 0; i < 64; ++i) {
+          const Vec3f origin = place + jitter(0.05f), way = end - origin;
+          const float length = std::sqrt(dot(way, way));
+          // Every third tile's directions have the length of the way, and some rays of the last tiles end half-way.
+          const bool whole = tile % 3 == 0, half = tile > 8 && i % 5 == 0;
+          rays.push_back({origin, 0.0f, whole ? way : way * (1.0f / length), (whole ? 1.0f : length) * (half ? 0.5f : 1.0f)});
+        }
+      }
+    }
+    Structures structures(mesh);
+    std::set<std::string_view> traversals;
+    for (const KernelRow& row : runnable_rows()) {
+      if (!row.traversal.starts_with("packet") && !row.traversal.starts_with("hybrid") && row.traversal != "auto") continue;
+      if (depends_on_neighbours(row)) continue;
+      INFO(name_of(row));
+      const Accel& accel = structures.get(row);
+      const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+      REQUIRE(single);
+      const std::vector<std::uint8_t> alone = any_hit(*single, accel, rays);
+      const auto hits = std::ranges::count(alone, 1);
+      REQUIRE((hits > 200 && hits < std::ptrdiff_t(rays.size()) - 200));
+      REQUIRE(any_hit(row, accel, rays) == alone);
+      traversals.insert(row.traversal);
+    }
+    CHECK(traversals.count("packet64") == (find_structure("bvh8") ? 1u : 0u));
+  }
+}
+
 TEST_CASE("the order of sorted streams: every ray once, octant after octant") {
   std::vector<Ray> rays = generic_rays(random_triangles(50, 0.3f, 1), 3000, 5);
   for (const Ray& ray : invalid_rays()) rays.push_back(ray);

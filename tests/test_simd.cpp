@@ -84,6 +84,17 @@ const std::map<std::string, Reference>& references() {
       {"unfused_mul_sub", {arithmetic, [](L l) { return bits(product(l.fa(), l.fb()) - l.fc()); }}},
       {"unfused_mul_add", {arithmetic, [](L l) { return bits(product(l.fa(), l.fb()) + l.fc()); }}},
       {"scalar_mul_sub", {arithmetic, [](L l) { return bits(product(l.fa(), l.fb()) - l.fc()); }}},
+      {"transposed_row", {exact, [](L l) { const Bits* row[] = {l.a, l.b, l.c, l.a}; return l.lane < 4 ? row[l.lane][l.c[0] & 3u] : 0u; }}},
+      {"bytes_with_bit",
+       {exact,
+        [](L l) {
+          Bits with = 0;
+          for (int i = 0; l.lane < 2 && i < 32; ++i) {
+            const int byte = (32 * l.lane + i) % (4 * l.width);
+            with |= (l.a[byte / 4] >> (8 * (byte % 4)) >> (l.c[0] & 7u) & 1u) << i;
+          }
+          return with;
+        }}},
       {"less", {exact, [](L l) { return Bits(l.fa() < l.fb()); }}},
       {"less_equal", {exact, [](L l) { return Bits(l.fa() <= l.fb()); }}},
       {"greater", {exact, [](L l) { return Bits(l.fa() > l.fb()); }}},

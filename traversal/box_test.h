@@ -128,6 +128,12 @@ struct BoxLanes {
   /// The same for planes that are made from the node: `planes(offset)` gives those that lie `offset` bytes behind its begin.
   template <class Planes>
   ARBORETUM_INLINE unsigned test_planes(const Planes& planes, F tnear, F tfar, F& entry) const {
+    const unsigned bits = meets(planes, tnear, tfar, entry).bits();
+    return N == W ? bits : bits & ((1u << N) - 1u);
+  }
+  /// The same as lanes, of which those from N on hold nothing.
+  template <class Planes>
+  ARBORETUM_INLINE vm<W> meets(const Planes& planes, F tnear, F tfar, F& entry) const {
     F nx, ny, nz, lx, ly, lz;
     if constexpr (kHasFma) {
       nx = msub(planes(near_x), rx, fx), ny = msub(planes(near_y), ry, fy), nz = msub(planes(near_z), rz, fz);
@@ -140,8 +146,7 @@ struct BoxLanes {
     // Two levels instead of three. A NaN may take a neighbour's bound with it: the interval only grows.
     entry = max_x86(max_x86(nx, ny), max_x86(nz, tnear));
     const F exit = min_x86(min_x86(lx, ly), min_x86(lz, tfar));
-    const unsigned bits = (entry <= exit).bits();
-    return N == W ? bits : bits & ((1u << N) - 1u);
+    return entry <= exit;
   }
 
  private:

@@ -4,7 +4,8 @@
 // A.d, B.d and (N - A - B).d have the sign of N.d or are zero. Origins and directions are boxes: centre and half extent. Each of these products then lies
 // within a radius about its value at the centres; where all of one is beyond zero on the wrong side no ray of the packet meets the triangle. What an
 // intersector computes is off the exact value by some 20 u (|C| + |e|)^2 |d|, u = 2^-24, whether its form is this one or the sheared one
-// of intersectors/watertight.h; the radius is widened by 2^-17 of the same. So no triangle is left out that an intersector would hit.
+// of intersectors/watertight.h; the radius is widened by 2^-17 of the same. The products do not change along a line, so any point of each ray may stand for its origin
+// as long as that width is of the origin's C. So no triangle is left out that an intersector would hit.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -15,6 +16,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Origins and directions of a packet by axis: centre and half extent, rounded up.
 struct PacketInterval {
   float origin[3], origin_half[3], direction[3], direction_half[3];
+  float reach = 0.0f;  ///< how far the rays' origins are at most (sum over the axes) from points on their lines that stand in `origin` instead
 
   void set_axis(int a, float o_low, float o_high, float d_low, float d_high) {
     const auto half = [](float low, float high, float centre) {
@@ -50,7 +52,7 @@ template <class Block>
   const V c = v0 - all(p.origin), c_half = all(p.origin_half), d = all(p.direction), d_half = all(p.direction_half);
   const V n = cross(e2, e1), A = cross(e2, c), B = cross(e1, c);
   const V abs_e1 = absolute(e1), abs_e2 = absolute(e2), abs_d = absolute(d);
-  const F size = sum(absolute(c)) + sum(c_half) + sum(abs_e1) + sum(abs_e2);
+  const F size = sum(absolute(c)) + sum(c_half) + sum(abs_e1) + sum(abs_e2) + F(p.reach);
   const F slack = F(0x1p-17f) * size * size * sum(plus(abs_d, d_half));
   // Radius of X.d for X within half of its centre: |d| half + d_half (|X| + half).
   const auto radius = [&](V X, V half) { return dot(plus(abs_d, d_half), half) + dot(d_half, absolute(X)) + slack; };

@@ -7,6 +7,7 @@
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
 #include "structures/bvh/bvh_stream.h"
+#include "structures/bvh/bvh_stream_lists.h"
 #include "traversal/kernel_rows.h"
 
 namespace arboretum {
@@ -19,6 +20,7 @@ void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, BatchLeaves{});
   add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", BatchLeaves{});
   add_stream_rows<N>(rows);
+  add_stream_list_rows<N>(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -8,13 +8,14 @@
 // The interval test. With r = 1/d and o within the packet's bounds a plane b is met at (b - o) r, whose ends over the packet are products of
 // ends. What a ray's own test computes is off it by less than 2^-20 (M + |o|)|r| (traversal/box_test.h: its pad and roundings are
 // three quarters of that, the interval's own roundings less than the rest), by which the interval is widened: no child is lost that a ray's test takes.
-// Without FMA r may be infinite; such a packet has no interval test.
+// Without FMA r may be infinite; such a packet has no interval test. Rays with a common end instead of a common origin, as those towards a point light, are bounded from there.
 //
 // Every ray visits at least the leaves that it would visit alone, up to those that begin beyond its nearest hit. So with padded boxes
 // the answers are those of single rays, bit for bit.
 #pragma once
 
 #include "structures/bvh/bvh_packet_nodes.h"
+#include "traversal/box_rays.h"
 #include "traversal/packet_interval.h"
 #include "traversal/leaves.h"
 
@@ -22,7 +23,7 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// Rays of a packet at most.
-inline constexpr int kMostPacketRays = PacketRays::kMost;
+inline constexpr int kMostPacketRays = BoxRays::kMost;
 
 /// W rays a register. `fast` and `padded` are one class: they differ in what rays bring with them (compile time).
 template <class Format, int W, class Leaves, bool AnyHit, class Counting>
@@ -43,7 +44,7 @@ class BvhPackets {
     for (std::uint64_t mask : octants)
       if (mask != 0) traverse(mask);
     if constexpr (!AnyHit) {
-      for (std::uint64_t valid = valid_; valid; valid &= valid - 1) {
+      for (std::uint64_t valid = box_.valid; valid; valid &= valid - 1) {
         const int i = __builtin_ctzll(valid);
         auto&& ray = data(i);
         leaves_.finish(ray, best_[i]);
@@ -51,12 +52,13 @@ class BvhPackets {
     }
   }
   [[nodiscard]] const NearestHit& best(int i) const { return best_[i]; }
+  /// Of all packets so far, how often a ray went on alone.
+  [[nodiscard]] std::size_t times_alone() const { return times_alone_; }
 
  private:
   using F = vf<W>;
   static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
   using Children = vf<kLanes>;
-  using Box = BoxRay<N, true>;
 
   struct Entry {
     bvh::NodeReference reference;
@@ -69,7 +71,7 @@ class BvhPackets {
   struct Interval {
     float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
     float tnear;
-    bool usable;
+    bool usable, from_end;
     unsigned near[3];  ///< the near planes; the far one of axis a is 4 a + 1 less that
   };
 
@@ -82,75 +84,21 @@ class BvhPackets {
     }
   }
 
-  /// The rays as structures of arrays and their constants of BoxRay, W at a time: the same operations, so the same bits.
   void prepare(int count, std::uint64_t (&octants)[8]) {
-    for (int i = 0; i < count; ++i) {
-      const Ray& ray = rays_[i];
-      soa_.origin[0][i] = ray.origin.x, soa_.origin[1][i] = ray.origin.y, soa_.origin[2][i] = ray.origin.z;
-      soa_.direction[0][i] = ray.direction.x, soa_.direction[1][i] = ray.direction.y, soa_.direction[2][i] = ray.direction.z;
-      soa_.tnear[i] = ray.tnear, t_[i] = ray.tfar;
-      best_[i] = NearestHit{ray.tfar};
-    }
-    for (int i = count; i < chunks_ * W; ++i) {
-      for (int a = 0; a < 3; ++a) soa_.origin[a][i] = soa_.direction[a][i] = 0.0f;
-      soa_.tnear[i] = t_[i] = 0.0f;
-    }
-    valid_ = overflown_ = 0;
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
-    std::uint64_t negative[3] = {};
-    for (int c = 0; c < chunks_; ++c) {
-      const int k = c * W;
-      const F o[3] = {F::load(soa_.origin[0] + k), F::load(soa_.origin[1] + k), F::load(soa_.origin[2] + k)};
-      const F d[3] = {F::load(soa_.direction[0] + k), F::load(soa_.direction[1] + k), F::load(soa_.direction[2] + k)};
-      const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-      const F infinity(std::numeric_limits<float>::infinity()), tnear = F::load(soa_.tnear + k);
-      vm<W> valid = (tnear <= F::load(t_ + k)) & (largest > F(0.0f));
-      for (int a = 0; a < 3; ++a) valid = valid & (abs(o[a]) < infinity) & (abs(d[a]) < infinity);
-      valid_ |= std::uint64_t(valid.bits()) << k;
-      max_x86(tnear, F(0.0f)).store(tnear_ + k);
-      if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(soa_, k);
-      vm<W> overflows(false);
-      for (int a = 0; a < 3; ++a) {
-        F r, f, g;
-        if (padded_) {
-          Box::template constants<true>(o[a], d[a], largest, F(max_coordinate_), r, f, g);
-        } else {
-          Box::template constants<false>(o[a], d[a], largest, F(max_coordinate_), r, f, g);
-        }
-        r.store(r_[a] + k), f.store(near_[a] + k), g.store(far_[a] + k);
-        overflows = overflows | Box::overflows(f, g);
-        negative[a] |= std::uint64_t((sign_bits(r) < vi<W>(0)).bits()) << k;
-      }
-      const unsigned overflown = (overflows & valid).bits();
-      if (__builtin_expect(overflown != 0, 0)) set_one_by_one(overflown, k);
-    }
+    box_.template prepare<W, N>(count, [this](int i) -> const Ray& { return rays_[i]; }, padded_, max_coordinate_, [this](int k) {
+      if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(box_.rays, k);
+    });
+    for (int i = 0; i < count; ++i) best_[i] = NearestHit{box_.t[i]};
     for (unsigned octant = 0; octant < 8; ++octant) {
-      std::uint64_t mask = valid_;
-      for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? negative[a] : ~negative[a];
+      std::uint64_t mask = box_.valid;
+      for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? box_.negative[a] : ~box_.negative[a];
       octants[octant] = mask;
     }
     if constexpr (!Leaves::kRaysInLanes) {
-      for (std::uint64_t rest = valid_; rest; rest &= rest - 1) {
+      for (std::uint64_t rest = box_.valid; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
         new (static_cast<void*>(data_ + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(rays_[i]));
-      }
-    }
-  }
-
-  /// Rays with constants that overflow, which BoxRay mends. No interval can hold them.
-  __attribute__((noinline)) void set_one_by_one(unsigned lanes, int k) {
-    overflown_ |= std::uint64_t(lanes) << k;
-    const auto set = [&](int i, const auto& box) {
-      r_[0][i] = box.r.x, r_[1][i] = box.r.y, r_[2][i] = box.r.z;
-      near_[0][i] = box.f.x, near_[1][i] = box.f.y, near_[2][i] = box.f.z;
-      far_[0][i] = box.g.x, far_[1][i] = box.g.y, far_[2][i] = box.g.z;
-    };
-    for (; lanes; lanes &= lanes - 1) {
-      const int i = k + __builtin_ctz(lanes);
-      if (padded_) {
-        set(i, BoxRay<N, true>(rays_[i], max_coordinate_));
-      } else {
-        set(i, BoxRay<N, false>(rays_[i], max_coordinate_));
       }
     }
   }
@@ -167,23 +115,66 @@ class BvhPackets {
     low = reduce_min(least), high = -reduce_min(-most);
   }
 
+  /// Bounds along one axis.
+  struct Bounds {
+    float low, high;
+    [[nodiscard]] float largest() const { return -low > high ? -low : high; }
+  };
+
   Interval interval_of(std::uint64_t mask) {
     Interval v;
-    v.usable = (mask & overflown_) == 0;
-    float o_low[3], o_high[3], d_low[3], d_high[3], unused;
-    range(tnear_, mask, v.tnear, unused);
-    for (int a = 0; a < 3; ++a) range(r_[a], mask, v.r_low[a], v.r_high[a]), range(soa_.origin[a], mask, o_low[a], o_high[a]), range(soa_.direction[a], mask, d_low[a], d_high[a]);
+    v.usable = (mask & box_.overflown) == 0;
+    Bounds r[3], o[3], d[3];
+    float unused;
+    range(box_.first, mask, v.tnear, unused);
     for (int a = 0; a < 3; ++a) {
-      const bool negative = __builtin_signbit(v.r_low[a]) != 0;
-      const float r = negative ? -v.r_low[a] : v.r_high[a];
-      const float o = -o_low[a] > o_high[a] ? -o_low[a] : o_high[a];
-      v.near_origin[a] = negative ? o_low[a] : o_high[a], v.far_origin[a] = negative ? o_high[a] : o_low[a];
-      v.pad[a] = 0x1p-20f * (max_coordinate_ + o) * r + 0x1p-99f;
+      range(box_.r[a], mask, r[a].low, r[a].high), range(box_.rays.origin[a], mask, o[a].low, o[a].high);
+      range(box_.rays.direction[a], mask, d[a].low, d[a].high);
+    }
+    float scale[3];
+    for (int a = 0; a < 3; ++a) scale[a] = 0x1p-20f * (max_coordinate_ + o[a].largest());
+    spread_.reach = 0.0f;
+    v.from_end = false;
+    if constexpr (AnyHit) {
+      if (v.usable) take_common_end(mask, v, o, scale);
+    }
+    for (int a = 0; a < 3; ++a) {
+      const bool negative = __builtin_signbit(r[a].low) != 0;
+      v.r_low[a] = r[a].low, v.r_high[a] = r[a].high;
+      v.near_origin[a] = negative ? o[a].low : o[a].high, v.far_origin[a] = negative ? o[a].high : o[a].low;
+      v.pad[a] = scale[a] * (negative ? -r[a].low : r[a].high) + 0x1p-99f;
       v.near[a] = unsigned(2 * a + negative);
       v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
-      if constexpr (Leaves::kRaysInLanes) spread_.set_axis(a, o_low[a], o_high[a], d_low[a], d_high[a]);
+      if constexpr (Leaves::kRaysInLanes) spread_.set_axis(a, o[a].low, o[a].high, d[a].low, d[a].high);
     }
     return v;
+  }
+
+  /// Rays towards a light have no common origin, but their ends o + tfar d lie close together. Then the bounds of the ends take the place of the origins', and
+  /// distances count from a ray's end, s = t - tfar: it meets a plane b at s = (b - end) r.
+  void take_common_end(std::uint64_t mask, Interval& v, Bounds (&o)[3], float (&scale)[3]) {
+    Bounds t, end[3];
+    range(box_.t, mask, t.low, t.high);
+    if (!(t.high < std::numeric_limits<float>::infinity())) return;
+    float origins = 0.0f, ends = 0.0f;
+    for (int a = 0; a < 3; ++a) {
+      alignas(64) float at[kMostPacketRays];
+      for (int k = 0; k < chunks_ * W; k += W) (F::load(box_.rays.origin[a] + k) + F::load(box_.t + k) * F::load(box_.rays.direction[a] + k)).store(at + k);
+      range(at, mask, end[a].low, end[a].high);
+      origins += o[a].high - o[a].low, ends += end[a].high - end[a].low;
+    }
+    if (!(ends < 0.25f * origins)) return;
+    v.from_end = true;
+    // The product and the sum round by less than 2^-22 (|o| + |end|) together; so does what is computed from `end` as above from `o`.
+    for (int a = 0; a < 3; ++a) {
+      const float largest = o[a].largest() > end[a].largest() ? o[a].largest() : end[a].largest();
+      const float rounding = 0x1p-21f * (o[a].largest() + end[a].largest());
+      const float up = end[a].high - o[a].low, down = o[a].high - end[a].low;
+      spread_.reach += up > down ? up : down;
+      o[a] = {end[a].low - rounding, end[a].high + rounding};
+      scale[a] = 0x1p-19f * (max_coordinate_ + largest);
+    }
+    v.tnear = v.tnear - t.high * (1.0f + 0x1p-20f);
   }
 
   /// The children that some ray of the packet may meet, and where it enters them at the earliest.
@@ -208,10 +199,10 @@ class BvhPackets {
       const unsigned in = unsigned(mask >> (c * W)) & ((1u << W) - 1u);
       if (in == 0) continue;
       const int k = c * W;
-      const F rx = F::load(r_[0] + k), ry = F::load(r_[1] + k), rz = F::load(r_[2] + k);
+      const F rx = F::load(box_.r[0] + k), ry = F::load(box_.r[1] + k), rz = F::load(box_.r[2] + k);
       const auto at = [&](unsigned plane, F r, const float* c) { return Format::template distance<F>(node, plane, i, r, F::load(c + k)); };
-      const F enter = max_x86(max_x86(at(near[0], rx, near_[0]), at(near[1], ry, near_[1])), max_x86(at(near[2], rz, near_[2]), F::load(tnear_ + k)));
-      const F leave = min_x86(min_x86(at(1 - near[0], rx, far_[0]), at(5 - near[1], ry, far_[1])), min_x86(at(9 - near[2], rz, far_[2]), F::load(t_ + k)));
+      const F enter = max_x86(max_x86(at(near[0], rx, box_.near[0]), at(near[1], ry, box_.near[1])), max_x86(at(near[2], rz, box_.near[2]), F::load(box_.first + k)));
+      const F leave = min_x86(min_x86(at(1 - near[0], rx, box_.far[0]), at(5 - near[1], ry, box_.far[1])), min_x86(at(9 - near[2], rz, box_.far[2]), F::load(box_.t + k)));
       met |= std::uint64_t((enter <= leave).bits() & in) << k;
     }
     return met;
@@ -219,13 +210,13 @@ class BvhPackets {
 
   [[nodiscard]] float farthest(std::uint64_t mask) const {
     float low, high;
-    range(t_, mask, low, high);
+    range(box_.t, mask, low, high);
     return high;
   }
 
   void traverse(std::uint64_t group) {
     const Interval interval = interval_of(group);
-    float tfar = farthest(group);
+    float tfar = interval.from_end ? 0.0f : farthest(group);
     Entry* const stack = stack_.data();
     Entry* top = stack;
     typename Counting::Depths depths{typename Counting::Depth{}};
@@ -233,6 +224,7 @@ class BvhPackets {
     for (;;) {
       while (!bvh::is_leaf(e.reference)) {
         if (__builtin_popcountll(e.mask) <= threshold_) {
+          times_alone_ += unsigned(__builtin_popcountll(e.mask));
           if constexpr (Counting::kCounting) ++counting_.counters.switches, counting_.counters.rays_alone += unsigned(__builtin_popcountll(e.mask));
           for (std::uint64_t rest = e.mask; rest; rest &= rest - 1) alone(__builtin_ctzll(rest), e.reference, depths.current());
           if constexpr (!AnyHit) tfar = farthest(group);
@@ -290,14 +282,14 @@ class BvhPackets {
   void alone(int i, bvh::NodeReference reference, typename Counting::Depth depth) {
     auto&& ray = data(i);
     const auto below = [&](auto padded) {
-      const BoxRay<N, decltype(padded)::value> box(of(r_, i), of(near_, i), of(far_, i));
-      return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(base_, reference, box, tnear_[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_, counting_, depth);
+      const BoxRay<N, decltype(padded)::value> box(of(box_.r, i), of(box_.near, i), of(box_.far, i));
+      return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(base_, reference, box, box_.first[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_, counting_, depth);
     };
     const bool hit = padded_ ? below(std::true_type{}) : below(std::false_type{});
     if constexpr (AnyHit) {
       if (hit) occluded(i);
     }
-    t_[i] = best_[i].t;
+    box_.t[i] = best_[i].t;
   }
   void occluded(int i) {
     best_[i].primitive = 0;
@@ -325,7 +317,7 @@ class BvhPackets {
       if constexpr (AnyHit) {
         if (leaves_.any_hit(ray, blocks, count, rays_[i].tnear, rays_[i].tfar)) occluded(i);
       } else {
-        if (leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) t_[i] = best_[i].t;
+        if (leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) box_.t[i] = best_[i].t;
       }
     }
   }
@@ -363,10 +355,10 @@ class BvhPackets {
       if (in == 0) continue;
       TriangleHits<W> hits;
       vm<W> redo;
-      const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(soa_, packet_, group, k, block, triangle, hits, redo);
+      const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(box_.rays, packet_, group, k, block, triangle, hits, redo);
       again |= std::uint64_t(redo.bits() & in) << k;
       if ((inside.bits() & in) == 0) continue;
-      unsigned hit = in & (inside & (hits.t <= F::load(t_ + k)) & (hits.t >= F::load(soa_.tnear + k))).bits();
+      unsigned hit = in & (inside & (hits.t <= F::load(box_.t + k)) & (hits.t >= F::load(box_.rays.tnear + k))).bits();
       if (hit == 0) continue;
       alignas(64) float t[W], u[W], v[W], denominator[W];
       hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
@@ -376,7 +368,7 @@ class BvhPackets {
           occluded(i);
         } else {
           NearestHit& best = best_[i];
-          if (t[lane] < best.t || id < best.primitive) best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, t_[i] = t[lane];
+          if (t[lane] < best.t || id < best.primitive) best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, box_.t[i] = t[lane];
         }
       }
     }
@@ -410,10 +402,10 @@ class BvhPackets {
   Counting counting_;
   const Ray* rays_ = nullptr;
   int threshold_ = 0, chunks_ = 0;
-  std::uint64_t active_ = 0, valid_ = 0, overflown_ = 0;
+  std::uint64_t active_ = 0;
+  std::size_t times_alone_ = 0;
   unsigned lanes_ = 0;  ///< rays of the packet, where it is counted
-  PacketRays soa_;
-  alignas(64) float r_[3][kMostPacketRays], near_[3][kMostPacketRays], far_[3][kMostPacketRays], tnear_[kMostPacketRays], t_[kMostPacketRays];
+  BoxRays box_;
   NearestHit best_[kMostPacketRays];
   alignas(64) std::byte data_[Leaves::kRaysInLanes ? 1 : kMostPacketRays * sizeof(typename Leaves::RayData)];
   struct NoPacket {};

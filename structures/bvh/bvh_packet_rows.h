@@ -8,20 +8,20 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// A batch as packets of `rays_each` rays that follow each other.
+/// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone.
 template <class Format, int W, class Leaves, class Counting>
 struct PacketBatch {
-  static __attribute__((noinline)) void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
-    packets<false>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+  static __attribute__((noinline)) std::size_t closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
+    return packets<false>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
   }
-  static __attribute__((noinline)) void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters, int rays_each,
+  static __attribute__((noinline)) std::size_t any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters, int rays_each,
                                                 int threshold) {
-    packets<true>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
+    return packets<true>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
   }
 
  private:
   template <bool AnyHit, class Report>
-  static ARBORETUM_INLINE void packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
+  static ARBORETUM_INLINE std::size_t packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
     BvhPackets<Format, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
     for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
       const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
@@ -29,6 +29,7 @@ struct PacketBatch {
       for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
     }
     if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_packets += rays.size();
+    return packet.times_alone();
   }
 };
 

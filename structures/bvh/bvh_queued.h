@@ -58,6 +58,40 @@ ARBORETUM_INLINE __m256d sort_down(__m256d e) {
 }
 #endif
 
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+/// The same as bytes, for the first four lanes of a mask; 0xff where there are fewer.
+struct CompressBytesTable {
+  alignas(16) std::uint8_t bytes[256][16] = {};
+  constexpr CompressBytesTable() {
+    for (unsigned m = 0; m < 256; ++m) {
+      unsigned n = 0;
+      for (unsigned i = 0; i < 8 && n < 4; ++i) {
+        if (!(m >> i & 1)) continue;
+        for (unsigned b = 0; b < 4; ++b) bytes[m][4 * n + b] = std::uint8_t(4 * i + b);
+        ++n;
+      }
+      for (; n < 4; ++n)
+        for (unsigned b = 0; b < 4; ++b) bytes[m][4 * n + b] = 0xff;
+    }
+  }
+};
+inline constexpr CompressBytesTable kCompressBytes;
+
+/// Of eight lanes those that `from` (a row of the table) names. A byte of an index with its highest bit gives 0, else its low four bits count.
+ARBORETUM_INLINE __m128i compress_bytes(__m128i low, __m128i high, __m128i from) {
+  return _mm_or_si128(_mm_shuffle_epi8(low, _mm_adds_epu8(from, _mm_set1_epi8(0x70))), _mm_shuffle_epi8(high, _mm_sub_epi8(from, _mm_set1_epi8(16))));
+}
+
+/// Four entries, the largest first: a[0], a[1], b[0], b[1]. Positive doubles order as their bits do.
+ARBORETUM_INLINE void sort_down(__m128d& a, __m128d& b) {
+  const __m128d high = _mm_max_pd(a, b), low = _mm_min_pd(a, b);
+  const __m128d even = _mm_unpacklo_pd(high, low), odd = _mm_unpackhi_pd(high, low);
+  const __m128d more = _mm_max_pd(even, odd), less = _mm_min_pd(even, odd);  // the most and one in between, one in between and the least
+  const __m128d between = _mm_unpackhi_pd(more, more);
+  a = _mm_unpacklo_pd(more, _mm_max_sd(between, less)), b = _mm_shuffle_pd(_mm_min_sd(between, less), less, 0b10);
+}
+#endif
+
 /// The same for all: up to four children, the usual case, without a branch where the registers can do it. Writes up to four
 /// entries whatever their number.
 template <int N, bool AnyHit>
@@ -87,6 +121,26 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
   }
 #else
   constexpr bool kVectors = false;
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+  if constexpr (N == 4 || N == 8) {
+    if (__builtin_expect(count <= 4, 1)) {
+      const __m128i from = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompressBytes.bytes[hit]));
+      const auto* reference = reinterpret_cast<const __m128i*>(child);
+      if constexpr (N == 4) {
+        references = _mm_shuffle_epi8(_mm_loadu_si128(reference), from);
+        keys = _mm_shuffle_epi8(_mm_castps_si128(entry.v), from);
+      } else {
+        references = compress_bytes(_mm_loadu_si128(reference), _mm_loadu_si128(reference + 1), from);
+        keys = compress_bytes(_mm_castps_si128(entry.lo.v), _mm_castps_si128(entry.hi.v), from);
+      }
+      __m128d a = _mm_castsi128_pd(_mm_unpacklo_epi32(references, keys)), b = _mm_castsi128_pd(_mm_unpackhi_epi32(references, keys));
+      if constexpr (!AnyHit) sort_down(a, b);
+      _mm_storeu_pd(reinterpret_cast<double*>(top), a), _mm_storeu_pd(reinterpret_cast<double*>(top + 2), b);
+      top += count;
+      return;
+    }
+  }
+#endif
 #endif
   if constexpr (kVectors) {
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2

@@ -1,18 +1,16 @@
-// Stream traversal: groups of rays of a batch go down the tree together, after Barringer and Akenine-Moeller, "Dynamic Ray Stream
-// Traversal", ACM TOG 33(4), 2014.
+// Stream traversal: rays of one octant share nodes. A group of up to 64 of them has one stack of nodes, each with a mask of the rays that are to visit it, after the any-hit
+// streams of Embree 3 (groups of 32 rays; there a ray alone leaves the stream).
 //
-// A group is parted by the octant of its rays' directions. Each part begins as one list of rays at the root; a node tests every ray
-// of its list against all its children, with the planes in registers, and sorts the rays into a list for each child; lists wait on a
-// stack, children near to far, so that a node's cache lines and its mispredicted branches are paid once for all its rays. Rays that
-// took different ways meet again in the next child that they share. A list of few rays is finished one ray after the other.
-//
-// Where we differ: nodes are wide, and the order of children is one for the whole list (of their centres along the mean direction of
-// the part) where theirs is each ray's own, so that a child is visited once. A ray may then visit a node that it would not have alone: it
-// finds the same hit, since a box is dropped only where it begins beyond the nearest hit. Rays that are
-// done (any hit) or have found something nearer than the box leave a list when its turn comes.
+// A batch's rays are sorted into eight lists as they come; a full list is a group. A node tests each of its rays against all its children, the planes in registers,
+// so that its cache lines, its place on the stack and its mispredicted branches are paid once for all of them. A closest hit takes the
+// children nearest first by the least distance at which any ray enters; rays that have found something nearer leave the mask when the node's turn comes.
+// Several groups take turns, a node each, so that the lines that one asks for arrive while others work: that hides what rays of their own wait for as
+// rays in flight do (bvh_queued.h), at a third of the instructions a node. A ray may visit a node that it would not have alone; it finds the same hit, since a
+// box is dropped only where it begins beyond the nearest hit.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
+#include "traversal/box_rays.h"
 #include "traversal/kernel_rows.h"
 #include "traversal/usual_leaves.h"
 
@@ -20,216 +18,232 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 inline constexpr std::string_view kStreamSorted = "stream_sorted";
-/// Rays of a group, and of a list that is no longer worth its own (docs/performance.md).
-inline constexpr std::size_t kStreamRays = 1024;
-inline constexpr unsigned kFewRays = 4;
+/// Groups that take turns (docs/performance.md).
+inline constexpr unsigned kGroupsInTurn = 8;
 
 template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
 class Stream {
  public:
-  /// Takes ray order[i] as the i-th, or ray i where `order` is empty. There is at least one ray.
+  /// Takes ray order[i] as the i-th, or ray i where `order` is empty.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, std::span<const std::uint32_t> order, Counting counting)
-      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form),
-        counting_(counting), rays_(rays), order_(order), group_(unsigned(std::min(kStreamRays, rays.size()))), lists_(tree.stack_entries()),
-        entries_(4 * group_), children_(std::size_t(N + 1) * group_), stack_(tree.stack_entries()), room_(group_ * (sizeof(State) + sizeof(LeafState))),
-        states_(reinterpret_cast<State*>(room_.data())), leaf_states_(reinterpret_cast<LeafState*>(room_.data() + group_ * sizeof(State))) {}
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
+        order_(order), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * stack_entries_), groups_(count_) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report>
-  void run(Report&& report) {
-    for (std::size_t begin = 0; begin < rays_.size(); begin += group_) group(begin, std::min(rays_.size(), begin + group_), report);
+  void run(const Report& report) {
+    Group* turn[kGroupsInTurn];
+    unsigned groups = 0;
+    for (unsigned i = 0; i < count_ && fill(groups_[i], stacks_.data() + i * stack_entries_); ++i) turn[groups++] = &groups_[i];
+    while (groups != 0) {
+      for (unsigned i = 0; i < groups;) {
+        Group& group = *turn[i];
+        if (step(group)) {
+          ++i;
+          continue;
+        }
+        finish(group, report);
+        if (!fill(group, group.bottom)) turn[i] = turn[--groups];
+      }
+    }
   }
 
  private:
+  static constexpr unsigned kRays = BoxRays::kMost;
   using Test = SoaNodeTest<N, Padded>;
   using Box = BoxRay<N, Padded>;
-  static constexpr int W = Test::W;
+  static constexpr int W = Test::W, kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth, kBytes = (W + 7) / 8;
   using F = vf<W>;
 
-  /// What nodes need of a ray: a cache line.
-  struct alignas(64) State {
-    Box box;
-    float first;    ///< distance from which boxes count
-    float nearest;  ///< beyond which they do not; -inf when the search is over
-    std::uint32_t place;  ///< in the group
+  /// What nodes need of a ray, in one cache line: BoxRay's r, f and g, and the distance from which boxes count.
+  struct alignas(64) Constants {
+    float number[12];
   };
-  static_assert(sizeof(State) == 64);
-  /// What leaves need.
-  struct LeafState {
-    NearestHit best;
-    float tnear;
-    typename Leaves::RayData data;
-    ARBORETUM_INLINE LeafState(const Ray& ray, const Leaves& leaves) : best{ray.tfar}, tnear(ray.tnear), data(leaves.prepare(ray)) {}
-  };
-  /// Rays that are to visit a node or leaf: entries_[begin ...], the key of each the distance at which it enters.
-  struct List {
+  struct Entry {
+    std::uint64_t rays;
     bvh::NodeReference target;
-    std::uint32_t begin, count;
+    float t;  ///< the least at which one of them enters
+  };
+  struct NoPacket {};
+  template <class L>
+  struct PacketOf {
+    using type = typename L::Intersector::PacketData;
+  };
+  using Packet = typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
+  struct alignas(64) Group {
+    Constants constants[kRays];
+    float t[kRays];  ///< nearest hit so far
+    NearestHit best[kRays];
+    std::uint32_t index[kRays];
+    Packet packet;
+    alignas(64) std::byte data[Leaves::kRaysInLanes ? 1 : kRays * sizeof(typename Leaves::RayData)];
+    unsigned count = 0, octant = 0;
+    std::uint64_t active = 0;  ///< rays whose search is not over
+    Entry *bottom = nullptr, *top = nullptr;
+    typename Counting::Depths depths{typename Counting::Depth{}};
   };
 
-  ARBORETUM_INLINE std::size_t index_of(std::size_t i) const { return order_.empty() ? i : order_[i]; }
+  /// What the intersector keeps for ray i: where it can be made of little it is, whenever it is asked for.
+  static ARBORETUM_INLINE decltype(auto) data(Group& g, unsigned i, [[maybe_unused]] const Ray& ray) {
+    if constexpr (Leaves::kRaysInLanes) {
+      return g.packet.alone(ray, int(i));
+    } else {
+      return (*reinterpret_cast<typename Leaves::RayData*>(g.data + i * sizeof(typename Leaves::RayData)));
+    }
+  }
+
+  /// The next group's rays; false when there are none left.
+  bool fill(Group& group, Entry* stack) {
+    while (next_ < rays_.size()) {
+      const std::uint32_t i = order_.empty() ? std::uint32_t(next_) : order_[next_];
+      ++next_;
+      const unsigned octant = sign_mask(vf<4>::load(&rays_[i].direction)) & 7u;
+      list_[octant][waiting_[octant]] = i;
+      if (++waiting_[octant] == kRays) return begin(group, octant, stack), true;
+    }
+    for (unsigned octant = 0; octant < 8; ++octant)
+      if (waiting_[octant] != 0) return begin(group, octant, stack), true;
+    return false;
+  }
+
+  void begin(Group& g, unsigned octant, Entry* stack) {
+    const std::uint32_t* const list = list_[octant];
+    const int count = int(std::exchange(waiting_[octant], 0u));
+    const auto ray_at = [&](int i) -> const Ray& { return rays_[list[i]]; };
+    if constexpr (Leaves::kRaysInLanes) g.packet.clear();
+    lanes_.template prepare<kNative, N>(count, ray_at, Padded, max_coordinate_, [&](int k) {
+      if constexpr (Leaves::kRaysInLanes) g.packet.template prepare<kNative>(lanes_.rays, k);
+    });
+    for (int k = 0; k < count; k += 4) gather(g, k);
+    for (int i = 0; i < count; ++i) {
+      g.index[i] = list[i];
+      g.best[i] = NearestHit{lanes_.t[i]};
+      if constexpr (!Leaves::kRaysInLanes) {
+        if (lanes_.valid >> i & 1u)
+          new (static_cast<void*>(g.data + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(ray_at(i)));
+      }
+    }
+    std::memcpy(g.t, lanes_.t, sizeof g.t);
+    g.count = unsigned(count), g.octant = octant, g.active = lanes_.valid;
+    g.bottom = g.top = stack;
+    if (g.active != 0) *g.top++ = {g.active, root_, 0.0f};
+    g.depths = typename Counting::Depths(typename Counting::Depth{});
+  }
+
+  /// The constants of the four rays from k on into their cache lines.
+  void gather(Group& g, int k) {
+    const auto four = [&](int at, const float* a, const float* b, const float* c, const float* d) {
+      vf<4> row[4] = {vf<4>::load(a + k), vf<4>::load(b + k), vf<4>::load(c + k), vf<4>::load(d + k)};
+      transpose(row);
+      for (int i = 0; i < 4; ++i) row[i].store(g.constants[k + i].number + at);
+    };
+    four(0, lanes_.r[0], lanes_.r[1], lanes_.r[2], lanes_.near[0]);
+    four(4, lanes_.near[1], lanes_.near[2], lanes_.far[0], lanes_.far[1]);
+    four(8, lanes_.far[2], lanes_.first, lanes_.first, lanes_.first);
+  }
 
   template <class Report>
-  void group(std::size_t begin, std::size_t end, Report&& report) {
-    unsigned rays = 0, of_octant[8] = {};
-    Vec3f direction[8] = {};
-    for (std::size_t i = begin; i < end; ++i) {
-      const Ray& ray = rays_[index_of(i)];
-      if (!is_valid_in_lanes(ray)) {
-        report(index_of(i), NearestHit{ray.tfar});
-        continue;
+  void finish(Group& g, const Report& report) {
+    for (unsigned i = 0; i < g.count; ++i) {
+      if constexpr (!AnyHit) {
+        auto&& ray = data(g, i, rays_[g.index[i]]);
+        leaves_.finish(ray, g.best[i]);
       }
-      State& s = *new (&states_[rays]) State{Box(ray, max_coordinate_), first_distance(ray), ray.tfar, std::uint32_t(i - begin)};
-      new (&leaf_states_[rays++]) LeafState(ray, leaves_);
-      ++of_octant[s.box.octant];
-      direction[s.box.octant] = direction[s.box.octant] + ray.direction;
-    }
-    unsigned at[8] = {};
-    for (int o = 1; o < 8; ++o) at[o] = at[o - 1] + of_octant[o - 1];
-    for (unsigned i = 0; i < rays; ++i) entries_[at[states_[i].box.octant]++] = stack_entry(__builtin_bit_cast(std::uint32_t, states_[i].first), i);
-    for (int o = 0; o < 8; ++o) {
-      if (of_octant[o]) octant({root_, at[o] - of_octant[o], of_octant[o]}, direction[o], rays);
-    }
-    for (unsigned i = 0; i < rays; ++i) {
-      LeafState& leaf = leaf_states_[i];
-      if constexpr (!AnyHit) leaves_.finish(leaf.data, leaf.best);
-      report(index_of(begin + states_[i].place), leaf.best);
+      report(g.index[i], g.best[i]);
     }
   }
 
-  /// Everything that the rays of `root` meet. They have the same octant. Entries from `free` on are unused.
-  void octant(const List& root, Vec3f direction, unsigned free) {
-    const Box& box = states_[ray_of(entries_[root.begin])].box;
-    const unsigned x = box.near_x(), y = box.near_y(), z = box.near_z();
-    const unsigned near[6] = {x, x ^ Box::kSide, y, 5 * Box::kSide - y, z, 9 * Box::kSide - z};
-    List* const bottom = lists_.data();
-    List* top = bottom;
-    *top++ = root;
-    typename Counting::Depths depths{typename Counting::Depth{}};
-    while (top != bottom) {
-      List list = *--top;
-      if (list.target != root.target) depths.pop(top - bottom);
-      drop(list);
-      if (list.count <= kFewRays) {
-        for (unsigned i = 0; i < list.count; ++i) alone(ray_of(entries_[list.begin + i]), list.target, depths.current());
-      } else if (bvh::is_leaf(list.target)) {
-        leaf(list);
+  /// One node or leaf; false when nothing waits any more.
+  ARBORETUM_INLINE bool step(Group& g) {
+    for (;;) {
+      if (g.top == g.bottom) return false;
+      const Entry e = *--g.top;
+      if (e.target != root_) g.depths.pop(g.top - g.bottom);
+      const std::uint64_t rays = AnyHit ? e.rays & g.active : e.rays & nearer(g, e.t);
+      if (rays == 0) continue;
+      if (bvh::is_leaf(e.target)) {
+        leaf(g, e.target, rays);
       } else {
-        List* const first = top;
-        node(list, near, direction, list.begin < free ? free : list.begin, top, depths.current());
-        depths.push(first - bottom, top - bottom);
+        node(g, e.target, rays);
       }
+      return true;
     }
   }
 
-  static ARBORETUM_INLINE unsigned ray_of(StackEntry e) { return std::uint32_t(e); }
-  static ARBORETUM_INLINE float key_of(StackEntry e) { return __builtin_bit_cast(float, std::uint32_t(e >> 32)); }
-
-  /// Takes from the list whose search is over or has found something nearer.
-  ARBORETUM_INLINE void drop(List& list) {
-    StackEntry* const first = entries_.data() + list.begin;
-    StackEntry* out = first;
-    for (const StackEntry *e = first, *end = first + list.count; e != end; ++e) {
-      const StackEntry entry = *e;
-      *out = entry;
-      out += key_of(entry) <= states_[ray_of(entry)].nearest;
-    }
-    list.count = unsigned(out - first);
+  /// The rays that have found nothing before t.
+  static ARBORETUM_INLINE std::uint64_t nearer(const Group& g, float t) {
+    constexpr int V = kNative;
+    std::uint64_t rays = 0;
+    for (int k = 0; k < int(kRays); k += V) rays |= std::uint64_t((vf<V>(t) <= vf<V>::load(g.t + k)).bits()) << k;
+    return rays;
   }
 
-  void node(const List& list, const unsigned (&side)[6], Vec3f direction, unsigned free, List*& top, typename Counting::Depth depth) {
-    const std::byte* const node = base_ + bvh::offset_of(list.target);
-    const F planes[6] = {F::load(node + side[0]), F::load(node + side[1]), F::load(node + side[2]),
-                         F::load(node + side[3]), F::load(node + side[4]), F::load(node + side[5])};
-    StackEntry* tail[N + 1];
-    for (int i = 0; i <= N; ++i) tail[i] = children_.data() + std::size_t(i) * group_;
-    alignas(64) std::uint32_t key[W + 1];
-    key[W] = 0;
-    for (const StackEntry *e = entries_.data() + list.begin, *end = e + list.count; e != end; ++e) {
-      const unsigned ray = ray_of(*e);
-      const State& s = states_[ray];
-      BoxLanes<N, Padded> box(s.box);
-      box.near_x = 0, box.near_y = 2 * Box::kSide, box.near_z = 4 * Box::kSide;
+  ARBORETUM_INLINE void node(Group& g, bvh::NodeReference target, std::uint64_t rays) {
+    constexpr unsigned kSide = Box::kSide, kChildren = (1u << N) - 1u;
+    const std::byte* const node = base_ + bvh::offset_of(target);
+    const unsigned x = (g.octant & 1u) * kSide, y = (2 + (g.octant >> 1 & 1u)) * kSide, z = (4 + (g.octant >> 2)) * kSide;
+    const F planes[6] = {F::load(node + x), F::load(node + (x ^ kSide)), F::load(node + y), F::load(node + (y ^ kSide)), F::load(node + z), F::load(node + (z ^ kSide))};
+    [[maybe_unused]] F least(std::numeric_limits<float>::infinity());
+    alignas(64) std::uint8_t met[kBytes][kRays];  // by ray, a bit for each child
+    unsigned any = 0;
+    for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
+      const unsigned i = unsigned(__builtin_ctzll(rest));
+      const float* const c = g.constants[i].number;
+      BoxLanes<N, Padded> box(Box({c[0], c[1], c[2]}, {c[3], c[4], c[5]}, {c[6], c[7], c[8]}));
+      box.near_x = 0, box.near_y = 2 * kSide, box.near_z = 4 * kSide;
       F entry;
-      unsigned hit = box.test_planes([&](unsigned offset) { return planes[offset / Box::kSide]; }, F(s.first), F(s.nearest), entry);
+      const vm<W> meets = box.meets([&](unsigned offset) { return planes[offset / kSide]; }, F(c[9]), F(g.t[i]), entry);
+      const unsigned hit = meets.bits() & kChildren;
+      for (int b = 0; b < kBytes; ++b) met[b][i] = std::uint8_t(hit >> (8 * b));
+      any |= hit;
+      if constexpr (!AnyHit) least = select(meets, min_x86(entry, least), least);
       if constexpr (Counting::kCounting) {
         counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
-        counting_.at_depth(depth, Test::kSlots, Test::boxes(node));
+        counting_.at_depth(g.depths.current(), Test::kSlots, Test::boxes(node));
       }
-      entry.store(key);
-      // Two without a branch, which most rays need no more than; what is not there goes to the list behind the last.
-      const auto append = [&] {
-        const unsigned i = unsigned(__builtin_ctz(hit | 1u << N));
-        *tail[i] = stack_entry(key[i], ray);
-        tail[i] += hit != 0;
-        hit &= hit - 1;
-      };
-      append(), append();
-      while (hit) append();
     }
-    push(node, planes, tail, direction, free, top);
+    push(g, Test::children(node), rays, met, any, least);
   }
 
-  /// The children's lists onto the stack, the nearest on top.
-  ARBORETUM_INLINE void push(const std::byte* node, const F (&planes)[6], StackEntry* const (&tail)[N + 1], Vec3f direction, unsigned free, List*& top) {
-    alignas(64) float along[W];
-    ((planes[0] + planes[1]) * F(direction.x) + (planes[2] + planes[3]) * F(direction.y) + (planes[4] + planes[5]) * F(direction.z)).store(along);
-    const bvh::NodeReference* const child = Test::children(node);
-    unsigned order[N], children = 0;
-    std::size_t total = 0;
-    for (unsigned i = 0; i < unsigned(N); ++i) {
-      const std::size_t count = std::size_t(tail[i] - (children_.data() + std::size_t(i) * group_));
-      if (count == 0) continue;
-      total += count;
-      unsigned at = children++;
-      for (; at && along[order[at - 1]] < along[i]; --at) order[at] = order[at - 1];
-      order[at] = i;
+  /// The children that some ray met, nearest on top.
+  ARBORETUM_INLINE void push(Group& g, const bvh::NodeReference* child, std::uint64_t rays, const std::uint8_t (&met)[kBytes][kRays], unsigned any, F least) {
+    [[maybe_unused]] alignas(64) float t[W];
+    if constexpr (!AnyHit) least.store(t);
+    Entry* const first = g.top;
+    Entry* top = first;
+    for (int b = 0; b < kBytes; ++b) {
+      const SixtyFourBytes bytes(met[b]);
+      for (unsigned rest = any >> (8 * b) & 0xffu; rest; rest &= rest - 1) {
+        const int bit = __builtin_ctz(rest), i = 8 * b + bit;
+        const auto* at = reinterpret_cast<const char*>(base_ + bvh::offset_of(child[i]));
+        for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+        Entry e{bytes.with_bit(bit) & rays, child[i], 0.0f};
+        Entry* p = top++;
+        if constexpr (!AnyHit) {
+          e.t = t[i];
+          for (; p != first && p[-1].t < e.t; --p) *p = p[-1];
+        }
+        *p = e;
+      }
     }
-    if (entries_.size() < free + total) entries_.resize(2 * (free + total));
-    for (unsigned k = 0; k < children; ++k) {
-      const unsigned i = order[k];
-      const auto* target = reinterpret_cast<const char*>(base_ + bvh::offset_of(child[i]));
-      for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
-      const StackEntry* const from = children_.data() + std::size_t(i) * group_;
-      const auto count = unsigned(tail[i] - from);
-      std::copy(from, from + count, entries_.data() + free);
-      *top++ = {child[i], free, count};
-      free += count;
-    }
+    g.top = top;
+    g.depths.push(first - g.bottom, top - g.bottom);
   }
 
-  void leaf(const List& list) {
-    const std::byte* const blocks = base_ + bvh::offset_of(list.target);
-    const unsigned count = bvh::block_count(list.target);
-    for (unsigned i = 0; i < list.count; ++i) leaf(ray_of(entries_[list.begin + i]), blocks, count);
-  }
-
-  /// Returns whether the nearest hit changed.
-  ARBORETUM_INLINE bool leaf(unsigned ray, const std::byte* blocks, unsigned count) {
-    State& s = states_[ray];
-    LeafState& l = leaf_states_[ray];
-    if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
-    if constexpr (AnyHit) {
-      if (!leaves_.any_hit(l.data, blocks, count, l.tnear, s.nearest)) return false;
-      l.best.primitive = 0;
-      s.nearest = -std::numeric_limits<float>::infinity();
-      return true;
-    } else {
-      if (!leaves_.closest_hit(l.data, blocks, count, l.tnear, l.best)) return false;
-      s.nearest = l.best.t;
-      return true;
+  ARBORETUM_INLINE void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
+    const std::byte* const blocks = base_ + bvh::offset_of(target);
+    const unsigned count = bvh::block_count(target);
+    for (; rays; rays &= rays - 1) {
+      const unsigned i = unsigned(__builtin_ctzll(rays));
+      if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
+      const Ray& ray = rays_[g.index[i]];
+      auto&& of_ray = data(g, i, ray);
+      if constexpr (AnyHit) {
+        if (leaves_.any_hit(of_ray, blocks, count, ray.tnear, ray.tfar)) g.best[i].primitive = 0, g.active &= ~(std::uint64_t{1} << i);
+      } else {
+        if (leaves_.closest_hit(of_ray, blocks, count, ray.tnear, g.best[i])) g.t[i] = g.best[i].t;
+      }
     }
-  }
-
-  /// One ray from `target` on.
-  void alone(unsigned ray, bvh::NodeReference target, typename Counting::Depth depth) {
-    State& s = states_[ray];
-    Test nodes(s.box, s.first, s.nearest);
-    walk_bvh<AnyHit>(base_, target, nodes, stack_.data(), leaf_states_[ray].best.t, counting_, [&](bvh::NodeReference reference) {
-      if (!leaf(ray, base_ + bvh::offset_of(reference), bvh::block_count(reference))) return false;
-      if constexpr (!AnyHit) nodes.shorten(s.nearest);
-      return AnyHit;
-    }, depth);
   }
 
   const std::byte* const base_;
@@ -240,14 +254,14 @@ class Stream {
   const Counting counting_;
   const RayBatch rays_;
   const std::span<const std::uint32_t> order_;
-  const unsigned group_;
-  std::vector<List> lists_;
-  std::vector<StackEntry> entries_;   ///< of the lists that wait, those on top last
-  std::vector<StackEntry> children_;  ///< those of the node at hand, group_ a child
-  TraversalStack stack_;
-  Arena room_;
-  State* const states_;
-  LeafState* const leaf_states_;
+  const unsigned count_;
+  const std::size_t stack_entries_;
+  std::vector<Entry> stacks_;
+  std::vector<Group> groups_;
+  std::size_t next_ = 0;
+  std::uint32_t list_[8][kRays];
+  unsigned waiting_[8] = {};
+  BoxRays lanes_;
 };
 
 template <int N, class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
@@ -280,16 +294,11 @@ struct BvhStream {
   }
 };
 
-/// The leaves that streams have compiled in: one, since each costs a unit two seconds to compile.
-using StreamLeaves = std::conditional_t<
-    kRegisterWidth == 1, TypeList<>,
-    std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>>, TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>>>>;
-
 /// `stream` takes the rays as they come, `stream_sorted` by octant and origin.
 template <int N>
 void add_stream_rows(KernelRows& rows) {
-  add_rows<bvh::Bvh<N>, BvhStream<N>>(rows, "stream", StreamLeaves{});
-  add_rows<bvh::Bvh<N>, BvhStream<N>>(rows, kStreamSorted, StreamLeaves{});
+  add_rows<bvh::Bvh<N>, BvhStream<N>>(rows, "stream", BatchLeaves{});
+  add_rows<bvh::Bvh<N>, BvhStream<N>>(rows, kStreamSorted, BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "simd/simd.h"
+#include "simd/swizzle.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -46,6 +47,23 @@ inline void scalar_mul_sub(const Bits* a, const Bits* b, const Bits* c, Bits* ou
   }
 }
 
+/// Of the rows a, b, c, a (four lanes each) as columns that with the number c[0] mod 4; 0 in other lanes.
+template <int W>
+inline void transposed_row(const Bits* a, const Bits* b, const Bits* c, Bits* out) {
+  vf<4> row[4] = {f<4>(a), f<4>(b), f<4>(c), f<4>(a)};
+  transpose(row);
+  for (int i = 0; i < W; ++i) out[i] = 0;
+  put<4>(row[c[0] & 3u], out);
+}
+/// Of 64 bytes, the first W words of `a` again and again, those with bit c[0] mod 8: two words of bits, then 0.
+template <int W>
+inline void bytes_with_bit(const Bits* a, const Bits*, const Bits* c, Bits* out) {
+  std::uint8_t bytes[64];
+  for (int i = 0; i < 64; i += 4 * W) std::memcpy(bytes + i, a, 4 * W);
+  const std::uint64_t with = SixtyFourBytes(bytes).with_bit(int(c[0] & 7u));
+  for (int i = 0; i < W; ++i) out[i] = i < 2 ? Bits(with >> (32 * i)) : 0;
+}
+
 #define OP(name, expression)                                           \
   {                                                                    \
     name, [](const Bits* a, const Bits* b, const Bits* c, Bits* out) { \
@@ -72,6 +90,8 @@ inline constexpr simd_test::Operation kOperations[] = {
     OP("unfused_mul_sub", f<W>(a) * f<W>(b) - f<W>(c)),
     OP("unfused_mul_add", f<W>(a) * f<W>(b) + f<W>(c)),
     {"scalar_mul_sub", &scalar_mul_sub<W>},
+    {"transposed_row", &transposed_row<W>},
+    {"bytes_with_bit", &bytes_with_bit<W>},
     OP("less", f<W>(a) < f<W>(b)),
     OP("less_equal", f<W>(a) <= f<W>(b)),
     OP("greater", f<W>(a) > f<W>(b)),
