@@ -1,9 +1,15 @@
 // The kd-tree: that clipping loses no reference, that duplicates, depth and memory are bounded, that both builders make
-// the same tree for any number of threads, and that rays in planes, flat cells and star-shaped scenes get the brute force's answers.
+// the same tree for any number of threads, that rays in planes, flat cells and star-shaped scenes get the brute force's answers, and that
+// a packet's rays go where they would go alone.
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <set>
+#include <span>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "core/error.h"
@@ -225,6 +231,45 @@ std::vector<Ray> rays_for(const TriangleMesh& mesh, std::size_t count) {
   return rays;
 }
 
+/// Numbers at the ends of float's range: planes are met at distances that overflow, vanish or are no number at all.
+std::vector<Ray> extreme_rays(const TriangleMesh& mesh) {
+  constexpr float kMax = std::numeric_limits<float>::max(), kLeast = std::numeric_limits<float>::denorm_min();
+  const Vec3f at = mesh.bounds().center(), low = mesh.bounds().lower;
+  std::vector<Ray> rays;
+  for (float size : {1e-38f, kLeast, 1e-30f, 1e30f, 1e38f}) {
+    rays.push_back({at, 0, {size, size, -size}, kInfinity}), rays.push_back({low, 0, {0, size, 1}, kInfinity});
+    rays.push_back({at, 0, {1, -size, 1}, kInfinity}), rays.push_back({{size, at.y, at.z}, 0, {-1, 0, 0}, kInfinity});
+    rays.push_back({{low.x, size, -size}, 0, {size, -1, 1}, kInfinity}), rays.push_back({at, 0, {0, 0, -size}, size});
+  }
+  rays.push_back({{kMax, -kMax, kMax}, 0, {-kMax, kMax, -kMax}, kInfinity}), rays.push_back({{-kMax, 0, 0}, 0, {kLeast, 0, 0}, kInfinity});
+  rays.push_back({at, kMax, {1, 1, 1}, kInfinity}), rays.push_back({at, 0, {1, 2, 3}, 0}), rays.push_back({at, kInfinity, {1, 0, 0}, kInfinity});
+  return rays;
+}
+
+/// Rays that share a way for a while: from one point to a patch of the mesh's bounds, in one octant where `eye` is far enough.
+std::vector<Ray> fan(const TriangleMesh& mesh, Vec3f eye, float spread, unsigned side) {
+  std::vector<Ray> rays;
+  const Vec3f extent = mesh.bounds().extent(), centre = mesh.bounds().center();
+  for (unsigned i = 0; i < side * side; ++i) {
+    const Vec3f target = centre + Vec3f{(float(i % side) / float(side) - 0.5f) * extent.x, (float(i / side) / float(side) - 0.5f) * extent.y, 0.01f * extent.z} * spread;
+    rays.push_back({eye, 0, target - eye, kInfinity});
+  }
+  return rays;
+}
+
+/// The kd-tree's rows of packets and hybrids on every instruction set of this machine: both boxes, the two usual intersectors, once a kernel.
+std::vector<KernelRow> packet_rows() {
+  std::vector<KernelRow> rows;
+  std::set<std::tuple<std::string_view, std::string_view, std::string_view, Isa, ClosestHitFunction>> seen;
+  for (const KernelRow& row : kernel_table()) {
+    const bool packets = row.traversal.starts_with("packet") || row.traversal.starts_with("hybrid");
+    const bool usual = row.intersector == "moller_trumbore" || row.intersector == "watertight";
+    if (row.structure != "kdtree" || !packets || !usual || !is_available(row.isa)) continue;
+    if (seen.insert({row.intersector, row.box, row.traversal, row.isa, row.timed.closest_hit}).second) rows.push_back(row);
+  }
+  return rows;
+}
+
 }  // namespace
 
 TEST_CASE("clipping keeps what is in the box, to the last bit outward") {
@@ -403,6 +448,64 @@ TEST_CASE("a ray in a split plane sees the triangles of both sides") {
       const std::size_t k = i % 65;
       CHECK(hits[i].primitive == std::uint32_t(k == 64 ? 63 : k));
     }
+  }
+}
+
+TEST_CASE("a packet's rays visit just what they visit alone, and get the same bits, whatever their neighbours are") {
+  std::size_t compared = 0, hits = 0;
+  for (const Scene& scene : hard_scenes()) {
+    const Vec3f centre = scene.mesh.bounds().center(), extent = scene.mesh.bounds().extent();
+    std::vector<Ray> rays = fan(scene.mesh, centre + extent * 1.5f + Vec3f{1, 1, 1} * (0.1f * length(extent)), 0.7f, 12);
+    const auto append = [&](const std::vector<Ray>& more) { rays.insert(rays.end(), more.begin(), more.end()); };
+    append(rays_for(scene.mesh, 150)), append(fan(scene.mesh, centre, 1.0f, 9));
+    std::size_t place = 2;
+    for (const auto& others : {extreme_rays(scene.mesh), test::invalid_rays()})
+      for (const Ray& ray : others) rays.insert(rays.begin() + std::ptrdiff_t(place % rays.size()), ray), place += 11;
+    test::Structures structures(scene.mesh);
+    for (const KernelRow& row : packet_rows()) {
+      const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+      REQUIRE(single);
+      const Accel& accel = structures.get(row);
+      const std::size_t width = std::stoul(std::string(row.traversal.substr(6)));
+      for (std::size_t size : {std::size_t(1), width - 1, width, 2 * width + 3, rays.size()}) {
+        INFO(scene.name << ": " << name_of(row) << ", batch of " << size);
+        const std::span<const Ray> batch = std::span(rays).first(std::min(size, rays.size()));
+        Counters alone[2], together[2];
+        const std::vector<Hit> want = closest_hit(*single, accel, batch, &alone[0]), got = closest_hit(row, accel, batch);
+        REQUIRE(same_bits(got, want));
+        REQUIRE(same_bits(closest_hit(row, accel, batch, &together[0]), want));
+        const std::vector<std::uint8_t> occluded = any_hit(*single, accel, batch, &alone[1]);
+        REQUIRE(any_hit(row, accel, batch) == occluded);
+        REQUIRE(any_hit(row, accel, batch, &together[1]) == occluded);
+        for (int any : {0, 1}) {
+          REQUIRE(together[any].nodes == alone[any].nodes);
+          REQUIRE(together[any].children_hit == alone[any].children_hit);
+          REQUIRE(together[any].leaves == alone[any].leaves);
+          REQUIRE(together[any].blocks == alone[any].blocks);
+          REQUIRE(together[any].packets == (batch.size() + width - 1) / width);
+        }
+        ++compared;
+        hits += std::size_t(std::ranges::count_if(want, &Hit::is_hit));
+      }
+    }
+  }
+  CHECK(compared > 500);
+  CHECK(hits > 20 * compared);
+}
+
+TEST_CASE("packets of a fan pass most nodes together") {
+  const TriangleMesh mesh = random_triangles(20000, 0.02f, 3);
+  test::Structures structures(mesh);
+  const std::vector<Ray> rays = fan(mesh, mesh.bounds().center() + mesh.bounds().extent() * 1.5f, 0.2f, 64);
+  for (const KernelRow& row : packet_rows()) {
+    if (row.box != "padded") continue;
+    INFO(name_of(row));
+    Counters c;
+    (void)closest_hit(row, structures.get(row), rays, &c);
+    std::uint64_t visits = 0;
+    for (const Counters::Depth& d : c.depths) visits += d.visits;
+    CHECK(double(visits) < 0.6 * double(c.nodes));  // visits of packets or of rays alone, against those of rays
+    CHECK((c.switches > 0) == (row.traversal != "packet4" && row.traversal != "packet8" && row.traversal != "packet16"));
   }
 }
 

@@ -116,7 +116,7 @@ TEST_CASE("no threshold of a hybrid and no number of rays in flight changes a bi
   for (std::string_view way : {"hybrid", "queued"}) {
     for (const KernelRow& row : rows_of(way)) {
       if (way == "queued" && row.traversal != "queued") continue;
-      if (way == "hybrid" && row.structure != "bvh8" && row.structure != "bvh4_aos" && row.structure != "bvh2") continue;
+      if (way == "hybrid" && row.structure != "bvh8" && row.structure != "bvh4_aos" && row.structure != "bvh2" && row.structure != "kdtree") continue;
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
       const std::vector<Hit> alone = test::closest_hit(*single, structures.get(row), rays);

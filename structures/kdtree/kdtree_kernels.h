@@ -2,6 +2,7 @@
 #pragma once
 
 #include "traversal/usual_leaves.h"
+#include "structures/kdtree/kdtree_packet_rows.h"
 #include "structures/kdtree/kdtree_queued.h"
 #include "structures/kdtree/kdtree_single.h"
 #include "traversal/kernel_rows.h"
@@ -12,6 +13,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 inline void add_kernels(std::type_identity<kdtree::KdTree>, KernelRows& rows) {
   add_rows<kdtree::KdTree, SingleRayFunctions<KdKernel>>(rows, "single", UsualLeaves{});
   add_queued_rows<kdtree::KdTree, KdQueued, SingleRayFunctions<KdKernel>>(rows, UsualLeaves{});
+  add_kd_packet_rows(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -32,6 +32,7 @@ struct KdRay {
   float r[4], enter[4], leave[4];  ///< t of a plane at s, rounded down: s * r - enter; rounded up: s * r - leave
   std::uint32_t far[4];            ///< byte offset within a pair of the child that the ray comes to last
 
+  KdRay() = default;
   ARBORETUM_INLINE KdRay(const Ray& ray, float max_coordinate, float pad) {
     const float x = __builtin_fabsf(ray.direction.x), y = __builtin_fabsf(ray.direction.y), z = __builtin_fabsf(ray.direction.z);
     const float xy = x > y ? x : y, largest = xy > z ? xy : z;
@@ -72,6 +73,65 @@ struct KdRay {
   ARBORETUM_INLINE float leaving(float plane, unsigned axis) const { return fused(plane, r[axis], leave[axis]); }
 };
 
+/// One ray from `node` on, within [begin, end] of it; what `leaves` keep for it is `data`. Returns whether an any hit was found; a closest hit
+/// updates `best`. `depth`: of the node, where it is counted.
+template <bool AnyHit, class Leaves, class Counting>
+ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t node, float begin, float end, const KdRay& planes, KdStackEntry* const stack, const Ray& ray,
+                                    const Leaves& leaves, typename Leaves::RayData& data, NearestHit& best, const LeafForm& form, const Counting& counting,
+                                    typename Counting::Depth depth = {}) {
+  KdStackEntry* top = stack;
+  typename Counting::Depths depths(depth);
+  for (;;) {
+    for (;;) {
+      const auto link = std::uint32_t(node >> 32);
+      const unsigned axis = link & 3u;
+      if (axis == 3) break;
+      const float plane = __builtin_bit_cast(float, std::uint32_t(node));
+      const std::byte* pair = base + std::size_t(link & ~3u) * 4;
+      const std::uint32_t far_offset = planes.far[axis];
+      std::uint64_t near, far;
+      std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
+      const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
+      const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell), skip_far = (enter > end) | (far == kdtree::kEmptyCell);
+      // A plane decides about two cells; a lane each.
+      counting.node(2, 2, 2u - skip_near - skip_far);
+      counting.at_depth(depths.current(), 2, 2);
+      if constexpr (Counting::kCounting) {
+        if (!skip_near && !skip_far) depths.push(top - stack, top - stack + 1);
+      }
+      depths.descend();
+      const float far_begin = enter > begin ? enter : begin;
+      if (skip_near) {
+        if (skip_far) goto pop;
+        node = far, begin = far_begin;
+      } else {
+        top->node = far, top->begin = far_begin, top->end = end;
+        top += !skip_far;
+        node = near, end = leave < end ? leave : end;
+      }
+    }
+    if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf
+      const std::byte* const blocks = base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
+      counting.leaf(form, blocks, count);
+      if constexpr (AnyHit) {
+        if (leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar)) return true;
+      } else {
+        leaves.closest_hit(data, blocks, count, ray.tnear, best);
+      }
+    }
+  pop:
+    do {
+      if (top == stack) return false;
+      --top;
+    } while (!AnyHit && top->begin > best.t);
+    depths.pop(top - stack);
+    node = top->node, begin = top->begin;
+    end = top->end < best.t ? top->end : best.t;
+  }
+}
+
+using KdStack = BatchStack<KdStackEntry, 80>;
+
 template <class Leaves, class Counting>
 class KdSingle {
  public:
@@ -80,7 +140,10 @@ class KdSingle {
   template <bool AnyHit>
   ARBORETUM_INLINE bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
     typename Leaves::RayData data = leaves_.prepare(ray);
-    const bool hit = walk<AnyHit>(ray, data, best);
+    const KdRay planes(ray, max_coordinate_, pad_);
+    float begin = ray.tnear, end = best.t;
+    planes.clip(bounds_, begin, end);
+    const bool hit = !(begin > end) && search_kdtree<AnyHit>(base_, root_, begin, end, planes, stack_.data(), ray, leaves_, data, best, form_, counting_);
     if constexpr (!AnyHit) leaves_.finish(data, best);
     return hit;
   }
@@ -91,66 +154,6 @@ class KdSingle {
         pad_(row.box == "padded" ? KdRay::kPad : 0.0f), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting),
         stack_(tree.stack_entries()) {}
 
-  template <bool AnyHit>
-  ARBORETUM_INLINE bool walk(const Ray& ray, typename Leaves::RayData& data, NearestHit& best) {
-    const KdRay planes(ray, max_coordinate_, pad_);
-    float begin = ray.tnear, end = best.t;
-    planes.clip(bounds_, begin, end);
-    if (begin > end) return false;
-    const std::byte* const base = base_;
-    KdStackEntry* const stack = stack_.data();
-    KdStackEntry* top = stack;
-    std::uint64_t node = root_;
-    typename Counting::Depths depths{typename Counting::Depth{}};
-    for (;;) {
-      for (;;) {
-        const auto link = std::uint32_t(node >> 32);
-        const unsigned axis = link & 3u;
-        if (axis == 3) break;
-        const float plane = __builtin_bit_cast(float, std::uint32_t(node));
-        const std::byte* pair = base + std::size_t(link & ~3u) * 4;
-        const std::uint32_t far_offset = planes.far[axis];
-        std::uint64_t near, far;
-        std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
-        const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
-        const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell), skip_far = (enter > end) | (far == kdtree::kEmptyCell);
-        // A plane decides about two cells; a lane each.
-        counting_.node(2, 2, 2u - skip_near - skip_far);
-        counting_.at_depth(depths.current(), 2, 2);
-        if constexpr (Counting::kCounting) {
-          if (!skip_near && !skip_far) depths.push(top - stack, top - stack + 1);
-        }
-        depths.descend();
-        const float far_begin = enter > begin ? enter : begin;
-        if (skip_near) {
-          if (skip_far) goto pop;
-          node = far, begin = far_begin;
-        } else {
-          top->node = far, top->begin = far_begin, top->end = end;
-          top += !skip_far;
-          node = near, end = leave < end ? leave : end;
-        }
-      }
-      if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf
-        const std::byte* const blocks = base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
-        counting_.leaf(form_, blocks, count);
-        if constexpr (AnyHit) {
-          if (leaves_.any_hit(data, blocks, count, ray.tnear, ray.tfar)) return true;
-        } else {
-          leaves_.closest_hit(data, blocks, count, ray.tnear, best);
-        }
-      }
-    pop:
-      do {
-        if (top == stack) return false;
-        --top;
-      } while (!AnyHit && top->begin > best.t);
-      depths.pop(top - stack);
-      node = top->node, begin = top->begin;
-      end = top->end < best.t ? top->end : best.t;
-    }
-  }
-
   const std::byte* base_;
   std::uint64_t root_;
   Bounds3f bounds_;
@@ -158,7 +161,7 @@ class KdSingle {
   Leaves leaves_;
   const LeafForm& form_;
   Counting counting_;
-  BatchStack<KdStackEntry, 80> stack_;
+  KdStack stack_;
 };
 
 /// `fast` and `padded` are one function with other constants.

@@ -1,0 +1,308 @@
+// Packets: up to 64 rays go through a kd-tree together (Wald, Slusallek, Benthin and Wagner, "Interactive Rendering with Coherent Ray
+// Tracing", Eurographics 2001), each with an interval of t of its own in a lane and a bit in the mask of those that are in a cell.
+//
+// Rays that share an octant share near and far on every axis, and so one traversal; a packet of mixed signs is one masked traversal an octant.
+// A plane is tested in two steps, the first after Reshetov, Soupikov and Hurley ("Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005): where the interval
+// of distances at which any ray of the packet meets it lies before or behind all that is left of the rays, they all go one way, and none
+// of their intervals changes. Else each ray is tested, W at a time. A far side waits on the stack with its rays and their intervals. Where no more
+// than `threshold` rays are left they go on alone (kdtree_single.h).
+//
+// A ray's own tests are those of kdtree_single.h, operation by operation, and its cells come in the same order. So it visits just the cells that it would
+// visit alone, and its answer is the same bit for bit, with `fast` planes, too. NaN, from values beyond float's range, is a ray's own affair: it
+// visits both sides, whatever lies in other lanes.
+//
+// The packet's interval. With r and o of the rays within [r0, r1] and [o0, o1], r of one sign, a plane at s is met at (s - o) r, whose ends are
+// products of ends. What a ray computes is off by its pad, 8 u (M + |o|)|r|, and by the roundings of kdtree_single.h, 5 u (M + |o|)|r|; the interval's
+// own roundings are 4 u (M + |o|)|r|: it is widened by 2^-19 (M + |o|)|r| = 32 u (M + |o|)|r|. Where that is not far below float's range
+// (a ray that gets r = 2^60 / |d|max may have such an r) there is no interval, and all rays are tested everywhere.
+#pragma once
+
+#include "structures/kdtree/kdtree_packet_leaves.h"
+#include "structures/kdtree/kdtree_single.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// `fast` and `padded` are one class with other constants.
+template <int W, class Leaves, bool AnyHit, class Counting>
+class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
+  using Base = PacketLeaves<W, Leaves, AnyHit, Counting>;
+
+ public:
+  using Base::best;
+
+  KdPackets(const Accel& accel, const KernelRow& row, Counting counting) : KdPackets(static_cast<const kdtree::KdTree&>(accel), row, counting) {}
+
+  /// Traces `count` rays, 1 to kMost; their hits are then in best().
+  void trace(const Ray* rays, int count, int threshold) {
+    threshold_ = threshold;
+    if constexpr (Counting::kCounting) ++counting_.counters.packets, rays_of_packet_ = unsigned(count);
+    Mask octants[8];
+    prepare(Base::load(rays, count), octants);
+    for (Mask mask : octants)
+      if (mask != 0) traverse(mask);
+    Base::finish();
+  }
+
+ private:
+  using typename Base::Mask;
+  using F = vf<W>;
+  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::kMost, Base::leaves_, Base::rays_, Base::soa_, Base::t_;
+
+  /// A cell that waits, or the one at hand: its rays, where they enter and leave it, and bounds of both for all of them.
+  struct alignas(64) Cell {
+    float begin[kMost], end[kMost];
+    std::uint64_t node;
+    Mask mask;
+    float first, last;
+  };
+
+  /// Bounds of a group of rays by axis.
+  struct Interval {
+    float r0[3], r1[3], low_origin[3], high_origin[3], pad[3];
+    bool usable;
+
+    /// No ray meets the plane before `low` or behind `high`, padded or not.
+    ARBORETUM_INLINE void distances(float plane, unsigned axis, float& low, float& high) const {
+      const float a = plane - low_origin[axis], b = plane - high_origin[axis];
+      const float a0 = a * r0[axis], a1 = a * r1[axis], b0 = b * r0[axis], b1 = b * r1[axis];
+      low = (a0 < a1 ? a0 : a1) - pad[axis], high = (b0 > b1 ? b0 : b1) + pad[axis];
+    }
+  };
+
+  KdPackets(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
+      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()),
+        max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f), stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
+
+  static ARBORETUM_INLINE F fused(F s, F r, F c) { return msub(s, r, c); }
+
+  /// The constants of KdRay, W rays at a time: the same operations, so the same bits. And the rays of each octant.
+  void prepare(Mask valid, Mask (&octants)[8]) {
+    Mask negative[3] = {};
+    for (int k = 0; k < chunks_ * W; k += W) {
+      const F d[3] = {F::load(soa_.direction[0] + k), F::load(soa_.direction[1] + k), F::load(soa_.direction[2] + k)};
+      const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
+      const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest;
+      for (int a = 0; a < 3; ++a) {
+        const F o = F::load(soa_.origin[a] + k);
+        const vm<W> parallel = ~(abs(d[a]) > tiny);
+        const F r = select(parallel, xor_sign(limit, sign_bits(d[a])), F(1.0f) / d[a]);
+        const F e = select(parallel, F(KdRay::kPad), F(pad_)) * (F(max_coordinate_) + abs(o)) * abs(r) + select(parallel, F(0x1p-100f), F(pad_ * 0x1p-79f));
+        const F at = o * r;
+        r.store(r_[a] + k), (at + e).store(enter_[a] + k), (at - e).store(leave_[a] + k);
+        negative[a] |= Mask((sign_bits(r) < vi<W>(0)).bits()) << k;
+      }
+    }
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      octants[octant] = valid;
+      for (unsigned a = 0; a < 3; ++a) octants[octant] &= (octant >> a & 1u) ? negative[a] : ~negative[a];
+    }
+  }
+
+  /// Also tells the leaves what they need of the group. Rays that fill two registers or less are not worth an interval of planes.
+  Interval interval_of(Mask group) {
+    Interval v;
+    v.usable = chunks_ > 2;
+    if (!v.usable && !Leaves::kRaysInLanes) return v;
+    for (int a = 0; a < 3; ++a) {
+      float o0, o1;
+      Base::range(soa_.origin[a], group, o0, o1), Base::range(r_[a], group, v.r0[a], v.r1[a]);
+      const bool down = __builtin_signbit(v.r0[a]) != 0;
+      const float r = down ? -v.r0[a] : v.r1[a], o = -o0 > o1 ? -o0 : o1;
+      v.low_origin[a] = down ? o0 : o1, v.high_origin[a] = down ? o1 : o0;
+      v.pad[a] = 0x1p-19f * (max_coordinate_ + o) * r + 0x1p-98f;
+      v.usable &= v.pad[a] < 0x1p100f;
+      Base::set_axis(a, o0, o1, group);
+    }
+    return v;
+  }
+
+  /// The octant's rays into the root's cell, as KdRay::clip().
+  void clip(Mask group, const unsigned (&far)[3], Cell& cell) const {
+    cell.mask = 0;
+    for (int c = 0; c < chunks_; ++c) {
+      const unsigned in = Base::lanes_of(group, c);
+      if (in == 0) continue;
+      const int k = c * W;
+      F begin = F::load(soa_.tnear + k), end = F::load(t_ + k);
+      for (int a = 0; a < 3; ++a) {
+        const float low = (&bounds_.lower.x)[a], high = (&bounds_.upper.x)[a];
+        const F r = F::load(r_[a] + k);
+        begin = max_x86(fused(F(far[a] ? low : high), r, F::load(enter_[a] + k)), begin);
+        end = min_x86(fused(F(far[a] ? high : low), r, F::load(leave_[a] + k)), end);
+      }
+      begin.store(cell.begin + k), end.store(cell.end + k);
+      cell.mask |= Mask((~(begin > end)).bits() & in) << k;
+    }
+  }
+
+  /// The rays of a cell at a plane: those that are in the near side and in the far side. The cell becomes its far side, the one behind it on the
+  /// stack the near side; a side that is not asked for stays as it is, and the near side alone is the cell itself.
+  template <bool Near, bool Far>
+  ARBORETUM_INLINE void divide(Cell* cell, float plane, unsigned axis, Mask mask, Mask& near, Mask& far) const {
+    near = far = 0;
+    Cell* const near_cell = Far ? cell + 1 : cell;
+    const F s(plane);
+    for (int c = 0; c < chunks_; ++c) {
+      const unsigned in = Base::lanes_of(mask, c);
+      if (in == 0) continue;
+      const int k = c * W;
+      const F r = F::load(r_[axis] + k), begin = F::load(cell->begin + k), end = F::load(cell->end + k);
+      if constexpr (Near) {
+        const F leave = fused(s, r, F::load(leave_[axis] + k));
+        near |= Mask((~(leave < begin)).bits() & in) << k;
+        if constexpr (Far) begin.store(near_cell->begin + k);
+        min_x86(leave, end).store(near_cell->end + k);
+      }
+      if constexpr (Far) {
+        const F enter = fused(s, r, F::load(enter_[axis] + k));
+        far |= Mask((~(enter > end)).bits() & in) << k;
+        max_x86(enter, begin).store(cell->begin + k);
+      }
+    }
+  }
+
+  void traverse(Mask group) {
+    unsigned far_side[3];  // byte offset within a pair of the child that rays come to last
+    for (int a = 0; a < 3; ++a) far_side[a] = __builtin_signbit(r_[a][__builtin_ctzll(group)]) ? 0u : 8u;
+    const Interval interval = interval_of(group);
+    Cell* const stack = stack_.data();
+    Cell* top = stack;  // the cell at hand; those below wait
+    typename Counting::Depths depths{typename Counting::Depth{}};
+    clip(group, far_side, *top);
+    Mask mask = top->mask;
+    if (mask == 0) return;
+    std::uint64_t node = root_;
+    float first = -std::numeric_limits<float>::infinity(), last = -first;
+    if (interval.usable) shorten(*top, mask, first, last);
+    for (;;) {
+      for (;;) {
+        const auto link = std::uint32_t(node >> 32);
+        const unsigned axis = link & 3u;
+        if (axis == 3) break;
+        if (__builtin_popcountll(mask) <= threshold_) {
+          if constexpr (Counting::kCounting) ++counting_.counters.switches, counting_.counters.rays_alone += unsigned(__builtin_popcountll(mask));
+          for (; mask; mask &= mask - 1) alone(__builtin_ctzll(mask), node, *top, far_side, depths.current());
+          goto pop;
+        }
+        const float plane = __builtin_bit_cast(float, std::uint32_t(node));
+        const std::byte* pair = base_ + std::size_t(link & ~3u) * 4;
+        std::uint64_t near, far;
+        std::memcpy(&near, pair + (far_side[axis] ^ 8u), 8), std::memcpy(&far, pair + far_side[axis], 8);
+        const bool has_near = near != kdtree::kEmptyCell, has_far = far != kdtree::kEmptyCell;
+        float low = first, high = last;
+        if (__builtin_expect(interval.usable, 1)) {
+          interval.distances(plane, axis, low, high);
+          if (low > last || high < first) {
+            const bool has = low > last ? has_near : has_far;
+            count(mask, has ? mask : 0, 0, depths.current());
+            if (!has) goto pop;
+            depths.descend();
+            node = low > last ? near : far;
+            continue;
+          }
+        }
+        Mask in_near, in_far;
+        if (has_near & has_far) {
+          divide<true, true>(top, plane, axis, mask, in_near, in_far);
+        } else if (has_near) {
+          divide<true, false>(top, plane, axis, mask, in_near, in_far);
+        } else {
+          divide<false, true>(top, plane, axis, mask, in_near, in_far);
+        }
+        count(mask, in_near, in_far, depths.current());
+        const float far_first = low > first ? low : first;
+        if (in_near == 0) {
+          if (in_far == 0) goto pop;
+          depths.descend();
+          node = far, mask = in_far, first = far_first;
+        } else {
+          if (has_far) {  // waits, though it be without rays
+            prefetch(far);
+            depths.push(top - stack, top - stack + 1);
+            top->node = far, top->mask = in_far, top->first = far_first, top->last = last;
+            ++top;
+          }
+          depths.descend();
+          node = near, mask = in_near, last = high < last ? high : last;
+        }
+      }
+      if (const auto blocks = std::uint32_t(node); blocks != 0) Base::leaf(place_of(node), blocks, mask);
+    pop:
+      do {
+        if (top == stack) return;
+        --top;
+        mask = top->mask;
+        if constexpr (AnyHit) {
+          mask &= active_, first = top->first, last = top->last;
+        } else if (mask != 0) {
+          mask = shorten(*top, mask, first, last);
+        }
+      } while (mask == 0);
+      depths.pop(top - stack);
+      node = top->node;
+    }
+  }
+
+  /// Ends the rays of a cell at what they have met. Returns those that enter it before, and bounds of where they enter and leave.
+  ARBORETUM_INLINE Mask shorten(Cell& cell, Mask mask, float& first, float& last) const {
+    const F infinity(std::numeric_limits<float>::infinity());
+    F least = infinity, most = -infinity;
+    Mask left = 0;
+    for (int c = 0; c < chunks_; ++c) {
+      const unsigned in = Base::lanes_of(mask, c);
+      if (in == 0) continue;
+      const int k = c * W;
+      const F begin = F::load(cell.begin + k), t = F::load(t_ + k), end = min_x86(F::load(cell.end + k), t);
+      end.store(cell.end + k);
+      const vm<W> here = ~(begin > t) & vm<W>::from_bits(in);
+      left |= Mask(here.bits()) << k;
+      least = min_x86(least, select(here, begin, infinity)), most = max_x86(most, select(here, end, -infinity));
+    }
+    first = reduce_min(least), last = -reduce_min(-most);
+    return left;
+  }
+
+  void alone(int i, std::uint64_t node, const Cell& cell, const unsigned (&far_side)[3], typename Counting::Depth depth) {
+    KdRay planes;
+    for (int a = 0; a < 3; ++a) planes.r[a] = r_[a][i], planes.enter[a] = enter_[a][i], planes.leave[a] = leave_[a][i], planes.far[a] = far_side[a];
+    auto&& ray = Base::data(i);
+    if (search(node, cell.begin[i], cell.end[i], planes, rays_[i], ray, best_[i], depth)) Base::occluded(i);
+    t_[i] = best_[i].t;
+  }
+  __attribute__((noinline)) bool search(std::uint64_t node, float begin, float end, const KdRay& planes, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
+                                        typename Counting::Depth depth) {
+    return search_kdtree<AnyHit>(base_, node, begin, end, planes, single_stack_.data(), ray, leaves_, data, best, form_, counting_, depth);
+  }
+
+  /// A node visit of a packet counts as one of each of its rays.
+  void count([[maybe_unused]] Mask mask, [[maybe_unused]] Mask near, [[maybe_unused]] Mask far, [[maybe_unused]] typename Counting::Depth depth) const {
+    if constexpr (Counting::kCounting) {
+      counting_.at_depth(depth, rays_of_packet_, unsigned(__builtin_popcountll(mask)));
+      for (; mask; mask &= mask - 1) {
+        const int i = __builtin_ctzll(mask);
+        counting_.node(2, 2, unsigned(near >> i & 1u) + unsigned(far >> i & 1u));
+      }
+    }
+  }
+
+  /// A node's pair of children, or a leaf's blocks.
+  ARBORETUM_INLINE const std::byte* place_of(std::uint64_t node) const { return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4; }
+  ARBORETUM_INLINE void prefetch(std::uint64_t node) const {
+    const auto* at = reinterpret_cast<const char*>(place_of(node));
+    for (int line = 0; line < 4; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+  }
+
+  const std::byte* base_;
+  const std::uint64_t root_;
+  const Bounds3f bounds_;
+  const float max_coordinate_, pad_;
+  int threshold_ = 0;
+  unsigned rays_of_packet_ = 0;
+  alignas(64) float r_[3][kMost], enter_[3][kMost], leave_[3][kMost];
+  BatchStack<Cell, 64> stack_;
+  KdStack single_stack_;
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

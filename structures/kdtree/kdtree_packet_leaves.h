@@ -1,0 +1,211 @@
+// Up to 64 rays as structures of arrays with what they have met, and how those of a mask meet a leaf: one ray after the other, or, where the
+// intersector can, the leaf's triangles against many rays in lanes, those first left out that no ray of the packet can hit
+// (traversal/packet_interval.h). Each ray gets the bits that it would get alone.
+#pragma once
+
+#include "traversal/leaves.h"
+#include "traversal/packet_interval.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// W rays a register.
+template <int W, class Leaves, bool AnyHit, class Counting>
+class PacketLeaves {
+ public:
+  static constexpr int kMost = PacketRays::kMost;
+  using Mask = std::uint64_t;
+
+  PacketLeaves(const KernelRow& row, const Vec3f* vertices, Counting counting) : leaves_(row, vertices), form_(*row.tests->form), counting_(counting) {}
+
+  [[nodiscard]] const NearestHit& best(int i) const { return best_[i]; }
+
+ protected:
+  using F = vf<W>;
+  static constexpr unsigned kAll = (1u << W) - 1u;
+
+  /// Takes `count` rays, 1 to kMost, none of which has met anything. Returns those that are valid (core/ray.h).
+  Mask load(const Ray* rays, int count) {
+    rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0};
+    for (int i = 0; i < count; ++i) {
+      const Ray& ray = rays[i];
+      soa_.origin[0][i] = ray.origin.x, soa_.origin[1][i] = ray.origin.y, soa_.origin[2][i] = ray.origin.z;
+      soa_.direction[0][i] = ray.direction.x, soa_.direction[1][i] = ray.direction.y, soa_.direction[2][i] = ray.direction.z;
+      soa_.tnear[i] = ray.tnear, t_[i] = ray.tfar;
+      best_[i] = NearestHit{ray.tfar};
+    }
+    for (int i = count; i < chunks_ * W; ++i) {  // not valid: no direction
+      for (int a = 0; a < 3; ++a) soa_.origin[a][i] = soa_.direction[a][i] = 0.0f;
+      soa_.tnear[i] = t_[i] = 0.0f;
+    }
+    valid_ = 0;
+    if constexpr (Leaves::kRaysInLanes) packet_.clear();
+    const F infinity(std::numeric_limits<float>::infinity());
+    for (int c = 0; c < chunks_; ++c) {
+      const int k = c * W;
+      vm<W> valid = F::load(soa_.tnear + k) <= F::load(t_ + k), moves(false);
+      for (int a = 0; a < 3; ++a) {
+        const F d = F::load(soa_.direction[a] + k);
+        valid = valid & (abs(F::load(soa_.origin[a] + k)) < infinity) & (abs(d) < infinity), moves = moves | (d != F(0.0f));
+      }
+      valid_ |= Mask((valid & moves).bits()) << k;
+      if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(soa_, k);
+    }
+    if constexpr (!Leaves::kRaysInLanes) {
+      for (Mask rest = valid_; rest; rest &= rest - 1) {
+        const int i = __builtin_ctzll(rest);
+        new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(rays_[i]));
+      }
+    }
+    return valid_;
+  }
+
+  void finish() {
+    if constexpr (!AnyHit) {
+      for (Mask rest = valid_; rest; rest &= rest - 1) {
+        const int i = __builtin_ctzll(rest);
+        auto&& ray = data(i);
+        leaves_.finish(ray, best_[i]);
+      }
+    }
+  }
+
+  /// The smallest and the largest value of the lanes of `mask`.
+  void range(const float* values, Mask mask, float& low, float& high) const {
+    const F infinity(std::numeric_limits<float>::infinity());
+    F least = infinity, most = -infinity;
+    for (int c = 0; c < chunks_; ++c) {
+      const vm<W> in = vm<W>::from_bits(lanes_of(mask, c));
+      const F v = F::load(values + c * W);
+      least = min_x86(least, select(in, v, infinity)), most = max_x86(most, select(in, v, -infinity));
+    }
+    low = reduce_min(least), high = -reduce_min(-most);
+  }
+
+  /// Before leaves are met by rays of `group`, whose origins and directions lie in these intervals.
+  void set_axis([[maybe_unused]] int axis, [[maybe_unused]] float o_low, [[maybe_unused]] float o_high, [[maybe_unused]] Mask group) {
+    if constexpr (Leaves::kRaysInLanes) {
+      float d_low, d_high;
+      range(soa_.direction[axis], group, d_low, d_high);
+      spread_.set_axis(axis, o_low, o_high, d_low, d_high);
+    }
+  }
+
+  static ARBORETUM_INLINE unsigned lanes_of(Mask mask, int chunk) { return unsigned(mask >> (chunk * W)) & kAll; }
+
+  /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever it is asked for.
+  ARBORETUM_INLINE decltype(auto) data(int i) {
+    if constexpr (Leaves::kRaysInLanes) {
+      return packet_.alone(rays_[i], i);
+    } else {
+      return (*reinterpret_cast<RayData*>(data_ + std::size_t(i) * sizeof(RayData)));
+    }
+  }
+
+  void occluded(int i) { best_[i].primitive = 0, active_ &= ~(Mask{1} << i); }
+
+  void leaf(const std::byte* blocks, unsigned count, Mask mask) {
+    if constexpr (Leaves::kRaysInLanes) {
+      if (__builtin_popcountll(mask) >= kWorthLanes) {
+        const auto* block = reinterpret_cast<const typename Leaves::Block*>(blocks);
+        for (const auto* const end = block + count; block != end; ++block) test_block(*block, mask);
+        return;
+      }
+    }
+    one_by_one(blocks, count, mask);
+  }
+
+ private:
+  using RayData = typename Leaves::RayData;
+  /// From so many rays on the triangles of a leaf are looked at together.
+  static constexpr int kWorthLanes = 16;
+
+  void one_by_one(const std::byte* blocks, unsigned count, Mask mask) {
+    for (; mask; mask &= mask - 1) {
+      const int i = __builtin_ctzll(mask);
+      if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
+      auto&& ray = data(i);
+      if constexpr (AnyHit) {
+        if (leaves_.any_hit(ray, blocks, count, rays_[i].tnear, rays_[i].tfar)) occluded(i);
+      } else {
+        if (leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) t_[i] = best_[i].t;
+      }
+    }
+  }
+
+  /// One block against the rays of `mask`: its triangles in lanes for each ray, or rays in lanes for each triangle that is left, whichever is less work.
+  template <class Block>
+  void test_block(const Block& block, Mask mask) {
+    const auto* const bytes = reinterpret_cast<const std::byte*>(&block);
+    if constexpr (AnyHit) mask &= active_;
+    unsigned triangles = interval_triangles(spread_, block);
+    if (triangles == 0) return;
+    int chunks = 0;
+    for (int c = 0; c < chunks_; ++c) chunks += lanes_of(mask, c) != 0;
+    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth)) return one_by_one(bytes, 1, mask);
+    Mask again = 0;
+    for (; triangles; triangles &= triangles - 1) {
+      const int i = __builtin_ctz(triangles);
+      for (int g = 0; g < Packet::kGroups; ++g) {
+        const Mask group = mask & packet_.group(g);
+        if (group != 0) test_triangle(block, i, g, group, again);
+      }
+      if constexpr (AnyHit) mask &= active_;
+    }
+    if (__builtin_expect(again != 0, 0)) one_by_one(bytes, 1, again);
+  }
+
+  template <class Block>
+  ARBORETUM_INLINE void test_triangle(const Block& block, int triangle, int group, Mask mask, Mask& again) {
+    const auto id = std::int32_t(block.id[triangle]);
+    for (int c = 0; c < chunks_; ++c) {
+      const int k = c * W;
+      const unsigned in = lanes_of(mask, c);
+      if (in == 0) continue;
+      TriangleHits<W> hits;
+      vm<W> redo;
+      const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(soa_, packet_, group, k, block, triangle, hits, redo);
+      again |= Mask(redo.bits() & in) << k;
+      if ((inside.bits() & in) == 0) continue;
+      unsigned hit = in & (inside & (hits.t <= F::load(t_ + k)) & (hits.t >= F::load(soa_.tnear + k))).bits();
+      if (hit == 0) continue;
+      alignas(64) float t[W], u[W], v[W], denominator[W];
+      hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
+      for (; hit; hit &= hit - 1) {
+        const int lane = __builtin_ctz(hit), i = k + lane;
+        if constexpr (AnyHit) {
+          occluded(i);
+        } else {
+          NearestHit& best = best_[i];
+          if (t[lane] < best.t || id < best.primitive) best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, t_[i] = t[lane];
+        }
+      }
+    }
+  }
+
+ protected:
+  Leaves leaves_;
+  const LeafForm& form_;
+  Counting counting_;
+  const Ray* rays_ = nullptr;
+  int chunks_ = 0;       ///< registers that the rays take
+  Mask active_ = 0;      ///< rays whose search is not over (any hit)
+  Mask valid_ = 0;
+  PacketRays soa_;
+  alignas(64) float t_[kMost];  ///< beyond which nothing counts
+  NearestHit best_[kMost];
+
+ private:
+  struct NoPacket {};
+  template <class L>
+  struct PacketOf {
+    using type = typename L::Intersector::PacketData;
+  };
+  using Packet = typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
+  alignas(64) std::byte data_[Leaves::kRaysInLanes ? 1 : kMost * sizeof(RayData)];
+  Packet packet_;
+  PacketInterval spread_;
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
