@@ -10,7 +10,8 @@
 namespace arboretum::bvh_quantised {
 namespace {
 
-constexpr int kBias = 127, kLeast = 1, kMost = 254;
+constexpr int kBias = 127, kLeast = 1 + int(plane_shift(2)), kMost = 254;
+constexpr double kMostSteps = kMostPlane;
 
 /// x - origin as an unevaluated sum: `high` rounded, `low` what rounding took (Knuth 1969), 0 for most floats.
 struct Distance {
@@ -30,38 +31,57 @@ struct Distance {
 Grid grid_over(float lower, float upper) noexcept {
   const Distance d(upper, lower);
   if (d.high == 0.0) return {lower, kBias};  // flat: every q is 0, and a step of 1 makes no subnormal numbers on the way
-  int exponent = std::clamp(std::ilogb(d.high) - 7 + kBias, kLeast, kMost);  // d.high is at least 2^7 steps, or the step is the least
-  while (steps(d, exponent) > 255.0 || (steps(d, exponent) == 255.0 && d.low > 0.0)) ++exponent;
+  int exponent = std::clamp(std::ilogb(d.high) - int(kPlaneBits - 1) + kBias, kLeast, kMost);  // d.high is at least 2^9 steps, or the step is the least
+  while (steps(d, exponent) > kMostSteps || (steps(d, exponent) == kMostSteps && d.low > 0.0)) ++exponent;
   return {lower, std::uint8_t(exponent)};
 }
 
-std::uint8_t plane_below(const Grid& grid, float x) noexcept {
+unsigned plane_below(const Grid& grid, float x) noexcept {
   const Distance d(x, grid.origin);
   const double exact = steps(d, grid.exponent), whole = std::floor(exact);
   const double finite = std::floor(std::ldexp(double(std::numeric_limits<float>::max()), kBias - grid.exponent));
-  return std::uint8_t(std::min(finite, whole == exact && d.low < 0.0 ? whole - 1.0 : whole));
+  return unsigned(std::min(finite, whole == exact && d.low < 0.0 ? whole - 1.0 : whole));
 }
 
-std::uint8_t plane_above(const Grid& grid, float x) noexcept {
+unsigned plane_above(const Grid& grid, float x) noexcept {
   const Distance d(x, grid.origin);
   const double exact = steps(d, grid.exponent), whole = std::ceil(exact);
-  return std::uint8_t(whole == exact && d.low > 0.0 ? whole + 1.0 : whole);
+  return unsigned(whole == exact && d.low > 0.0 ? whole + 1.0 : whole);
 }
 
-float plane_of(const Grid& grid, std::uint8_t q) noexcept { return float(q) * std::ldexp(1.0f, grid.exponent - kBias) + grid.origin; }
+float plane_of(const Grid& grid, unsigned q) noexcept { return float(q) * std::ldexp(1.0f, grid.exponent - kBias) + grid.origin; }
+
+template <int N>
+Grid grid_of(const Node<N>& node, int axis) noexcept {
+  const int shift = int(plane_shift(unsigned(axis)));
+  if constexpr (requires { node.step; }) {
+    return {node.origin[axis], std::uint8_t(std::ilogb(node.step[axis]) + kBias + shift)};
+  } else {
+    return {node.origin[axis], std::uint8_t(node.exponent[axis] + shift)};
+  }
+}
+template Grid grid_of(const Node<4>&, int) noexcept;
+template Grid grid_of(const Node<8>&, int) noexcept;
 
 template <int N>
 void QuantisedNodes<N>::write(Node& node, const Bounds3f* boxes, const bvh::NodeReference* references, unsigned count) noexcept {
-  std::memset(&node, 0, sizeof node);
+  std::memset(static_cast<void*>(&node), 0, sizeof node);
   Bounds3f all;
   for (unsigned i = 0; i < count; ++i) all.extend(boxes[i]), node.child[i] = references[i];
   node.children = std::uint8_t((1u << count) - 1u);
+  if constexpr (requires { node.filler; }) std::memcpy(node.filler, node.kFiller, sizeof node.filler);
   for (int axis = 0; axis < 3; ++axis) {
+    const unsigned shift = plane_shift(unsigned(axis));
     const Grid grid = count == 0 ? Grid{0.0f, kBias} : grid_over(all.lower[axis], all.upper[axis]);
-    node.origin[axis] = grid.origin, node.exponent[axis] = grid.exponent;
+    node.origin[axis] = grid.origin;
+    if constexpr (requires { node.step; }) {
+      node.step[axis] = std::ldexp(1.0f, grid.exponent - kBias - int(shift));
+    } else {
+      node.exponent[axis] = std::uint8_t(grid.exponent - shift);
+    }
     for (unsigned i = 0; i < count; ++i) {
-      node.planes[2 * axis][i] = plane_below(grid, boxes[i].lower[axis]);
-      node.planes[2 * axis + 1][i] = plane_above(grid, boxes[i].upper[axis]);
+      node.planes[0][i] |= plane_below(grid, boxes[i].lower[axis]) << shift;
+      node.planes[1][i] |= plane_above(grid, boxes[i].upper[axis]) << shift;
     }
   }
 }
@@ -71,9 +91,9 @@ unsigned QuantisedNodes<N>::read(const Node& node, Bounds3f* boxes, bvh::NodeRef
   unsigned i = 0;
   for (; i < unsigned(N) && (node.children >> i & 1u); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
-      const Grid grid{node.origin[axis], node.exponent[axis]};
-      boxes[i].lower[axis] = plane_of(grid, node.planes[2 * axis][i]);
-      boxes[i].upper[axis] = plane_of(grid, node.planes[2 * axis + 1][i]);
+      const Grid grid = grid_of(node, axis);
+      boxes[i].lower[axis] = plane_of(grid, node.plane(unsigned(axis), 0, i));
+      boxes[i].upper[axis] = plane_of(grid, node.plane(unsigned(axis), 1, i));
     }
     references[i] = node.child[i];
   }
