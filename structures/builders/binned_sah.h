@@ -54,20 +54,15 @@ class BinnedSah {
     }
   }
 
-  void split(const Range& range, Range& left, Range& right) {
-    sah::Bins bins;
-    MeteredVector<sah::Bins> chunks;
-    const sah::BinMap map(range.bounds.centroids, range.size(), max_bins_);
+  /// Not inlined: recurse() has to do without room for bins in its frame.
+  __attribute__((noinline)) void split(const Range& range, Range& left, Range& right) {
     const sah::Reference* r = references_[range.side].data();
-    sah::bin_range(r + range.begin, r + range.end, map, bins, chunks);
-    const sah::Split split = sah::best_split(bins, map.bins, range.size(), leaf_width_);
-    if (split.axis < 0) return split_in_the_middle(range, left, right);
-    const std::size_t middle = range.begin + split.left_count;
-    left = {range.begin, middle, 1 - range.side, {}}, right = {middle, range.end, 1 - range.side, {}};
-    sah::child_bounds(bins, map.bins, split, left.bounds.boxes, right.bounds.boxes);
+    const sah::ObjectSplit object(r + range.begin, r + range.end, range.bounds.centroids, max_bins_, leaf_width_);
+    if (!object.exists()) return split_in_the_middle(range, left, right);
+    const std::size_t middle = range.begin + object.left_count();
+    left = {range.begin, middle, 1 - range.side, {object.left(), {}}}, right = {middle, range.end, 1 - range.side, {object.right(), {}}};
     sah::Reference* out = references_[1 - range.side].data();
-    sah::partition_range(r + range.begin, r + range.end, map, split, chunks, out + left.begin, out + right.begin, left.bounds.centroids,
-                         right.bounds.centroids);
+    object.partition_to(out + left.begin, out + right.begin, left.bounds.centroids, right.bounds.centroids);
   }
 
   void recurse(const Range& range, std::uint32_t index, sah::TreeWriter::Pool& pool) {

@@ -22,17 +22,24 @@ struct alignas(32) Reference {
 static_assert(sizeof(Reference) == 32);
 
 inline constexpr unsigned kMaxBins = 64;
-inline constexpr float kFlat = 1e-36f;              ///< no splits across less: kMaxBins / kFlat is finite
+inline constexpr unsigned kManyBins = 256;          ///< 8 times as many bins, at most these, above kLarge references
+inline constexpr float kFlat = 1e-36f;              ///< no splits across less: kManyBins / kFlat is finite
 inline constexpr std::size_t kChunk = 1u << 14;     ///< references a task takes at a time
 inline constexpr std::size_t kLarge = 4 * kChunk;   ///< more references than this are split by several tasks
 inline constexpr std::size_t kParallel = 1u << 12;  ///< smaller subtrees are built by one task
 
-/// Bins of the three axes, twice over: consecutive references go to different sets, so that a read after a write to the
-/// same bin does not wait.
-struct Bins {
-  Box box[2][3][kMaxBins];
-  std::int32_t count4[kMaxBins][4];  ///< references by bin, then axis; exact as float below 2^24, good enough above
+/// Bins of the three axes, Sets times over.
+template <unsigned N, int Sets>
+struct BinSets {
+  static constexpr unsigned kMost = N;
+  static constexpr int kSets = Sets;
+  Box box[Sets][3][N];
+  std::int32_t count4[N][4];  ///< references by bin, then axis; exact as float below 2^24, good enough above
 };
+/// Consecutive references go to different sets, so that a read after a write to the same bin does not wait.
+using Bins = BinSets<kMaxBins, 2>;
+/// For more than kLarge references. A few planes decide there what all levels below have to do with, and a sweep costs little beside the binning.
+using ManyBins = BinSets<kManyBins, 1>;
 
 struct Split {
   float cost = std::numeric_limits<float>::infinity();
@@ -83,7 +90,8 @@ struct BinMap {
   vf<4> lower, scale;
   unsigned bins;
   BinMap(Box centroids, std::size_t n, unsigned max_bins) {
-    bins = std::min(max_bins, n < 48 ? 8u : n < 1024 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
+    bins = std::min(max_bins, n < 24 ? 8u : n < 256 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
+    if (n > kLarge) bins = std::min(8 * bins, kManyBins);
     const vf<4> low = -low_half(centroids), extent = high_half(centroids) - low;
     lower = low;
     // A flat axis, or one whose scale would overflow, gets scale 0: all in bin 0, and no split there.
@@ -94,7 +102,8 @@ struct BinMap {
   }
 };
 
-inline void clear(Bins& bins, unsigned n, int sets) {
+template <class B>
+void clear(B& bins, unsigned n, int sets) {
   for (int axis = 0; axis < 3; ++axis) {
     for (int set = 0; set < sets; ++set) {
       for (unsigned b = 0; b < n; ++b) bins.box[set][axis][b] = empty_box();
@@ -103,8 +112,9 @@ inline void clear(Bins& bins, unsigned n, int sets) {
   std::memset(bins.count4, 0, n * sizeof bins.count4[0]);
 }
 
-inline void bin(const Reference* r, const Reference* end, const BinMap& map, Bins& bins) {
-  const int sets = end - r < 64 ? 1 : 2;
+template <class B>
+void bin(const Reference* r, const Reference* end, const BinMap& map, B& bins) {
+  const int sets = end - r < 64 ? 1 : B::kSets;
   clear(bins, map.bins, sets);
   const auto put = [&](const Reference& ref, int set) {
     alignas(16) std::int32_t b[4];
@@ -119,14 +129,17 @@ inline void bin(const Reference* r, const Reference* end, const BinMap& map, Bin
     for (; r < end; ++r) put(*r, 0);
     return;
   }
-  for (; r + 1 < end; r += 2) put(r[0], 0), put(r[1], 1);
-  if (r < end) put(*r, 0);
-  for (int axis = 0; axis < 3; ++axis) {
-    for (unsigned b = 0; b < map.bins; ++b) bins.box[0][axis][b] = max_x86(bins.box[0][axis][b], bins.box[1][axis][b]);
+  if constexpr (B::kSets == 2) {
+    for (; r + 1 < end; r += 2) put(r[0], 0), put(r[1], 1);
+    if (r < end) put(*r, 0);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (unsigned b = 0; b < map.bins; ++b) bins.box[0][axis][b] = max_x86(bins.box[0][axis][b], bins.box[1][axis][b]);
+    }
   }
 }
 
-inline void merge(Bins& into, const Bins& from, unsigned n) {
+template <class B>
+void merge(B& into, const B& from, unsigned n) {
   for (int axis = 0; axis < 3; ++axis) {
     for (unsigned b = 0; b < n; ++b) {
       into.box[0][axis][b] = max_x86(into.box[0][axis][b], from.box[0][axis][b]);
@@ -159,20 +172,31 @@ ARBORETUM_INLINE vf<4> half_areas(const Box (&box)[3]) {
   return x * (y + z) + y * z;
 }
 
-ARBORETUM_INLINE vf<4> counts_of(const Bins& bins, unsigned b) {
+template <class B>
+ARBORETUM_INLINE vf<4> counts_of(const B& bins, unsigned b) {
   return to_float(vi<4>::load(bins.count4[b]));
 }
 
-/// The cheapest plane: area times blocks on both sides, a block holding leaf_width references; the three axes in lanes.
-inline Split best_split(const Bins& bins, unsigned n, std::size_t total, unsigned leaf_width) {
-  const vf<4> per_block(1.0f / float(leaf_width)), one(1.0f), zero(0.0f), none(std::numeric_limits<float>::infinity());
-  vf<4> right_cost[kMaxBins];
+/// Leaf blocks that `count` references fill, the last one perhaps in part.
+struct BlocksFor {
+  vf<4> one_less, per_block;
+  explicit BlocksFor(unsigned leaf_width) : one_less(float(leaf_width - 1)), per_block(1.0f / float(leaf_width)) {}
+  ARBORETUM_INLINE vf<4> operator()(vf<4> count) const { return to_float(truncate_to_int((count + one_less) * per_block)); }
+};
+
+/// The cheapest plane: area times blocks on both sides, a block holding leaf_width references; the three axes in lanes. Whole blocks:
+/// what a block's last lanes could hold costs the same, and splits that fill blocks save nodes and bytes.
+template <class B>
+Split best_split(const B& bins, unsigned n, std::size_t total, unsigned leaf_width) {
+  const BlocksFor blocks(leaf_width);
+  const vf<4> zero(0.0f), none(std::numeric_limits<float>::infinity());
+  vf<4> right_cost[B::kMost];
   Box box[3] = {empty_box(), empty_box(), empty_box()};
   vf<4> count(0.0f);
   for (unsigned b = n; --b > 0;) {
     for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b], box[axis]);
     count = count + counts_of(bins, b);
-    right_cost[b] = select(count > zero, half_areas(box) * max_x86(count * per_block, one), none);
+    right_cost[b] = select(count > zero, half_areas(box) * blocks(count), none);
   }
   for (Box& side : box) side = empty_box();
   count = vf<4>(0.0f);
@@ -181,7 +205,7 @@ inline Split best_split(const Bins& bins, unsigned n, std::size_t total, unsigne
   for (unsigned b = 1; b < n; ++b) {
     for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b - 1], box[axis]);
     count = count + counts_of(bins, b - 1);
-    const vf<4> cost = select(count > zero, half_areas(box) * max_x86(count * per_block, one) + right_cost[b], none);
+    const vf<4> cost = select(count > zero, half_areas(box) * blocks(count) + right_cost[b], none);
     const vm<4> better = cost < best_cost;
     best_cost = select(better, cost, best_cost);
     best_bin = select(better, vi<4>(std::int32_t(b)), best_bin);
@@ -200,7 +224,8 @@ inline Split best_split(const Bins& bins, unsigned n, std::size_t total, unsigne
 }
 
 /// Box of the bins on each side of a split.
-inline void child_bounds(const Bins& bins, unsigned n, const Split& split, Box& left, Box& right) {
+template <class B>
+void child_bounds(const B& bins, unsigned n, const Split& split, Box& left, Box& right) {
   left = right = empty_box();
   for (unsigned b = 0; b < split.bin; ++b) left = max_x86(bins.box[0][split.axis][b], left);
   for (unsigned b = split.bin; b < n; ++b) right = max_x86(bins.box[0][split.axis][b], right);
@@ -230,20 +255,17 @@ inline void partition(const Reference* r, const Reference* end, const BinMap& ma
   right_centroids = both_halves(bounds[2], bounds[3]);
 }
 
-/// Bins of references [r, end) in `total`; many are binned in parallel, and `chunks` keeps the bins of each kChunk of them.
-inline void bin_range(const Reference* r, const Reference* end, const BinMap& map, Bins& total, MeteredVector<Bins>& chunks) {
-  const std::size_t n = std::size_t(end - r);
-  if (n <= kLarge) return bin(r, end, map, total);
-  chunks.resize((n + kChunk - 1) / kChunk);
+/// Bins of references [r, end), more than kLarge, in `total`, binned in parallel; `chunks` keeps the bins of each kChunk of them.
+inline void bin_range(const Reference* r, const Reference* end, const BinMap& map, ManyBins& total, MeteredVector<ManyBins>& chunks) {
+  chunks.resize((std::size_t(end - r) + kChunk - 1) / kChunk);
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) { bin(r + c * kChunk, std::min(end, r + (c + 1) * kChunk), map, chunks[c]); });
   clear(total, map.bins, 1);
-  for (const Bins& b : chunks) merge(total, b, map.bins);
+  for (const ManyBins& b : chunks) merge(total, b, map.bins);
 }
 
-/// partition(), in parallel where bin_range() left chunks: a chunk's bins say where its two sides go.
-inline void partition_range(const Reference* r, const Reference* end, const BinMap& map, const Split& split, const MeteredVector<Bins>& chunks,
+/// partition() in parallel: a chunk's bins say where its two sides go.
+inline void partition_range(const Reference* r, const Reference* end, const BinMap& map, const Split& split, const MeteredVector<ManyBins>& chunks,
                             Reference* left_out, Reference* right_out, Box& left_centroids, Box& right_centroids) {
-  if (chunks.empty()) return partition(r, end, map, split, left_out, right_out, left_centroids, right_centroids);
   struct Target {
     Reference *left, *right;
     Box left_centroids, right_centroids;
@@ -264,6 +286,47 @@ inline void partition_range(const Reference* r, const Reference* end, const BinM
     left_centroids = max_x86(t.left_centroids, left_centroids), right_centroids = max_x86(t.right_centroids, right_centroids);
   }
 }
+
+/// The best object split of a range, and all that its partition needs: small ranges on the stack, large ones in chunks for several tasks.
+class ObjectSplit {
+ public:
+  ObjectSplit(const Reference* r, const Reference* end, const Box& centroids, unsigned max_bins, unsigned leaf_width)
+      : r_(r), end_(end), map_(centroids, std::size_t(end - r), max_bins) {
+    const std::size_t n = std::size_t(end - r);
+    if (n <= kLarge) {
+      Bins bins;
+      bin(r, end, map_, bins);
+      choose(bins, leaf_width);
+    } else {
+      MeteredVector<ManyBins> total(1);
+      bin_range(r, end, map_, total[0], chunks_);
+      choose(total[0], leaf_width);
+    }
+  }
+  /// False where all centroids fall into one bin.
+  [[nodiscard]] bool exists() const { return split_.axis >= 0; }
+  [[nodiscard]] float cost() const { return split_.cost; }
+  [[nodiscard]] std::size_t left_count() const { return split_.left_count; }
+  [[nodiscard]] const Box& left() const { return left_; }
+  [[nodiscard]] const Box& right() const { return right_; }
+  /// Moves the references to the two sides, in order; returns the sides' centroid bounds.
+  void partition_to(Reference* left_out, Reference* right_out, Box& left_centroids, Box& right_centroids) const {
+    if (chunks_.empty()) return partition(r_, end_, map_, split_, left_out, right_out, left_centroids, right_centroids);
+    partition_range(r_, end_, map_, split_, chunks_, left_out, right_out, left_centroids, right_centroids);
+  }
+
+ private:
+  template <class B>
+  void choose(const B& bins, unsigned leaf_width) {
+    split_ = best_split(bins, map_.bins, std::size_t(end_ - r_), leaf_width);
+    if (split_.axis >= 0) child_bounds(bins, map_.bins, split_, left_, right_);
+  }
+  const Reference *r_, *end_;
+  const BinMap map_;
+  Split split_;
+  Box left_, right_;
+  MeteredVector<ManyBins> chunks_;
+};
 
 }  // namespace sah
 }  // namespace ARBORETUM_ISA_NAMESPACE

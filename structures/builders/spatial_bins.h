@@ -168,7 +168,8 @@ struct SpatialSplit {
 
 /// The cheapest plane among those that leave fewer than `total` references on either side and at most `room` on both.
 inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t total, std::size_t room, unsigned leaf_width) {
-  const vf<4> per_block(1.0f / float(leaf_width)), one(1.0f), zero(0.0f), none(std::numeric_limits<float>::infinity());
+  const BlocksFor blocks(leaf_width);
+  const vf<4> zero(0.0f), none(std::numeric_limits<float>::infinity());
   vf<4> right_cost[kMaxSpatialBins], right_count[kMaxSpatialBins];
   const vf<4> whole = to_float(vi<4>(std::int32_t(total))), most = to_float(vi<4>(std::int32_t(room)));
   const auto fits = [&](vf<4> count) { return (count > zero) & (count < whole); };
@@ -178,7 +179,7 @@ inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t 
     for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[axis][b], box[axis]);
     count = count + to_float(vi<4>::load(bins.leave4[b]));
     right_count[b] = count;
-    right_cost[b] = select(fits(count), half_areas(box) * max_x86(count * per_block, one), none);
+    right_cost[b] = select(fits(count), half_areas(box) * blocks(count), none);
   }
   for (Box& side : box) side = empty_box();
   count = vf<4>(0.0f);
@@ -187,7 +188,7 @@ inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t 
   for (unsigned b = 1; b < n; ++b) {
     for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[axis][b - 1], box[axis]);
     count = count + to_float(vi<4>::load(bins.enter4[b - 1]));
-    const vf<4> cost = select(fits(count) & (count + right_count[b] <= most), half_areas(box) * max_x86(count * per_block, one) + right_cost[b], none);
+    const vf<4> cost = select(fits(count) & (count + right_count[b] <= most), half_areas(box) * blocks(count) + right_cost[b], none);
     const vm<4> better = cost < best_cost;
     best_cost = select(better, cost, best_cost);
     best_bin = select(better, vi<4>(std::int32_t(b)), best_bin);

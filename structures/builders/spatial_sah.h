@@ -76,26 +76,22 @@ class SpatialSah {
     }
   }
 
-  void split(const Range& range, Range& left, Range& right) {
-    sah::Bins bins;
-    MeteredVector<sah::Bins> chunks;
-    const sah::BinMap map(range.bounds.centroids, range.size(), parameters_.bins);
+  /// Not inlined: recurse() has to do without room for bins in its frame.
+  __attribute__((noinline)) void split(const Range& range, Range& left, Range& right) {
     const sah::Reference* begin = references_[range.side].data() + range.begin;
     const sah::Reference* end = begin + range.size();
-    sah::bin_range(begin, end, map, bins, chunks);
-    const sah::Split object = sah::best_split(bins, map.bins, range.size(), leaf_width_);
-    sah::Box left_box = range.bounds.boxes, right_box = range.bounds.boxes;
-    if (object.axis >= 0) sah::child_bounds(bins, map.bins, object, left_box, right_box);
+    const sah::ObjectSplit object(begin, end, range.bounds.centroids, parameters_.bins, leaf_width_);
+    const sah::Box left_box = object.exists() ? object.left() : range.bounds.boxes, right_box = object.exists() ? object.right() : range.bounds.boxes;
     if (range.room() >= range.size() + kFewest && range.size() > kFewest && sah::half_area_or_0(min_x86(left_box, right_box)) > parameters_.spatial_overlap * root_area_ &&
-        split_space(range, object.cost, left, right)) {
+        split_space(range, object.cost(), left, right)) {
       return;
     }
-    if (object.axis < 0) return split_in_the_middle(range, left, right);
-    const std::size_t right_count = range.size() - object.left_count, middle = divide(range, object.left_count, right_count);
-    left = {range.room_begin, range.room_begin + object.left_count, range.room_begin, middle, 1 - range.side, {left_box, left_box}};
+    if (!object.exists()) return split_in_the_middle(range, left, right);
+    const std::size_t right_count = range.size() - object.left_count(), middle = divide(range, object.left_count(), right_count);
+    left = {range.room_begin, range.room_begin + object.left_count(), range.room_begin, middle, 1 - range.side, {left_box, left_box}};
     right = {middle, middle + right_count, middle, range.room_end, 1 - range.side, {right_box, right_box}};
     sah::Reference* out = references_[1 - range.side].data();
-    sah::partition_range(begin, end, map, object, chunks, out + left.begin, out + right.begin, left.bounds.centroids, right.bounds.centroids);
+    object.partition_to(out + left.begin, out + right.begin, left.bounds.centroids, right.bounds.centroids);
   }
 
   /// Splits by a plane in space where that pays; false where it does not.

@@ -80,7 +80,7 @@ class SweepSah {
   }
 
   [[nodiscard]] float cost(const Bounds3f& box, std::size_t count) const noexcept {
-    return half_area(box) * std::max(1.0f, float(count) / float(leaf_width_));
+    return half_area(box) * float((std::uint32_t(count) + leaf_width_ - 1) / leaf_width_);
   }
 
   [[nodiscard]] Split sweep(int axis, std::size_t begin, std::size_t end) {
