@@ -26,15 +26,30 @@ struct Box4 {
   return {lanes[0], lanes[1], lanes[2]};
 }
 
+/// A mesh's vertices in lanes x y z; the fourth holds anything.
+class TriangleVertices {
+ public:
+  explicit TriangleVertices(const TriangleMesh& mesh) noexcept
+      : vertices_(mesh.vertices.data()), last_(std::uint32_t(mesh.vertices.size() - 1)) {}
+  /// The array's last vertex is not read beyond.
+  [[nodiscard]] __m128 operator[](std::uint32_t v) const noexcept {
+    if (v != last_) [[likely]] return _mm_loadu_ps(&vertices_[v].x);
+    return _mm_setr_ps(vertices_[v].x, vertices_[v].y, vertices_[v].z, 0.0f);
+  }
+
+ private:
+  const Vec3f* vertices_;
+  std::uint32_t last_;
+};
+
 /// A mesh's triangles as boxes.
 class TriangleBoxes {
  public:
-  explicit TriangleBoxes(const TriangleMesh& mesh) noexcept
-      : triangles_(mesh.triangles.data()), vertices_(mesh.vertices.data()), last_(std::uint32_t(mesh.vertices.size() - 1)) {}
+  explicit TriangleBoxes(const TriangleMesh& mesh) noexcept : triangles_(mesh.triangles.data()), vertices_(mesh.vertices.data()), corner_(mesh) {}
 
   [[nodiscard]] Box4 box(std::size_t i) const noexcept {
     const Triangle t = triangles_[i];
-    const __m128 a = vertex(t.a), b = vertex(t.b), c = vertex(t.c);
+    const __m128 a = corner_[t.a], b = corner_[t.b], c = corner_[t.c];
     return {_mm_min_ps(_mm_min_ps(a, b), c), _mm_max_ps(_mm_max_ps(a, b), c)};
   }
   void prefetch_triangle(std::size_t i) const noexcept { prefetch(triangles_ + i); }
@@ -46,14 +61,9 @@ class TriangleBoxes {
 
  private:
   static void prefetch(const void* p) noexcept { _mm_prefetch(static_cast<const char*>(p), _MM_HINT_T0); }
-  /// The array's last vertex is not read beyond.
-  [[nodiscard]] __m128 vertex(std::uint32_t v) const noexcept {
-    if (v != last_) [[likely]] return _mm_loadu_ps(&vertices_[v].x);
-    return _mm_setr_ps(vertices_[v].x, vertices_[v].y, vertices_[v].z, 0.0f);
-  }
   const Triangle* triangles_;
   const Vec3f* vertices_;
-  std::uint32_t last_;
+  TriangleVertices corner_;
 };
 
 }  // namespace arboretum

@@ -1,6 +1,6 @@
 #include "structures/leaves/leaf_form.h"
 
-#include "structures/leaves/blocks.h"
+#include "structures/leaves/fill_leaves.h"
 
 namespace arboretum {
 
@@ -10,7 +10,7 @@ std::span<const LeafForm> leaf_forms() {
     for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) {
       list.push_back({Block::kName, unsigned(Block::kWidth), sizeof(Block),
                       [](std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids) noexcept {
-                        fill_blocks(reinterpret_cast<Block*>(at), mesh, ids);
+                        fill_leaf(reinterpret_cast<Block*>(at), mesh, ids);
                       },
                       [](const std::byte* at, unsigned blocks, std::vector<std::uint32_t>& out) {
                         append_primitives(reinterpret_cast<const Block*>(at), blocks, out);
