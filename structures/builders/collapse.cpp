@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include <emmintrin.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
@@ -14,10 +15,35 @@ constexpr std::uint32_t kTooMany = 1000;  // references, more than a leaf holds
 constexpr float kLeafVisit = 0.25f;
 }
 
-/// cost[k - 1]: least cost of the subtree in at most k slots of its parent.
+/// cost[k - 1]: least cost of the subtree in at most k slots of its parent; infinite above `slots`, and so is what stands before it.
 struct Collapse::Costs {
-  unsigned slots;
+  Costs() noexcept {
+    for (int i = 0; i < 2 * int(kMaxBranching); i += 4) _mm_store_ps(before + i, _mm_set1_ps(std::numeric_limits<float>::infinity()));
+  }
+  alignas(16) float before[kMaxBranching];
   float cost[kMaxBranching];
+  unsigned slots = 1;
+};
+
+/// least[k - 1]: the least sum of two subtrees' costs in exactly k slots; left[k - 1]: of these the left one's, the fewest of equals. All k in lanes.
+struct Collapse::Shares {
+  alignas(16) float least[kMaxBranching];
+  alignas(16) std::int32_t left[kMaxBranching];
+  Shares(const Costs& a, const Costs& b, unsigned branching) noexcept {
+    unsigned at = 0;
+    do {
+      __m128 best = _mm_set1_ps(std::numeric_limits<float>::infinity());
+      __m128i share = _mm_set1_epi32(1);
+      for (unsigned l = 1; l <= a.slots; ++l) {
+        const __m128 sum = _mm_add_ps(_mm_set1_ps(a.cost[l - 1]), _mm_loadu_ps(b.before + kMaxBranching + at - l));
+        const __m128i less = _mm_castps_si128(_mm_cmplt_ps(sum, best));
+        best = _mm_min_ps(sum, best);
+        share = _mm_or_si128(_mm_and_si128(less, _mm_set1_epi32(int(l))), _mm_andnot_si128(less, share));
+      }
+      _mm_store_ps(least + at, best);
+      _mm_store_si128(reinterpret_cast<__m128i*>(left + at), share);
+    } while ((at += 4) < branching);
+  }
 };
 
 Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : tree_(tree), settings_(settings) {
@@ -70,17 +96,12 @@ void Collapse::optimise(std::uint32_t index, Costs& out) {
   const unsigned n = settings_.branching;
   std::uint8_t* choice = &choice_[std::size_t(index) * n];
   out.slots = std::min(n, left.slots + right.slots);
-  float split_cost[kMaxBranching] = {};  // in exactly k slots, k >= 2
+  const Shares shares(left, right, n);
+  const float* split_cost = shares.least;
   unsigned cheapest = 2;
   for (unsigned k = 2; k <= out.slots; ++k) {
-    float best = std::numeric_limits<float>::infinity();
-    unsigned best_left = 1;
-    for (unsigned l = k > right.slots ? k - right.slots : 1; l <= std::min(k - 1, left.slots); ++l) {
-      const float cost = left.cost[l - 1] + right.cost[k - l - 1];
-      if (cost < best) best = cost, best_left = l;
-    }
-    split_cost[k - 1] = best, choice[k - 1] = std::uint8_t(best_left - 1);
-    if (best < split_cost[cheapest - 1]) cheapest = k;
+    choice[k - 1] = std::uint8_t(shares.left[k - 1] - 1);
+    if (split_cost[k - 1] < split_cost[cheapest - 1]) cheapest = k;
   }
   const float inner_cost = area * settings_.traversal_cost + split_cost[cheapest - 1];
   plan_[index].leaf = node.count <= kMaxMergedReferences && blocks(index) <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;

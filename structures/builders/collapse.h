@@ -59,13 +59,12 @@ class Collapse {
     std::uint64_t leaf : 1;
   };
   struct Costs;
+  struct Shares;
   void optimise(std::uint32_t node, Costs& out);
   void choose_leaves(std::uint32_t node);
   std::uint64_t measure(std::uint32_t node);
   void plan_leaf(std::uint32_t node);
-  [[nodiscard]] unsigned blocks_for(std::size_t references) const noexcept {
-    return unsigned((references + settings_.block_width - 1) / settings_.block_width);
-  }
+  [[nodiscard]] unsigned blocks_for(unsigned references) const noexcept { return (references + settings_.block_width - 1) / settings_.block_width; }
   void expand(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
   void expand_children(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
 

@@ -90,7 +90,7 @@ struct BinMap {
   vf<4> lower, scale;
   unsigned bins;
   BinMap(Box centroids, std::size_t n, unsigned max_bins) {
-    bins = std::min(max_bins, n < 24 ? 8u : n < 256 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
+    bins = std::min(max_bins, n < 32 ? 8u : n < 512 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
     if (n > kLarge) bins = std::min(8 * bins, kManyBins);
     const vf<4> low = -low_half(centroids), extent = high_half(centroids) - low;
     lower = low;
