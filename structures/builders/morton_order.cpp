@@ -1,6 +1,7 @@
 #include "structures/builders/morton_order.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <string>
 
@@ -16,6 +17,7 @@ namespace {
 
 constexpr std::size_t kChunk = 1u << 14;
 constexpr unsigned kRestBits = 31;
+constexpr std::size_t kShortRun = 8;  ///< triangles that may share the upper bits and keep their order: a leaf or two
 
 template <class F>
 void for_chunks(std::size_t n, const F& f) {
@@ -48,7 +50,7 @@ void check_morton_bits(unsigned bits) {
   if (bits != 30 && bits != 63) throw UserError("morton_bits: " + std::to_string(bits) + " is neither 30 nor 63");
 }
 
-MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits) : keys_(mesh.size()), rest_(bits == 63 ? mesh.size() : 0) {
+MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits) : keys_(mesh.size()) {
   check_morton_bits(bits);
   const std::size_t n = mesh.size();
   if (n == 0) return;
@@ -71,47 +73,57 @@ MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits) : keys_(mesh.s
   Box4 box;
   for (const Box4& b : partial) box.extend(b);
   const Cells cells(box, bits / 3);
+  const unsigned left_out = bits == 30 ? 0 : kRestBits;
+  const auto code = [&](std::size_t i) { return cells.code(_mm_load_ps(centroids[i].doubled)); };
   for_chunks(n, [&](std::size_t, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::uint64_t code = cells.code(_mm_load_ps(centroids[i].doubled));
-      if (bits == 30) {
-        keys_[i] = code << 32 | i;
-      } else {
-        keys_[i] = code >> kRestBits << 32 | i;
-        rest_[i] = std::uint32_t(code) & ((1u << kRestBits) - 1);
-      }
-    }
+    for (std::size_t i = begin; i < end; ++i) keys_[i] = code(i) >> left_out << 32 | i;
   });
   radix_sort(keys_, 32, bits == 30 ? 62 : 64);
-  if (bits == 63) refine();
+  if (bits == 63) refine([&](std::uint32_t i) { return std::uint32_t(code(i)) & ((1u << kRestBits) - 1); });
 }
 
-/// Sorts runs of keys with the same upper half by the lower; each is done with the chunk that it begins in.
-void MortonOrder::refine() {
+/// Calls f(begin, end) for the runs of keys with the same upper half that begin in a chunk.
+template <class F>
+void MortonOrder::for_runs(const F& f) const {
   const std::size_t n = keys_.size();
   const auto upper = [&](std::size_t i) { return keys_[i] >> 32; };
-  // Upper halves stay where they are, so that a chunk may look at its neighbours' while these are sorted.
   for_chunks(n, [&](std::size_t, std::size_t begin, std::size_t end) {
-    MeteredVector<std::uint64_t> run;
     if (begin > 0) {
       while (begin < end && upper(begin) == upper(begin - 1)) ++begin;
     }
     while (begin < end) {
       std::size_t last = begin + 1;
       while (last < n && upper(last) == upper(begin)) ++last;
-      if (last - begin > 1) {
-        run.resize(last - begin);
-        const std::uint64_t high = upper(begin) << 32;
-        for (std::size_t i = begin; i < last; ++i) run[i - begin] = std::uint64_t{rest_[id(i)]} << 32 | id(i);
-        if (run.size() < kChunk) {
-          std::sort(run.begin(), run.end());
-        } else {
-          radix_sort(run, 32, 32 + kRestBits);
-        }
-        for (std::size_t i = begin; i < last; ++i) keys_[i] = high | std::uint32_t(run[i - begin]);
-      }
+      f(begin, last);
       begin = last;
     }
+  });
+}
+
+/// Sorts long runs of keys with the same upper half by the lower; each is done with the chunk that it begins in.
+template <class Rest>
+void MortonOrder::refine(const Rest& rest) {
+  std::atomic<bool> any{false};
+  for_runs([&](std::size_t begin, std::size_t end) {
+    if (end - begin > kShortRun) any.store(true, std::memory_order_relaxed);
+  });
+  if (!any) return;
+  rest_.resize(keys_.size());
+  // Upper halves stay where they are, so that a chunk may look at its neighbours' while these are sorted.
+  for_runs([&](std::size_t begin, std::size_t end) {
+    if (end - begin <= kShortRun) {
+      std::fill(rest_.begin() + std::ptrdiff_t(begin), rest_.begin() + std::ptrdiff_t(end), 0u);
+      return;
+    }
+    MeteredVector<std::uint64_t> run(end - begin);
+    const std::uint64_t high = keys_[begin] >> 32 << 32;
+    for (std::size_t i = begin; i < end; ++i) run[i - begin] = std::uint64_t{rest(id(i))} << 32 | id(i);
+    if (run.size() < kChunk) {
+      std::sort(run.begin(), run.end());
+    } else {
+      radix_sort(run, 32, 32 + kRestBits);
+    }
+    for (std::size_t i = begin; i < end; ++i) keys_[i] = high | std::uint32_t(run[i - begin]), rest_[i] = std::uint32_t(run[i - begin] >> 32);
   });
 }
 
@@ -133,8 +145,8 @@ std::size_t MortonOrder::split(std::size_t begin, std::size_t end) const noexcep
   if (keys_[begin] >> 32 != keys_[end - 1] >> 32) {
     return split_at_bit(begin, end, [this](std::size_t i) { return std::uint32_t(keys_[i] >> 32); });
   }
-  if (rest_.empty() || rest_[id(begin)] == rest_[id(end - 1)]) return begin + (end - begin) / 2;
-  return split_at_bit(begin, end, [this](std::size_t i) { return rest_[id(i)]; });
+  if (rest_.empty() || rest_[begin] == rest_[end - 1]) return begin + (end - begin) / 2;
+  return split_at_bit(begin, end, [this](std::size_t i) { return rest_[i]; });
 }
 
 }  // namespace arboretum

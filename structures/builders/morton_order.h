@@ -12,7 +12,8 @@ namespace arboretum {
 /// Throws UserError unless `bits` is 30 or 63.
 void check_morton_bits(unsigned bits);
 
-/// Triangles sorted by code, those of one code by id.
+/// Triangles sorted by code, those of one code by id. Of 63 bits the lower 31 count only where more than a few triangles have the same upper 32:
+/// most scenes need no look at them.
 class MortonOrder {
  public:
   /// `bits`: 30 or 63. Runs in the caller's TBB arena. Coordinates are finite.
@@ -25,13 +26,16 @@ class MortonOrder {
   [[nodiscard]] std::size_t split(std::size_t begin, std::size_t end) const noexcept;
 
  private:
-  void refine();
+  template <class F>
+  void for_runs(const F& f) const;
+  template <class Rest>
+  void refine(const Rest& rest);
   template <class Code>
   [[nodiscard]] static std::size_t split_at_bit(std::size_t begin, std::size_t end, const Code& code) noexcept;
 
   /// The code's upper 32 bits (all 30 of the shorter), then the id.
   MeteredVector<std::uint64_t> keys_;
-  MeteredVector<std::uint32_t> rest_;  ///< the lower 31 bits by id; none for 30 bits
+  MeteredVector<std::uint32_t> rest_;  ///< the lower 31 bits by place, 0 in short runs; empty where there are no others
 };
 
 }  // namespace arboretum

@@ -99,7 +99,7 @@ class TreeWriter {
   }
 
  private:
-  static constexpr std::uint32_t kBlock = 256;
+  static constexpr std::uint32_t kBlock = 64;
 
   void hand_out(std::size_t n) { tree_.nodes.hand_out(n), tree_.first.hand_out(n); }
 
