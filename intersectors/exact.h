@@ -23,10 +23,12 @@
 // lies within [z_min, z_max], padded by 8 u max |z|.
 //
 // The nearest. A hit is left out only when its interval lies beyond that of the best; where they overlap the exact distances are
-// compared. best.t is the high end of the best hit's interval until finish(), so that no box in front of the exact t is culled.
+// compared. best.t is the high end of the best hit's interval until finish(), so that no box in front of the exact t is culled. Nearly always
+// the nearest candidate of a block is certainly hit, and its interval lies before all others: it is taken where the filter stands.
 #pragma once
 
 #include "intersectors/leaf_block.h"
+#include "intersectors/round_in_double.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -42,10 +44,10 @@ struct Exact {
     int kx, ky, kz;
     Vec3f origin, direction;
     bool has_best = false;
-    float best_low = 0.0f;
-    std::array<Vec3f, 3> best;
+    float best_low;  ///< of the ray while it has no hit
+    CornersInFours best;
 
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction), best_low(ray.tfar) {
       const float ax = __builtin_fabsf(ray.direction.x), ay = __builtin_fabsf(ray.direction.y), az = __builtin_fabsf(ray.direction.z);
       kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
       kx = kz == 2 ? 0 : kz + 1;
@@ -67,7 +69,18 @@ struct Exact {
     if (__builtin_expect(edges.candidates() == 0, 1)) return false;
     Distances<Block::kWidth> d;
     find_distances(ray, edges, tnear, best.t, d);
-    return d.candidates != 0 && nearest(ray, block, d, tnear, best);
+    if (d.candidates == 0) return false;
+    const unsigned lane = foremost(d, tnear);
+    if (__builtin_expect(lane != 0, 1)) {
+      const int i = __builtin_ctz(lane);
+      const float high = d.high[i];
+      if (__builtin_expect(high < ray.best_low && high <= best.t, 1)) {
+        ray.has_best = true, ray.best = CornersInFours(block, i), ray.best_low = d.low[i];
+        best.t = high, best.primitive = std::int32_t(block.id[i]);
+        return true;
+      }
+    }
+    return nearest(ray, block, d, tnear, best);
   }
 
   template <class Block>
@@ -82,7 +95,8 @@ struct Exact {
   /// Rounds t, u and v of the nearest hit.
   static ARBORETUM_INLINE void finish(RayData& ray, NearestHit& best) {
     if (!ray.has_best) return;
-    const RoundedHit hit = round_exactly({ray.origin, 0.0f, ray.direction, best.t}, ray.best);
+    RoundedHit hit;
+    if (__builtin_expect(!round_in_double(ray.origin, ray.direction, ray.best, hit), 0)) hit = round_exactly({ray.origin, 0.0f, ray.direction, best.t}, ray.best.corners());
     best.t = hit.t, best.u = hit.u, best.v = hit.v;
   }
 
@@ -143,6 +157,24 @@ struct Exact {
     d.candidates = l.candidates() & ~((low > F(tfar)) | (high < F(tnear))).bits();
   }
 
+  /// The candidate, as a bit, that is certainly hit behind tnear, with a narrow interval before those of all other candidates; else 0.
+  template <int W>
+  static ARBORETUM_INLINE unsigned foremost(const Distances<W>& d, float tnear) {
+    using F = vf<W>;
+    const unsigned certain = d.candidates & d.certain;
+    if (__builtin_expect((d.candidates & (d.candidates - 1)) == 0, 1)) {
+      if (certain == 0) return 0;
+      const int i = __builtin_ctz(certain);
+      return d.low[i] >= tnear && d.high[i] - d.low[i] <= kWide * __builtin_fabsf(d.high[i]) ? certain : 0;
+    }
+    const F low = F::load(d.low), high = F::load(d.high);
+    const vm<W> narrow = vm<W>::from_bits(certain) & (low >= F(tnear)) & (high - low <= F(kWide) * abs(high));
+    const float least = reduce_min(select(narrow, high, F(std::numeric_limits<float>::infinity())));
+    // One without an interval (NaN) may be anywhere.
+    const unsigned first = d.candidates & ~(low > F(least)).bits();
+    return (first & (first - 1)) == 0 ? first & narrow.bits() : 0;
+  }
+
   template <class Block>
   static ARBORETUM_INLINE std::array<Vec3f, 3> corners(const Block& block, int i) {
     return {Vec3f{block.v0[0][i], block.v0[1][i], block.v0[2][i]}, Vec3f{block.v1[0][i], block.v1[1][i], block.v1[2][i]},
@@ -174,10 +206,10 @@ struct Exact {
     }
     if (ray.has_best && t.high >= ray.best_low) {
       if (t.low > best.t) return false;
-      const int order = compare_distances_exactly(exact, corner, ray.best);
+      const int order = compare_distances_exactly(exact, corner, ray.best.corners());
       if (order > 0 || (order == 0 && id > best.primitive)) return false;
     }
-    ray.has_best = true, ray.best = corner, ray.best_low = t.low;
+    ray.has_best = true, ray.best = CornersInFours(corner), ray.best_low = t.low;
     if (t.high < best.t) best.t = t.high;  // else the old bound, which holds for what is nearer still
     best.primitive = id;
     return true;
