@@ -247,6 +247,34 @@ TEST_CASE("sign of an edge function that doubles get wrong") {
   CHECK(on.counts().in_integers > 0);
 }
 
+TEST_CASE("a ray exactly through a vertex needs no whole numbers, one an ulp beside it is not taken for such") {
+  const Vec3f hub{0.25f, 0.5f, 2.0f}, origin{0.125f, -0.75f, -1.0f};
+  const Corners first{hub, Vec3f{3, 0.1f, 2.3f}, Vec3f{0.3f, 5, 1.7f}}, second{Vec3f{-2, 0.3f, 1.1f}, hub, Vec3f{0.3f, 5, 1.7f}}, missed{Vec3f{3, 0.1f, 2.3f}, Vec3f{0.3f, 5, 1.7f}, Vec3f{4, 5, 2.5f}};
+  const Ray through{origin, 0, {0.5f * (hub.x - origin.x), 0.5f * (hub.y - origin.y), 0.5f * (hub.z - origin.z)}, kInf};
+  Enclosure t;
+  ExactPredicate on(through);
+  CHECK(on.meets(first, t));
+  CHECK((t.lower <= 2.0 && t.upper >= 2.0));
+  CHECK(on.meets(second, t));
+  CHECK_FALSE(on.meets(missed, t));
+  CHECK(on.compare_t(first, second) == 0);
+  CHECK(on.counts().in_integers == 0);
+
+  Ray beside = through;
+  beside.direction.x = std::nextafter(beside.direction.x, 1.0f);
+  ExactPredicate off(beside);
+  TriangleMesh mesh;
+  for (const Corners& c : {first, second}) {
+    const auto at = std::uint32_t(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), c.begin(), c.end());
+    mesh.triangles.push_back({at, at + 1, at + 2});
+  }
+  const rational::Answer truth = rational::closest_hit(mesh, beside);
+  CHECK(truth.hits == 1);
+  CHECK(off.meets(first, t) == (truth.nearest == std::vector<std::uint32_t>{0}));
+  CHECK(off.meets(second, t) == (truth.nearest == std::vector<std::uint32_t>{1}));
+}
+
 TEST_CASE("exact integers round to float32 as the standard asks") {
   struct Case {
     long long numerator, denominator;

@@ -49,6 +49,12 @@ int sign_beyond(double value, double bound) {
   return value > bound ? 1 : value < -bound ? -1 : 0;
 }
 
+/// a * b == c * d exactly: the two parts of a product are unique.
+bool equal_products(double a, double b, double c, double d) {
+  const DoubleDouble p = two_product(a, b), q = two_product(c, d);
+  return p.hi == q.hi && p.lo == q.lo;
+}
+
 double down(double x) {
   return std::nextafter(x, -kInfinity);
 }
@@ -96,6 +102,13 @@ ExactPredicate::ExactPredicate(const Ray& ray, const std::array<double, 3>& orig
       tfar_(ray.tfar),
       direction_size_(size_of(direction_)) {}
 
+bool ExactPredicate::surely_on_line(Vec3f point) const {
+  const Triple<DoubleDouble> s = difference(widen(point), origin_);
+  if (s[0].lo != 0 || s[1].lo != 0 || s[2].lo != 0) return false;
+  const Triple<double>& d = direction_;
+  return equal_products(s[0].hi, d[1], s[1].hi, d[0]) && equal_products(s[1].hi, d[2], s[2].hi, d[1]) && equal_products(s[2].hi, d[0], s[0].hi, d[2]);
+}
+
 bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
   const Triple<double> a = widen(corners[0]) - origin_, b = widen(corners[1]) - origin_,
                        c = widen(corners[2]) - origin_;
@@ -110,11 +123,15 @@ bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
   ++counts_.in_double;
   if (mixed()) return false;
   if (sign[0] == 0 || sign[1] == 0 || sign[2] == 0) {
+    // A corner on the line: both its edges are exactly 0. So it is for all triangles of a fan, where whole numbers would take their time.
+    bool zero[3] = {false, false, false};
+    for (int k = 0; k < 3; ++k)
+      if (sign[k] == 0 && sign[(k + 2) % 3] == 0 && surely_on_line(corners[static_cast<std::size_t>(k)])) zero[k] = zero[(k + 2) % 3] = true;
     Triple<DoubleDouble> p[3];
     for (int k = 0; k < 3; ++k) p[k] = difference(widen(corners[static_cast<std::size_t>(k)]), origin_);
     bool all_certain = true;
     for (int k = 0; k < 3; ++k) {
-      if (sign[k] != 0) continue;
+      if (sign[k] != 0 || zero[k]) continue;
       bool certain = false;
       sign[k] = edge_sign_in_double_double(p[k], p[(k + 1) % 3], direction_size_, certain);
       all_certain = all_certain && certain;
@@ -125,8 +142,9 @@ bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
       ++counts_.in_integers;
       const std::array<int, 3> exact = exact_edge_signs(line_, corners);
       std::copy(exact.begin(), exact.end(), sign);
-      if (mixed() || (sign[0] == 0 && sign[1] == 0 && sign[2] == 0)) return false;
+      if (mixed()) return false;
     }
+    if (sign[0] == 0 && sign[1] == 0 && sign[2] == 0) return false;
   }
   return within_interval(corners, t);
 }
@@ -191,6 +209,9 @@ bool ExactPredicate::within_interval(const Corners& corners, Enclosure& t) {
 
 int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
   if (first == second) return 0;
+  // A corner of both on the line is where it meets both.
+  for (const Vec3f& corner : first)
+    if (std::find(second.begin(), second.end(), corner) != second.end() && surely_on_line(corner)) return ++counts_.in_double_double, 0;
   const Approximate p = approximate_t(first), q = approximate_t(second);
   if (p.usable() && q.usable()) {
     const DoubleDouble difference = p.value - q.value;

@@ -63,6 +63,8 @@ class ExactPredicate {
   [[nodiscard]] int edge_sign_in_double_double(const Triple<DoubleDouble>& p, const Triple<DoubleDouble>& q,
                                                double scale, bool& certain) const;
   [[nodiscard]] Approximate approximate_t(const Corners& corners) const;
+  /// Whether the ray's line passes through the point; false also where doubles cannot hold the point as seen from the origin.
+  [[nodiscard]] bool surely_on_line(Vec3f point) const;
   [[nodiscard]] bool within_interval(const Corners& corners, Enclosure& t);
 
   ExactLine line_;
