@@ -48,6 +48,7 @@ constexpr Summary kIntersectors[] = {
 };
 constexpr Summary kBoxes[] = {
     {"fast", "slab test as rounded: may miss a box that the exact ray touches"},
+    {"ize", "Ize 2013: far planes' reciprocals two ulp larger; misses of the boxes that a ray only touches some in a million"},
     {"padded", "slab test widened by its error bound: never misses a box that the exact ray touches"},
     {"auto", "padded for intersectors that promise to lose no hit, fast for moller_trumbore and its like"},
 };

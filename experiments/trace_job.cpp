@@ -100,6 +100,7 @@ void TraceJob::prepare(Json& facts, SceneData* data, const MeasureSettings& meas
     facts["start_distance"] = data->start_distance(workload_);
   }
   add_facts(facts, count());
+  if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";
 
   for (unsigned i = 0; i < measure.warmup; ++i) trace(rays);
   const double begin = wall_seconds();

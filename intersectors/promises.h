@@ -48,7 +48,7 @@ struct BoxPromise {
 
 inline constexpr BoxPromise kBoxPromises[] = {
     {"fast", false, "rounding can lose a box that the ray touches at a face, edge or corner"},
-    {"ize", false, "no touched box is missed, but one an ulp nearer than the best hit may be culled"},
+    {"ize", false, "meets boxes that the ray is in for 2^-22 of its distance or more; may miss one that it only touches, or as near as the best hit"},
     {"padded", true, "never misses a box that the exact ray touches"},
 };
 

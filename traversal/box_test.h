@@ -13,8 +13,7 @@
 // Without FMA (scalar, SSE) t = (plane - o) * r with r = 1/d, infinite for 0; padded: the origin of the near planes is moved
 // by e = 2^-21 (M + |o|) along the direction, that of the far planes against it (as Woop, Benthin, Wald 2013 do), so both ends
 // of the interval are padded for the cost of none. Proof: the moved origin, the difference and the two factors round by less
-// than 4 u (M + |o| + e)|r| together, which is under e |r|. (Ize's pad, JCGT 2(2) 2013, widens the far end alone: no box is
-// missed, but one whose triangle is an ulp nearer than the best hit can be culled.) 0 * inf is NaN in the fast test;
+// than 4 u (M + |o| + e)|r| together, which is under e |r|. (Ize's pad is in ize_box.h.) 0 * inf is NaN in the fast test;
 // min_x86 and max_x86 keep their second operand, the running value, and so ignore it.
 //
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.

@@ -33,6 +33,18 @@ const std::map<Key, const KernelRow*>& index() {
   });
 }
 
+/// The values that `key` has in the rows with that box test, of `structure` if one is named: " single, packet8".
+[[nodiscard]] std::string those_with(std::string_view box, std::string_view KernelRow::*key, std::string_view structure) {
+  std::vector<std::string_view> seen;
+  std::string words;
+  for (const KernelRow& r : kernel_table()) {
+    if (r.box != box || (!structure.empty() && r.structure != structure) || std::ranges::find(seen, r.*key) != seen.end()) continue;
+    words.append(seen.empty() ? " " : ", ").append(r.*key);
+    seen.push_back(r.*key);
+  }
+  return words;
+}
+
 }  // namespace
 
 Counters& Counters::operator+=(const Counters& o) noexcept {
@@ -101,6 +113,9 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
     others.pop_back();
     return i + " cannot read leaf " + l + " in " + s + ": use" + others;
   }
+  // A box test that only some ways of traversal, or some structures, have.
+  if (const std::string ways = those_with(box, &KernelRow::traversal, structure); !ways.empty()) return s + " has the box test " + b + " for" + ways + " alone, not for " + t;
+  if (const std::string others = those_with(box, &KernelRow::structure, ""); !others.empty()) return s + " has no box test " + b + ":" + others + " have it";
   return s + " with " + l + " and " + i + " has no box test " + b + " for " + t;
 }
 

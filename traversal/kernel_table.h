@@ -69,6 +69,7 @@ struct KernelRow {
   const LeafTests* tests = nullptr;  ///< nullptr where the structure has its own (embree)
   RowFunctions timed{};              ///< ignore their Counters*
   RowFunctions counting{};           ///< same answers, add to the Counters; nullptr where there are none
+  bool leaves_compiled_in = false;   ///< `timed` has its leaf tests compiled in; else it calls `tests`, which costs a few per cent
 
   /// With `counters`, by the counting functions, which must be there.
   void closest_hit(const Accel& accel, RayBatch rays, std::span<Hit> hits, Counters* counters = nullptr) const {

@@ -55,6 +55,7 @@ def draw_hard(points):
             for cell, time, value in sorted(here, key=lambda p: p[0]["box"] == "padded"):  # filled ones above
                 own = intersector_colour(cell["intersector"])
                 axis.plot(time, value, markers[cell["structure"]], markersize=6.5, color=own, markeredgewidth=1.3,
+                          fillstyle="left" if cell["box"] == "ize" else "full", markerfacecoloralt="white",
                           markerfacecolor="white" if cell["box"] == "fast" else own, markeredgecolor=own, clip_on=False)
             step_front(axis, [(t, v) for _, t, v in here])
             log_with_zero(axis, "y", [v for v in everywhere if v is not None])
@@ -64,6 +65,10 @@ def draw_hard(points):
             axis.set_ylabel(label + ("\nhard rays" if name == "wrong_answers" else "\nhard rays answered right"))
     boxes = marker_legend({"fast boxes: hollow": "o", "padded boxes: filled": "o"})
     boxes[1].set_markerfacecolor("#333333")
+    if any(c["box"] == "ize" for c, _, _ in points):
+        boxes += marker_legend({"Ize's boxes: half": "o"})
+        boxes[2].set_fillstyle("left")
+        boxes[2].set_markerfacecolor("#333333")
     legends_right(figure, [("intersector", intersector_legend(intersectors)), ("structure", marker_legend(markers)), ("", boxes)])
     return figure
 

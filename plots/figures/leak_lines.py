@@ -6,6 +6,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from results import HARD_PREFIX, NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_with_zero, panels, plain, short
 
+BOX_LINES = {"fast": (0, (2, 1.2)), "ize": "-."}  # others: drawn through
+
 
 def draw_lines(results, key, value_of, label, why_none):
     """`key`: what of the placing is swept; `value_of(cell)`: where the cell stands on the x axis, or None."""
@@ -31,7 +33,7 @@ def draw_lines(results, key, value_of, label, why_none):
                 intersectors.add(intersector)
                 embree = embree or is_embree
                 axis.plot(*zip(*sorted(line.items())), color=intersector_colour(intersector), linewidth=2.4 if box == "fast" and not is_embree else 1.3,
-                          alpha=0.55 if box == "fast" and not is_embree else 1.0, linestyle=(0, (2, 1.2)) if box == "fast" else "-",
+                          alpha=0.55 if box == "fast" and not is_embree else 1.0, linestyle=BOX_LINES.get(box, "-"),
                           marker="D" if is_embree else "o", markersize=5 if is_embree else 3.5, markerfacecolor="white" if is_embree else None, clip_on=False)
             xs = sorted({x for line in lines.values() for x in line})
             axis.set_xscale("log")
@@ -43,7 +45,7 @@ def draw_lines(results, key, value_of, label, why_none):
             axis.set_title(f"{short(family)}, {workload.replace('_', ' ')}")
             axis.set_xlabel(label(family, results))
         axes[row][0].set_ylabel("leaks per million rays")
-    boxes = [Line2D([], [], color="#333333", linestyle=(0, (2, 1.2)), linewidth=2.4, alpha=0.55, label="fast"), Line2D([], [], color="#333333", linewidth=1.3, label="padded")]
+    boxes = [Line2D([], [], color="#333333", linestyle=BOX_LINES["fast"], linewidth=2.4, alpha=0.55, label="fast"), Line2D([], [], color="#333333", linewidth=1.3, label="padded")]
     who = [Line2D([], [], color="#333333", linestyle="", marker="D", markerfacecolor="white", markersize=5, label="of embree")] if embree else []
     legends_right(figure, [("intersector", intersector_legend(sorted(intersectors))), ("boxes", boxes + who)])
     return figure

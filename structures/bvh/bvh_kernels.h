@@ -3,6 +3,7 @@
 
 #include "traversal/usual_leaves.h"
 #include "structures/bvh/bvh_auto.h"
+#include "structures/bvh/bvh_ize_single.h"
 #include "structures/bvh/bvh_packet_rows.h"
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
@@ -16,6 +17,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_rows<bvh::Bvh<N>, typename BvhSingle<SoaTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
+  add_ize_rows<N>(rows);
   add_queued_rows<bvh::Bvh<N>, BvhQueue<N>::template Of, typename BvhQueue<N>::Single>(rows, BatchLeaves{});
   add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, BatchLeaves{});
   add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", BatchLeaves{});

@@ -1,0 +1,13 @@
+#define ARBORETUM_TARGET ARBORETUM_TARGET_SSE
+#include "traversal/kernel_unit.h"
+
+#include "tests/boxes/box_tests.h"
+
+#include "simd/target_begin.h"
+#include "tests/boxes/box_tests_impl.h"
+namespace arboretum::box_test {
+unsigned meets_sse(Test test, const Ray& ray, float max_coordinate, const Boxes& boxes) {
+  return isa_sse::meets(test, ray, max_coordinate, boxes);
+}
+}  // namespace arboretum::box_test
+#include "simd/target_end.h"
