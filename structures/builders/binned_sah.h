@@ -5,6 +5,7 @@
 // into chunks whose size does not depend on the number of threads: the tree is the same for any number of threads.
 #pragma once
 
+#include "structures/builders/object_split.h"
 #include "structures/builders/sah_references.h"
 
 namespace arboretum {

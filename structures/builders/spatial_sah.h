@@ -8,6 +8,7 @@
 // (unsplitting) by costs that do not depend on the references before it.
 #pragma once
 
+#include "structures/builders/object_split.h"
 #include "structures/builders/spatial_partition.h"
 
 namespace arboretum {
