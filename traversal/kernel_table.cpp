@@ -96,7 +96,7 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   const std::string s(structure), l(leaf), i(intersector), b(box), t(traversal), a(to_string(isa));
   if (!any_row(structure, "", "", "", "", nullptr)) return "no kernels for " + s;
   if (!any_row(structure, "", "", "", "", &isa)) return s + " has no " + a + " kernels";
-  if (!any_row(structure, "", "", "", traversal, nullptr)) return s + " has no " + t + " traversal";
+  if (!any_row(structure, "", "", "", traversal, nullptr)) return s + " has no " + t + " traversal (docs/traversal.md says why)";
   if (!any_row(structure, "", "", "", traversal, &isa)) return s + " has no " + t + " traversal on " + a;
   if (!any_row(structure, "", intersector, "", traversal, &isa)) return s + " has no " + i + " kernels for " + t;
   if (!any_row(structure, leaf, "", "", traversal, &isa)) return s + " has no leaf " + l + " for " + t;
