@@ -59,6 +59,8 @@ constexpr Summary kTraversals[] = {
     {"hybrid", "packets that fall apart into single rays, as wide as the instruction set"},
     {"stream", "groups of up to 64 rays of an octant share nodes, each with a mask of its rays"},
     {"stream_sorted", "stream, of rays sorted by octant and origin within the measured time"},
+    {"stream_coherent", "Embree's stream of single rays, always with its coherent flag"},
+    {"stream_incoherent", "Embree's stream of single rays, never with its coherent flag"},
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
     {"auto", "looks at the rays, tile by tile: packets of 64 where they hold together, else streams"},
 };
@@ -185,6 +187,9 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
       break;
     case Axis::traversal:
       for (const KernelRow& row : registry.kernels) append_new(list, row.traversal);
+      // Embree's, where it or an instruction set is missing: a configuration that names them is right all the same.
+      for (std::string_view way : {"packet4", "packet8", "packet16", "stream"})
+        for (std::string_view flag : {"_coherent", "_incoherent"}) append_new(list, std::string(way).append(flag));
       for (std::string_view family : {"packet", "hybrid"}) {
         if (std::ranges::any_of(list,
                                 [&](const std::string& t) { return split_number(t).first == family; })) {

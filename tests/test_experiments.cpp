@@ -159,6 +159,13 @@ TEST_CASE("builder all is each that the structure takes, a named one not twice")
   CHECK(cells("structure: [tree], builder: [morton, all]") == "tree:morton tree:binned_sah ");
 }
 
+TEST_CASE("ways of traversal that this machine lacks are known to configurations all the same") {
+  const Registry registry = paper_registry();
+  for (std::string way : {"packet16_coherent", "packet8_incoherent", "stream_coherent"}) CHECK(check_axis_value(Axis::traversal, way, registry) == "");
+  std::string wrong = "packet16_coherant";
+  CHECK(check_axis_value(Axis::traversal, wrong, registry).find("did you mean 'packet16_coherent'?") != std::string::npos);
+}
+
 TEST_CASE("an optional scene that is not there has its cells skipped with the reason; ARBORETUM_SCENES is where it may be") {
   TemporaryFolder folder;
   const Registry registry = paper_registry();

@@ -114,8 +114,9 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
     return i + " cannot read leaf " + l + " in " + s + ": use" + others;
   }
   // A box test that only some ways of traversal, or some structures, have.
-  if (const std::string ways = those_with(box, &KernelRow::traversal, structure); !ways.empty()) return s + " has the box test " + b + " for" + ways + " alone, not for " + t;
-  if (const std::string others = those_with(box, &KernelRow::structure, ""); !others.empty()) return s + " has no box test " + b + ":" + others + " have it";
+  const bool elsewhere = !any_row(structure, "", "", box, traversal, nullptr);
+  if (const std::string ways = those_with(box, &KernelRow::traversal, structure); elsewhere && !ways.empty()) return s + " has the box test " + b + " for" + ways + " alone, not for " + t;
+  if (const std::string others = those_with(box, &KernelRow::structure, ""); elsewhere && !others.empty()) return s + " has no box test " + b + ":" + others + " have it";
   return s + " with " + l + " and " + i + " has no box test " + b + " for " + t;
 }
 
