@@ -1,4 +1,5 @@
 // From a YAML file to the cells of a sweep: faults, the product, includes, filters, the effective configuration.
+#include "experiments/axis_words.h"
 #include "experiments/config.h"
 #include "experiments/effective.h"
 #include "experiments/plan.h"

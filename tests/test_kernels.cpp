@@ -283,6 +283,13 @@ TEST_CASE("rays that end in one place are occluded in packets as they are alone"
         }
       }
     }
+    // Parallel rays end far away, at the same place as far as floats can tell; two of the directions are 0 along an axis.
+    for (const Vec3f& direction : {Vec3f{0.6f, 0.8f, 0.0f}, Vec3f{0.0f, 0.0f, -1.0f}, Vec3f{0.48f, 0.6f, 0.64f}}) {
+      for (float tfar : {1e6f, 1e13f, 1e30f, std::numeric_limits<float>::max()}) {
+        const Vec3f place = center - direction;
+        for (int i = 0; i < 64; ++i) rays.push_back({place + jitter(i % 2 ? 0.9f : 0.05f), 0.0f, direction, tfar});
+      }
+    }
     Structures structures(mesh);
     std::set<std::string_view> traversals;
     for (const KernelRow& row : runnable_rows()) {

@@ -53,7 +53,8 @@ template <class Block>
   const V n = cross(e2, e1), A = cross(e2, c), B = cross(e1, c);
   const V abs_e1 = absolute(e1), abs_e2 = absolute(e2), abs_d = absolute(d);
   const F size = sum(absolute(c)) + sum(c_half) + sum(abs_e1) + sum(abs_e2) + F(p.reach);
-  const F slack = F(0x1p-17f) * size * size * sum(plus(abs_d, d_half));
+  const F least(0x1p-126f);  // products below it lose bits
+  const F slack = (F(0x1p-17f) * size * size + least) * sum(plus(abs_d, d_half)) + least;
   // Radius of X.d for X within half of its centre: |d| half + d_half (|X| + half).
   const auto radius = [&](V X, V half) { return dot(plus(abs_d, d_half), half) + dot(d_half, absolute(X)) + slack; };
   const V A_half = cross_bound(abs_e2, c_half), B_half = cross_bound(abs_e1, c_half);

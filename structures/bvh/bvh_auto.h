@@ -22,6 +22,8 @@ struct BvhAuto {
   /// So many rays in packets show how those do; where a ray goes on alone more often than this, so many rays take the other way (docs/performance.md).
   static constexpr std::size_t kProbe = 8 * kTile, kOtherWay = 7 * kProbe;
   static constexpr float kTimesAlone = 0.4f;
+  /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
+  static constexpr unsigned kSwitch = 4;
   static constexpr int kThreshold = 6;  ///< packet64's
 
   [[nodiscard]] static bool coherent(const Ray* rays, std::size_t count, float cone) {
@@ -58,13 +60,17 @@ struct BvhAuto {
         begin += count;
       }
     };
-    bool last = false;
+    bool kind = false;
+    unsigned others = 0;  // tiles of the other kind, one after the other
     for (std::size_t at = 0; at < rays.size(); at += kTile) {
       const bool now = coherent(&rays[at], std::min(kTile, rays.size() - at), cone);
-      if (now != last) run(at, last);
-      last = now;
+      if (at == 0) kind = now;
+      others = now == kind ? 0 : others + 1;
+      if (others < kSwitch) continue;
+      run(at - (kSwitch - 1) * kTile, kind);
+      kind = now, others = 0;
     }
-    run(rays.size(), last);
+    run(rays.size(), kind);
   }
 
   /// Scalar kernels are the reference, not a race: independent rays go alone.

@@ -150,28 +150,33 @@ class BvhPackets {
     return v;
   }
 
+  /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together.
+  static float rounding(const Bounds& o, const Bounds& end) { return 0x1p-21f * (o.largest() + end.largest()); }
+
   /// Rays towards a light have no common origin, but their ends o + tfar d lie close together. Then the bounds of the ends take the place of the origins', and
   /// distances count from a ray's end, s = t - tfar: it meets a plane b at s = (b - end) r.
   void take_common_end(std::uint64_t mask, Interval& v, Bounds (&o)[3], float (&scale)[3]) {
     Bounds t, end[3];
     range(box_.t, mask, t.low, t.high);
     if (!(t.high < std::numeric_limits<float>::infinity())) return;
-    float origins = 0.0f, ends = 0.0f;
+    float origins = 0.0f, ends = 0.0f, largest = 0.0f;
     for (int a = 0; a < 3; ++a) {
       alignas(64) float at[kMostPacketRays];
       for (int k = 0; k < chunks_ * W; k += W) (F::load(box_.rays.origin[a] + k) + F::load(box_.t + k) * F::load(box_.rays.direction[a] + k)).store(at + k);
       range(at, mask, end[a].low, end[a].high);
-      origins += o[a].high - o[a].low, ends += end[a].high - end[a].low;
+      const float most = o[a].largest() > end[a].largest() ? o[a].largest() : end[a].largest();
+      largest = most > largest ? most : largest;
+      origins += o[a].high - o[a].low, ends += end[a].high - end[a].low + 2.0f * rounding(o[a], end[a]);
     }
     if (!(ends < 0.25f * origins)) return;
     v.from_end = true;
-    // The product and the sum round by less than 2^-22 (|o| + |end|) together; so does what is computed from `end` as above from `o`.
+    // What is computed from `end` is off like what is computed from `o` above. Where the direction is as good as 0 along an axis, r is not its reciprocal but 2^60 / |d|max, and s is off by
+    // up to tfar <= 2 largest / |d|max: the width is of the largest coordinate of any axis, 2^-19 of which times that r is beyond it.
     for (int a = 0; a < 3; ++a) {
-      const float largest = o[a].largest() > end[a].largest() ? o[a].largest() : end[a].largest();
-      const float rounding = 0x1p-21f * (o[a].largest() + end[a].largest());
+      const float wide = rounding(o[a], end[a]);
       const float up = end[a].high - o[a].low, down = o[a].high - end[a].low;
       spread_.reach += up > down ? up : down;
-      o[a] = {end[a].low - rounding, end[a].high + rounding};
+      o[a] = {end[a].low - wide, end[a].high + wide};
       scale[a] = 0x1p-19f * (max_coordinate_ + largest);
     }
     v.tnear = v.tnear - t.high * (1.0f + 0x1p-20f);

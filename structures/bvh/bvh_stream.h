@@ -24,10 +24,10 @@ inline constexpr unsigned kGroupsInTurn = 8;
 template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
 class Stream {
  public:
-  /// Takes ray order[i] as the i-th, or ray i where `order` is empty.
+  /// Takes ray order[i] as the i-th, or ray i where `order` is empty; fewer than 2^32 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, std::span<const std::uint32_t> order, Counting counting)
       : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
-        order_(order), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * stack_entries_), groups_(count_) {}
+        order_(order), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * stack_entries_), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report>
@@ -257,7 +257,7 @@ class Stream {
   const unsigned count_;
   const std::size_t stack_entries_;
   std::vector<Entry> stacks_;
-  std::vector<Group> groups_;
+  const std::unique_ptr<Group[]> groups_;
   std::size_t next_ = 0;
   std::uint32_t list_[8][kRays];
   unsigned waiting_[8] = {};
