@@ -255,13 +255,18 @@ TEST_CASE("lanes by depth, switches and queue lengths: packets, hybrids and queu
   CHECK(two_by_two.queue_rounds == 4);
   CHECK(two_by_two.nodes_queued == 8);
 
-  // Sixty-four rays of one direction, then as many in all directions: `auto` takes the first for packets.
-  std::vector<Ray> tiles(64, kThroughAll);
-  for (unsigned i = 0; i < 64; ++i) tiles.push_back({{-5, 0, 0}, 0, {i % 2 ? 1.0f : -1.0f, i % 4 < 2 ? 1.0f : -1.0f, i % 3 ? 1.0f : -1.0f}, kInfinity});
+  // Four tiles of rays of one direction, as many of rays in all directions, four of one again and one tile more of all: `auto` takes those of one
+  // direction for packets, and changes for no single tile.
+  std::vector<Ray> tiles;
+  const auto add_tile = [&](bool coherent) {
+    for (unsigned i = 0; i < 64; ++i)
+      tiles.push_back(coherent ? kThroughAll : Ray{{-5, 0, 0}, 0, {i % 2 ? 1.0f : -1.0f, i % 4 < 2 ? 1.0f : -1.0f, i % 3 ? 1.0f : -1.0f}, kInfinity});
+  };
+  for (int tile = 0; tile < 13; ++tile) add_tile((tile < 4 || tile >= 8) && tile != 12);
   Counters chosen;
   (void)closest_hit(kernel("auto"), *tree.accel, tiles, {}, &chosen);
-  CHECK(chosen.rays == 128);
-  CHECK(chosen.rays_in_packets == 64);
+  CHECK(chosen.rays == 13 * 64);
+  CHECK(chosen.rays_in_packets == 9 * 64);
 
   Counters sum = packet;
   sum += hybrid, sum += queued;
