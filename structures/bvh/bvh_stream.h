@@ -24,10 +24,10 @@ inline constexpr unsigned kGroupsInTurn = 8;
 template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
 class Stream {
  public:
-  /// Takes ray order[i] as the i-th, or ray i where `order` is empty; fewer than 2^32 rays.
-  Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, std::span<const std::uint32_t> order, Counting counting)
+  /// 1 to 2^32 - 1 rays.
+  Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
       : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
-        order_(order), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * stack_entries_), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
+        order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * stack_entries_), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report>
@@ -253,7 +253,7 @@ class Stream {
   const LeafForm& form_;
   const Counting counting_;
   const RayBatch rays_;
-  const std::span<const std::uint32_t> order_;
+  const std::vector<std::uint32_t> order_;  ///< the i-th ray to be taken is order_[i], or i where it is empty
   const unsigned count_;
   const std::size_t stack_entries_;
   std::vector<Entry> stacks_;
@@ -264,26 +264,9 @@ class Stream {
   BoxRays lanes_;
 };
 
-template <int N, class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
-void trace_stream(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
-  if (rays.size() == 0) return;
-  const std::vector<std::uint32_t> order = row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>();
-  Stream<N, Leaves, Padded, AnyHit, Counting>(static_cast<const bvh::Bvh<N>&>(a), row, rays, order, Counting(counters)).run(report);
-  if constexpr (Counting::kCounting) counters->rays += rays.size();
-}
-
-template <int N>
-struct BvhStream {
-  template <class Leaves, bool Padded, class Counting>
-  static RowFunctions functions() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-              trace_stream<N, Leaves, Padded, false, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-            },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-              trace_stream<N, Leaves, Padded, true, Counting>(a, row, rays, counters,
-                                                              [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-            }};
-  }
+/// Of a kind of stream, `Streams<N, Leaves, Padded, AnyHit, Counting>`, the functions of the kernel table.
+template <template <int, class, bool, bool, class> class Streams, int N>
+struct StreamFunctions {
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
     return functions<Leaves, Padded, NoCounters>();
@@ -292,7 +275,27 @@ struct BvhStream {
   static RowFunctions counting() {
     return functions<CalledLeaves, Padded, WithCounters>();
   }
+
+ private:
+  template <class Leaves, bool Padded, class Counting>
+  static RowFunctions functions() {
+    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+              trace<Leaves, Padded, false, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+            },
+            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+              trace<Leaves, Padded, true, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
+            }};
+  }
+  template <class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
+  static ARBORETUM_INLINE void trace(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
+    if (rays.size() == 0) return;
+    Streams<N, Leaves, Padded, AnyHit, Counting>(static_cast<const bvh::Bvh<N>&>(a), row, rays, Counting(counters)).run(report);
+    if constexpr (Counting::kCounting) counters->rays += rays.size();
+  }
 };
+
+template <int N>
+using BvhStream = StreamFunctions<Stream, N>;
 
 /// `stream` takes the rays as they come, `stream_sorted` by octant and origin.
 template <int N>

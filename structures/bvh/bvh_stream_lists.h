@@ -12,7 +12,7 @@
 // done (any hit) or have found something nearer than the box leave a list when its turn comes.
 #pragma once
 
-#include "structures/bvh/bvh_single.h"
+#include "structures/bvh/bvh_stream.h"
 #include "traversal/kernel_rows.h"
 #include "traversal/usual_leaves.h"
 
@@ -246,35 +246,6 @@ class StreamLists {
   LeafState* const leaf_states_;
 };
 
-template <int N, class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
-void trace_stream_lists(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
-  if (rays.size() == 0) return;
-  StreamLists<N, Leaves, Padded, AnyHit, Counting>(static_cast<const bvh::Bvh<N>&>(a), row, rays, Counting(counters)).run(report);
-  if constexpr (Counting::kCounting) counters->rays += rays.size();
-}
-
-template <int N>
-struct BvhStreamLists {
-  template <class Leaves, bool Padded, class Counting>
-  static RowFunctions functions() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-              trace_stream_lists<N, Leaves, Padded, false, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-            },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-              trace_stream_lists<N, Leaves, Padded, true, Counting>(a, row, rays, counters,
-                                                              [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-            }};
-  }
-  template <class Leaves, bool Padded>
-  static RowFunctions timed() {
-    return functions<Leaves, Padded, NoCounters>();
-  }
-  template <bool Padded>
-  static RowFunctions counting() {
-    return functions<CalledLeaves, Padded, WithCounters>();
-  }
-};
-
 /// What they have compiled in: one leaf, since each costs a unit two seconds to compile.
 using StreamListLeaves = std::conditional_t<
     kRegisterWidth == 1, TypeList<>,
@@ -282,7 +253,7 @@ using StreamListLeaves = std::conditional_t<
 
 template <int N>
 void add_stream_list_rows(KernelRows& rows) {
-  add_rows<bvh::Bvh<N>, BvhStreamLists<N>>(rows, "stream_lists", StreamListLeaves{});
+  add_rows<bvh::Bvh<N>, StreamFunctions<StreamLists, N>>(rows, "stream_lists", StreamListLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
