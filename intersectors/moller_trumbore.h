@@ -13,7 +13,10 @@ template <class F>
 struct MollerTrumboreTerms {
   vec3<F> n, c;
   F det, u, v;
-  ARBORETUM_INLINE MollerTrumboreTerms(vec3<F> v0, vec3<F> e1, vec3<F> e2, vec3<F> o, vec3<F> d) : n(cross(e2, e1)), c(v0 - o) {
+  ARBORETUM_INLINE MollerTrumboreTerms(vec3<F> v0, vec3<F> e1, vec3<F> e2, vec3<F> o, vec3<F> d) : MollerTrumboreTerms(cross(e2, e1), v0 - o) { meet(e1, e2, d); }
+  /// Of a triangle and an origin; meet() does the rest.
+  ARBORETUM_INLINE MollerTrumboreTerms(vec3<F> normal, vec3<F> from_origin) : n(normal), c(from_origin) {}
+  ARBORETUM_INLINE void meet(vec3<F> e1, vec3<F> e2, vec3<F> d) {
     const vec3<F> r = cross(c, d);
     det = dot(n, d), u = dot(r, e2), v = dot(r, e1);
   }
@@ -33,19 +36,29 @@ struct MollerTrumbore {
   /// Lanes whose closed triangle the line meets, whatever t is; `hits` is set only where that is any lane.
   template <class Block>
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
-    constexpr int W = Block::kWidth;
-    using F = vf<W>;
-    const vf3<W> v0{F::load(block.v0[0]), F::load(block.v0[1]), F::load(block.v0[2])};
-    vf3<W> e1, e2;
-    if constexpr (Block::kForm == TriangleForm::edges) {
-      e1 = {F::load(block.e1[0]), F::load(block.e1[1]), F::load(block.e1[2])};
-      e2 = {F::load(block.e2[0]), F::load(block.e2[1]), F::load(block.e2[2])};
-    } else {
-      e1 = v0 - vf3<W>{F::load(block.v1[0]), F::load(block.v1[1]), F::load(block.v1[2])};
-      e2 = vf3<W>{F::load(block.v2[0]), F::load(block.v2[1]), F::load(block.v2[2])} - v0;
-    }
-    return core<W>({F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)}, {F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)}, v0, e1, e2, hits);
+    using F = vf<Block::kWidth>;
+    return core<F>({F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)}, {F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)}, block,
+                   [](const float(&p)[Block::kWidth]) { return F::load(p); }, hits);
   }
+
+  /// A block as rays of one origin see it: what core() makes of origin and triangle alone, once for all of them. (With R.e2 written as d.(e2 x C), as is
+  /// usual for rays of one origin, less would be left for each ray, but it would round in another way than for rays that go alone.)
+  template <int M>
+  struct FromOrigin {
+    static constexpr int kWidth = M;
+    alignas(M * sizeof(float)) float c[3][M], n[3][M], e1[3][M], e2[3][M], n_dot_c[M];
+    alignas(M * sizeof(float)) std::uint32_t id[M];
+
+    template <class Block>
+    ARBORETUM_INLINE FromOrigin(const Block& block, Vec3f origin) {
+      using F = vf<M>;
+      const auto store = [](vf3<M> from, float(&to)[3][M]) { from.x.store(to[0]), from.y.store(to[1]), from.z.store(to[2]); };
+      const Corners<F> t = corners(block, [](const float(&p)[M]) { return F::load(p); });
+      const MollerTrumboreTerms<F> terms(cross(t.e2, t.e1), t.v0 - vf3<M>{F(origin.x), F(origin.y), F(origin.z)});
+      store(terms.c, c), store(terms.n, n), store(t.e1, e1), store(t.e2, e2), dot(terms.n, terms.c).store(n_dot_c);
+      std::memcpy(id, block.id, sizeof id);
+    }
+  };
 
   /// What a packet keeps beside its rays: nothing.
   struct PacketData {
@@ -63,30 +76,53 @@ struct MollerTrumbore {
   template <int W, class Block>
   static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData&, int /*group*/, int k, const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
     using F = vf<W>;
-    const auto all = [i](const float(&p)[3][Block::kWidth]) { return vf3<W>{F(p[0][i]), F(p[1][i]), F(p[2][i])}; };
     const auto load = [k](const float(&p)[3][PacketRays::kMost]) { return vf3<W>{F::load(p[0] + k), F::load(p[1] + k), F::load(p[2] + k)}; };
-    const vf3<W> v0 = all(block.v0);
-    vf3<W> e1, e2;
-    if constexpr (Block::kForm == TriangleForm::edges) {
-      e1 = all(block.e1), e2 = all(block.e2);
-    } else {
-      e1 = v0 - all(block.v1), e2 = all(block.v2) - v0;
-    }
     again = vm<W>(false);
-    return core<W>(load(rays.origin), load(rays.direction), v0, e1, e2, hits);
+    return core<F>(load(rays.origin), load(rays.direction), block, [i](const float(&p)[Block::kWidth]) { return F(p[i]); }, hits);
   }
 
  private:
-  template <int W>
-  static ARBORETUM_INLINE vm<W> core(vf3<W> o, vf3<W> d, vf3<W> v0, vf3<W> e1, vf3<W> e2, TriangleHits<W>& hits) {
-    using F = vf<W>;
-    const MollerTrumboreTerms<F> terms(v0, e1, e2, o, d);
+  template <class F>
+  struct Corners {
+    vec3<F> v0, e1, e2;
+  };
+  /// `get(row)` gives the lanes of a row of the block.
+  template <class Get, int M>
+  static ARBORETUM_INLINE auto three(const Get& get, const float (&rows)[3][M]) {
+    return vec3<decltype(get(rows[0]))>{get(rows[0]), get(rows[1]), get(rows[2])};
+  }
+  template <class Block, class Get>
+  static ARBORETUM_INLINE auto corners(const Block& block, const Get& get) {
+    Corners<decltype(get(block.v0[0]))> t{three(get, block.v0), {}, {}};
+    if constexpr (Block::kForm == TriangleForm::edges) {
+      t.e1 = three(get, block.e1), t.e2 = three(get, block.e2);
+    } else {
+      t.e1 = t.v0 - three(get, block.v1), t.e2 = three(get, block.v2) - t.v0;
+    }
+    return t;
+  }
+
+  template <class F, class Block, class Get, class Hits>
+  static ARBORETUM_INLINE auto core(vec3<F> o, vec3<F> d, const Block& block, const Get& get, Hits& hits) {
+    const Corners<F> t = corners(block, get);
+    const MollerTrumboreTerms<F> terms(t.v0, t.e1, t.e2, o, d);
+    return decide(terms, [&] { return dot(terms.n, terms.c); }, hits);
+  }
+  template <class F, int M, class Get, class Hits>
+  static ARBORETUM_INLINE auto core(vec3<F> /*o*/, vec3<F> d, const FromOrigin<M>& block, const Get& get, Hits& hits) {
+    MollerTrumboreTerms<F> terms(three(get, block.n), three(get, block.c));
+    terms.meet(three(get, block.e1), three(get, block.e2), d);
+    return decide(terms, [&] { return get(block.n_dot_c); }, hits);
+  }
+
+  template <class F, class Distance, class Hits>
+  static ARBORETUM_INLINE auto decide(const MollerTrumboreTerms<F>& terms, const Distance& n_dot_c, Hits& hits) {
     const F det = terms.det, abs_det = abs(det);
-    const vi<W> sign = sign_bits(det);
+    const auto sign = sign_bits(det);
     const F u = xor_sign(terms.u, sign), v = xor_sign(terms.v, sign);
-    const vm<W> inside = (u >= F(0.0f)) & (v >= F(0.0f)) & (u + v <= abs_det) & (det != F(0.0f));
+    const auto inside = (u >= F(0.0f)) & (v >= F(0.0f)) & (u + v <= abs_det) & (det != F(0.0f));
     if (any(inside)) {
-      hits.t = xor_sign(dot(terms.n, terms.c), sign) / abs_det;
+      hits.t = xor_sign(n_dot_c(), sign) / abs_det;
       hits.u_numerator = u, hits.v_numerator = v, hits.denominator = abs_det;
     }
     return inside;

@@ -10,6 +10,7 @@
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
+#include "tests/small_meshes.h"
 #include "traversal/ray_order.h"
 
 using namespace arboretum;
@@ -307,6 +308,44 @@ TEST_CASE("rays that end in one place are occluded in packets as they are alone"
     }
     CHECK(traversals.count("packet64") == (find_structure("bvh8") ? 1u : 0u));
   }
+}
+
+// What rays of one origin share of a leaf (intersectors/moller_trumbore.h: FromOrigin) is what each would compute, and rays of nearly one do not share it.
+TEST_CASE("rays of one origin get in packets what they get alone, bit for bit") {
+  // Triangles large enough for all rays of a packet to be in one leaf, some with corners at 0 and planes through the origins.
+  TriangleMesh mesh = random_triangles(300, 0.8f, 9);
+  for (int i = 0; i < 12; ++i) {
+    const float x = 0.1f * float(i % 4), y = i % 3 == 0 ? -0.0f : 0.1f * float(i % 3);
+    add_triangle(mesh, {0, 0, 0}, {1, x, y}, {x, 1, -y}), add_triangle(mesh, {-0.0f, y, 1}, {0, -1, x}, {-1, 0, -0.0f});
+  }
+  std::vector<Ray> rays;
+  std::uint64_t drawn = 0;
+  const auto draw = [&] { return random_float(78, drawn++, 0) - 0.5f; };
+  for (const Vec3f& origin : {Vec3f{0, 0, 0}, Vec3f{0, 0, -3}, Vec3f{2, 1.5f, 0}, Vec3f{-0.3f, 0.2f, 0.1f}, mesh.vertices[4]}) {
+    for (int tile = 0; tile < 24; ++tile) {
+      const Vec3f towards = Vec3f{draw(), draw(), draw()} - origin;
+      for (int i = 0; i < 64; ++i) {
+        Vec3f from = origin;
+        if (tile % 4 == 1 && i % 7 == 0) for (std::size_t a = 0; a < 3; ++a) from[a] = from[a] == 0 ? -0.0f : from[a];
+        if (tile % 4 == 2 && i == 33) from.y = std::nextafter(from.y, 1.0f);
+        rays.push_back({from, 0.0f, towards + Vec3f{draw(), draw(), draw()} * (tile % 2 ? 0.05f : 0.4f), kInfinity});
+      }
+    }
+  }
+  Structures structures(mesh);
+  std::set<std::string_view> traversals;
+  for (const KernelRow& row : runnable_rows()) {
+    if ((!row.traversal.starts_with("packet") && row.traversal != "auto") || row.box != "padded" || depends_on_neighbours(row)) continue;
+    INFO(name_of(row));
+    const Accel& accel = structures.get(row);
+    const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+    REQUIRE(single);
+    const std::vector<Hit> alone = closest_hit(*single, accel, rays);
+    REQUIRE(std::ranges::count_if(alone, &Hit::is_hit) > std::ptrdiff_t(rays.size() / 2));
+    REQUIRE(same_bits(closest_hit(row, accel, rays), alone));
+    traversals.insert(row.traversal);
+  }
+  CHECK(traversals.count("packet64") == (find_structure("bvh8") ? 1u : 0u));
 }
 
 TEST_CASE("the order of sorted streams: every ray once, octant after octant") {

@@ -1,26 +1,30 @@
-// Up to 64 rays side by side, each with the constants of its box tests: what packets and streams keep of their rays.
+// Up to 64 rays side by side, each with the constants of its box tests.
 #pragma once
 
-#include "intersectors/triangle_hits.h"
-#include "simd/swizzle.h"
 #include "traversal/box_test.h"
+#include "traversal/lane_rays.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// Where rays with the constants r and c (BoxRay) meet a plane.
+template <class F>
+[[nodiscard]] ARBORETUM_INLINE F plane_distance(F plane, F r, F c) {
+  if constexpr (kHasFma) {
+    return msub(plane, r, c);
+  } else {
+    return (plane - c) * r;
+  }
+}
+
 /// Structures of arrays. The constants are computed W rays at a time by the operations of BoxRay, so they are the same bits.
-struct BoxRays {
-  static constexpr int kMost = PacketRays::kMost;
-  PacketRays rays;
+struct BoxRays : LaneRays {
   alignas(64) float r[3][kMost], near[3][kMost], far[3][kMost];  ///< BoxRay's r, f, g
   alignas(64) float first[kMost];  ///< distance from which boxes count
-  alignas(64) float t[kMost];      ///< beyond which they do not: tfar
-  std::uint64_t valid;        ///< rays that are rays
   std::uint64_t overflown;    ///< those whose constants overflow, so that BoxRay mended them
   std::uint64_t negative[3];  ///< by axis: the direction is negative, or -0
 
-  /// Of `count` rays, 1 to kMost, of which `ray_at(i)` is the i-th; lanes up to the next multiple of W hold no ray. `each(k)` is called for k = 0, W, 2 W ...
-  /// when the W rays from k on stand in `rays`.
+  /// As LaneRays::prepare().
   template <int W, int N, class RayAt, class Each>
   ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, bool padded, float max_coordinate, const Each& each) {
     place(count, ray_at);
@@ -29,8 +33,7 @@ struct BoxRays {
       constants<W, N>(k, padded, max_coordinate);
       each(k);
     }
-    const std::uint64_t all = count == kMost ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
-    valid &= all;
+    valid &= first_rays(count);
     if (__builtin_expect((overflown &= valid) != 0, 0)) {
       for (std::uint64_t rest = overflown; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
@@ -44,25 +47,6 @@ struct BoxRays {
   }
 
  private:
-  template <class RayAt>
-  ARBORETUM_INLINE void place(int count, const RayAt& ray_at) {
-    for (int k = 0; k < count; k += 4) {
-      vf<4> low[4], high[4];
-      for (int j = 0; j < 4; ++j) {
-        const Ray& ray = ray_at(k + j < count ? k + j : count - 1);
-        low[j] = vf<4>::load(&ray.origin), high[j] = vf<4>::load(&ray.direction);
-      }
-      transpose(low), transpose(high);
-      for (int a = 0; a < 3; ++a) low[a].store(rays.origin[a] + k), high[a].store(rays.direction[a] + k);
-      low[3].store(rays.tnear + k), high[3].store(t + k);
-    }
-    // A register may be wider than four rays.
-    for (int i = (count + 3) & ~3; i < kMost && (i & 15) != 0; ++i) {
-      for (int a = 0; a < 3; ++a) rays.origin[a][i] = rays.direction[a][i] = 0.0f;
-      rays.tnear[i] = t[i] = 0.0f;
-    }
-  }
-
   template <int W, int N>
   ARBORETUM_INLINE void constants(int k, bool padded, float max_coordinate) {
     using F = vf<W>;
@@ -70,11 +54,8 @@ struct BoxRays {
     const F o[3] = {F::load(rays.origin[0] + k), F::load(rays.origin[1] + k), F::load(rays.origin[2] + k)};
     const F d[3] = {F::load(rays.direction[0] + k), F::load(rays.direction[1] + k), F::load(rays.direction[2] + k)};
     const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-    const F infinity(std::numeric_limits<float>::infinity()), tnear = F::load(rays.tnear + k);
-    vm<W> is_ray = (tnear <= F::load(t + k)) & (largest > F(0.0f));
-    for (int a = 0; a < 3; ++a) is_ray = is_ray & (abs(o[a]) < infinity) & (abs(d[a]) < infinity);
-    valid |= std::uint64_t(is_ray.bits()) << k;
-    max_x86(tnear, F(0.0f)).store(first + k);
+    valid |= std::uint64_t(are_rays<W>(k).bits()) << k;
+    max_x86(F::load(rays.tnear + k), F(0.0f)).store(first + k);
     vm<W> overflows(false);
     for (int a = 0; a < 3; ++a) {
       F rs, fs, gs;

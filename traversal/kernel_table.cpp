@@ -45,6 +45,18 @@ const std::map<Key, const KernelRow*>& index() {
   return words;
 }
 
+/// Of a way of traversal that the structure has no row of.
+[[nodiscard]] std::string why_no_traversal(std::string_view structure, std::string_view traversal) {
+  if (const StructureEntry* entry = find_structure(structure); entry && !entry->info.only_single_rays.empty()) return std::string(entry->info.only_single_rays);
+  std::vector<std::string_view> owners;
+  for (const KernelRow& row : kernel_table())
+    if (row.traversal == traversal && std::ranges::find(owners, row.structure) == owners.end()) owners.push_back(row.structure);
+  if (owners.empty()) return "no structure of this build has it on this machine";
+  std::string words = "that is for";
+  for (std::string_view owner : owners) words.append(&owner == &owners.front() ? " " : ", ").append(owner);
+  return words;
+}
+
 }  // namespace
 
 Counters& Counters::operator+=(const Counters& o) noexcept {
@@ -96,7 +108,7 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   const std::string s(structure), l(leaf), i(intersector), b(box), t(traversal), a(to_string(isa));
   if (!any_row(structure, "", "", "", "", nullptr)) return "no kernels for " + s;
   if (!any_row(structure, "", "", "", "", &isa)) return s + " has no " + a + " kernels";
-  if (!any_row(structure, "", "", "", traversal, nullptr)) return s + " has no " + t + " traversal (docs/traversal.md says why)";
+  if (!any_row(structure, "", "", "", traversal, nullptr)) return s + " has no " + t + " traversal: " + why_no_traversal(structure, traversal);
   if (!any_row(structure, "", "", "", traversal, &isa)) return s + " has no " + t + " traversal on " + a;
   if (!any_row(structure, "", intersector, "", traversal, &isa)) return s + " has no " + i + " kernels for " + t;
   if (!any_row(structure, leaf, "", "", traversal, &isa)) return s + " has no leaf " + l + " for " + t;

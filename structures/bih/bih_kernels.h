@@ -1,114 +1,37 @@
-// The kernels of the bounding interval hierarchy: one ray, closest hit and any hit. The ray keeps the
-// interval [low, high] of t in which it is between all planes passed; a plane that ends an interval and one
-// that begins one have constants of their own, so that padded intervals hold the exact ones
-// (traversal/box_test.h). A NaN (plane and origin equal, 0 * inf) leaves an interval as it is.
+// The kernels of the bounding interval hierarchy: its ways of traversal on this instruction set.
 #pragma once
 
+#include "structures/bih/bih_packet.h"
+#include "structures/bih/bih_single.h"
 #include "structures/leaves/leaf_kernels.h"
-#include "traversal/batch_stack.h"
-#include "traversal/box_test.h"
+#include "traversal/auto_rows.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// One ray's constants by axis.
-template <bool Padded>
-struct IntervalRay {
-  float r[3], begin[3], end[3];
-  unsigned negative[3];
-
-  ARBORETUM_INLINE IntervalRay(const Ray& ray, float max_coordinate) {
-    const BoxRay<2, Padded> b(ray, max_coordinate);
-    r[0] = b.r.x, r[1] = b.r.y, r[2] = b.r.z;
-    begin[0] = b.f.x, begin[1] = b.f.y, begin[2] = b.f.z;
-    end[0] = b.g.x, end[1] = b.g.y, end[2] = b.g.z;
-    for (int a = 0; a < 3; ++a) negative[a] = unsigned(__builtin_signbit(r[a]) != 0);
-  }
-  /// Where an interval begins that a plane begins.
-  ARBORETUM_INLINE float at_begin(float plane, unsigned a) const {
-    return kHasFma ? __builtin_fmaf(plane, r[a], -begin[a]) : (plane - begin[a]) * r[a];
-  }
-  ARBORETUM_INLINE float at_end(float plane, unsigned a) const {
-    return kHasFma ? __builtin_fmaf(plane, r[a], -end[a]) : (plane - end[a]) * r[a];
-  }
-};
-
-/// The later of a beginning and a plane's; the earlier of an end and a plane's. NaN for the plane's leaves
-/// it.
-ARBORETUM_INLINE float later(float plane, float low) {
-  return plane > low ? plane : low;
-}
-ARBORETUM_INLINE float earlier(float plane, float high) {
-  return plane < high ? plane : high;
-}
-
-struct IntervalEntry {
-  std::uint32_t node;
-  float low, high;
-};
-
-struct IntervalStack : BatchStack<IntervalEntry, 128> {
-  explicit IntervalStack(const bih::Bih& tree) : BatchStack(tree.stack_entries()) {}
-};
-
 template <bool Padded, class Counting>
 struct BihSingle {
   using Scratch = IntervalStack;
+
   template <bool AnyHit, class Visits>
-  static ARBORETUM_INLINE bool trace(const bih::Bih& tree, const Ray& ray, NearestHit& best,
-                                     const Counting& counting, Scratch& stack, Visits& visits) {
-    const IntervalRay<Padded> interval(ray, tree.max_coordinate());
+  static ARBORETUM_INLINE bool trace(const bih::Bih& tree, const Ray& ray, NearestHit& best, const Counting& counting, Scratch& stack, Visits& visits) {
+    const IntervalRay interval(BoxRay<2, Padded>(ray, tree.max_coordinate()));
     float low = ray.tnear, high = best.t;
     for (unsigned a = 0; a < 3; ++a) {
       const float faces[2] = {(&tree.bounds().lower.x)[a], (&tree.bounds().upper.x)[a]};
       low = later(interval.at_begin(faces[interval.negative[a]], a), low);
       high = earlier(interval.at_end(faces[1 - interval.negative[a]], a), high);
     }
-    if (!(low <= high)) return false;
-    IntervalEntry* top = stack.data();
-    const bih::Node* const nodes = tree.nodes();
-    const bih::Node* node = nodes;
-    for (;;) {
-      const std::uint32_t kind = node->kind();
-      if (kind < bih::Node::kLeaf) {
-        const unsigned axis = kind, back = interval.negative[axis];
-        const float near_high = earlier(interval.at_end(node->clip[back], axis), high);
-        const float far_low = later(interval.at_begin(node->clip[1 - back], axis), low);
-        const bool near = low <= near_high, far = far_low <= high;
-        counting.node(2, 2, unsigned(near) + unsigned(far));
-        const std::uint32_t first = node->first();
-        if (near) {
-          if (far) *top++ = {first + 1 - back, far_low, high};
-          high = near_high, node = nodes + first + back;
-          continue;
-        }
-        if (far) {
-          low = far_low, node = nodes + first + 1 - back;
-          continue;
-        }
-      } else if (kind == bih::Node::kLeaf) {
-        if (visits(node->code())) return true;
-      } else {
-        const unsigned axis = kind - bih::Node::kClip, back = interval.negative[axis];
-        low = later(interval.at_begin(node->clip[back], axis), low);
-        high = earlier(interval.at_end(node->clip[1 - back], axis), high);
-        counting.node(1, 1, low <= high);
-        if (low <= high) {
-          node = nodes + node->first();
-          continue;
-        }
-      }
-      do {
-        if (top == stack.data()) return false;
-        --top;
-      } while (!AnyHit && top->low > best.t);
-      low = top->low, high = earlier(best.t, top->high), node = nodes + top->node;
-    }
+    return low <= high && search_bih<AnyHit>(tree, interval, tree.nodes(), low, high, best, counting, stack.data(), visits);
   }
 };
 
 inline void add_kernels(std::type_identity<bih::Bih>, KernelRows& rows) {
-  ListedLeaves<bih::Bih, BihSingle>::add(rows);
+  using Single = ListedLeaves<bih::Bih, BihSingle>;
+  Single::add(rows);
+  add_packet_rows<bih::Bih, BihPacketFamily>(rows, TypeList<>{});
+  add_rows<bih::Bih, AutoFunctions<BihPacketFamily, TypeList<>, Single::Functions>>(rows, "auto", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -15,6 +15,7 @@ const StructureInfo& BruteForce::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "every ray tests every triangle: the reference, for small scenes";
+    i.only_single_rays = "every ray tests every triangle: there is no node to share";
     i.builders = {"in_order"};
     i.uses_parameters = false;
     for (const LeafForm& form : leaf_forms()) i.leaves.push_back(form.name);

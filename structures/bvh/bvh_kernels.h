@@ -2,25 +2,29 @@
 #pragma once
 
 #include "traversal/usual_leaves.h"
-#include "structures/bvh/bvh_auto.h"
 #include "structures/bvh/bvh_ize_single.h"
-#include "structures/bvh/bvh_packet_rows.h"
+#include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
 #include "structures/bvh/bvh_stream.h"
 #include "structures/bvh/bvh_stream_lists.h"
+#include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 template <int N>
 void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
-  add_rows<bvh::Bvh<N>, typename BvhSingle<SoaTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
+  using Single = typename BvhSingle<SoaTests<N>::template Nodes>::Functions;
+  add_rows<bvh::Bvh<N>, Single>(rows, "single", UsualLeaves{});
   add_ize_rows<N>(rows);
   add_queued_rows<bvh::Bvh<N>, BvhQueue<N>::template Of, typename BvhQueue<N>::Single>(rows, BatchLeaves{});
-  add_packet_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows, BatchLeaves{});
-  add_rows<bvh::Bvh<N>, BvhAuto<N>>(rows, "auto", BatchLeaves{});
+  add_packet_rows<bvh::Bvh<N>, BvhPacketFamily<SoaPacketNodes<N>>>(rows, BatchLeaves{});
+  // Scalar kernels are the reference, not a race: independent rays go alone.
+  using Incoherent = std::conditional_t<kRegisterWidth == 1, Single, BvhStream<N>>;
+  add_rows<bvh::Bvh<N>, AutoFunctions<BvhPacketFamily<SoaPacketNodes<N>>, BatchLeaves, Incoherent, Single>>(rows, "auto", BatchLeaves{});
   add_stream_rows<N>(rows);
   add_stream_list_rows<N>(rows);
 }

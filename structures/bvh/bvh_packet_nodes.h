@@ -2,19 +2,10 @@
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
+#include "traversal/box_rays.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
-
-/// Where rays with the constants r and c (BoxRay) meet a plane.
-template <class F>
-[[nodiscard]] ARBORETUM_INLINE F plane_distance(F plane, F r, F c) {
-  if constexpr (kHasFma) {
-    return msub(plane, r, c);
-  } else {
-    return (plane - c) * r;
-  }
-}
 
 /// How packets read the nodes of bvh::SoaNodes<N>: planes k = 2 * axis + side, side 0 lower and 1 upper, of all children; where rays meet that of child i,
 /// as their own box test computes it.

@@ -7,9 +7,11 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
-#include "structures/bvh/bvh_packet_rows.h"
+#include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
+#include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -85,7 +87,8 @@ struct AosPacketNodes {
 
 inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows) {
   add_rows<bvh4_aos::Bvh4Aos, BvhSingle<AosNodeTest>::Functions>(rows, "single", UsualLeaves{});
-  add_packet_rows<bvh4_aos::Bvh4Aos, AosPacketNodes>(rows, TypeList<>{});
+  add_packet_rows<bvh4_aos::Bvh4Aos, BvhPacketFamily<AosPacketNodes>>(rows, TypeList<>{});
+  add_rows<bvh4_aos::Bvh4Aos, AutoFunctions<BvhPacketFamily<AosPacketNodes>, TypeList<>, BvhSingle<AosNodeTest>::Functions>>(rows, "auto", UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -150,6 +150,7 @@ const StructureInfo& Bvh4Motion::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "4-wide BVH of a moving scene: boxes and triangles interpolated at the ray's time (BVH4MB)";
+    i.only_single_rays = "each ray sees boxes and triangles at its own time, so rays share no node";
     i.builders = binary_builder_names();
     i.leaves = {Block::kName};
     i.holds_motion = i.needs_motion = true;

@@ -11,9 +11,11 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
-#include "structures/bvh/bvh_packet_rows.h"
+#include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
+#include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -140,7 +142,8 @@ template <int N>
 void add_kernels(std::type_identity<bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>>, KernelRows& rows) {
   using Structure = bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>;
   add_rows<Structure, typename BvhSingle<QuantisedTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
-  add_packet_rows<Structure, QuantisedPacketNodes<N>>(rows, TypeList<>{});
+  add_packet_rows<Structure, BvhPacketFamily<QuantisedPacketNodes<N>>>(rows, TypeList<>{});
+  add_rows<Structure, AutoFunctions<BvhPacketFamily<QuantisedPacketNodes<N>>, TypeList<>, typename BvhSingle<QuantisedTests<N>::template Nodes>::Functions>>(rows, "auto", UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

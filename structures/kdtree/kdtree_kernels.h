@@ -2,10 +2,12 @@
 #pragma once
 
 #include "traversal/usual_leaves.h"
-#include "structures/kdtree/kdtree_packet_rows.h"
+#include "structures/kdtree/kdtree_packet.h"
 #include "structures/kdtree/kdtree_queued.h"
 #include "structures/kdtree/kdtree_single.h"
+#include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -13,7 +15,8 @@ namespace ARBORETUM_ISA_NAMESPACE {
 inline void add_kernels(std::type_identity<kdtree::KdTree>, KernelRows& rows) {
   add_rows<kdtree::KdTree, SingleRayFunctions<KdKernel>>(rows, "single", UsualLeaves{});
   add_queued_rows<kdtree::KdTree, KdQueued, SingleRayFunctions<KdKernel>>(rows, UsualLeaves{});
-  add_kd_packet_rows(rows);
+  add_packet_rows<kdtree::KdTree, KdPacketFamily>(rows, KdPacketLeaves{});
+  add_rows<kdtree::KdTree, AutoFunctions<KdPacketFamily, KdPacketLeaves, SingleRayFunctions<KdKernel>>>(rows, "auto", UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

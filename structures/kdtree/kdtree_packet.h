@@ -17,16 +17,16 @@
 // (a ray that gets r = 2^60 / |d|max may have such an r) there is no interval, and all rays are tested everywhere.
 #pragma once
 
-#include "structures/kdtree/kdtree_packet_leaves.h"
 #include "structures/kdtree/kdtree_single.h"
+#include "traversal/packet_leaves.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// `fast` and `padded` are one class with other constants.
 template <int W, class Leaves, bool AnyHit, class Counting>
-class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
-  using Base = PacketLeaves<W, Leaves, AnyHit, Counting>;
+class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
+  using Base = PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays>;
 
  public:
   using Base::best;
@@ -37,17 +37,20 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
   void trace(const Ray* rays, int count, int threshold) {
     threshold_ = threshold;
     if constexpr (Counting::kCounting) ++counting_.counters.packets, rays_of_packet_ = unsigned(count);
+    Base::load(rays, count, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W>(count, ray_at, each); });
     Mask octants[8];
-    prepare(Base::load(rays, count), octants);
+    prepare(octants);
     for (Mask mask : octants)
       if (mask != 0) traverse(mask);
     Base::finish();
   }
+  /// Of all packets so far, how often a ray went on alone.
+  [[nodiscard]] std::size_t times_alone() const { return times_alone_; }
 
  private:
   using typename Base::Mask;
   using F = vf<W>;
-  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::kMost, Base::leaves_, Base::rays_, Base::soa_, Base::t_;
+  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::kMost, Base::lanes_, Base::leaves_, Base::rays_;
 
   /// A cell that waits, or the one at hand: its rays, where they enter and leave it, and bounds of both for all of them.
   struct alignas(64) Cell {
@@ -77,14 +80,14 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
   static ARBORETUM_INLINE F fused(F s, F r, F c) { return msub(s, r, c); }
 
   /// The constants of KdRay, W rays at a time: the same operations, so the same bits. And the rays of each octant.
-  void prepare(Mask valid, Mask (&octants)[8]) {
+  void prepare(Mask (&octants)[8]) {
     Mask negative[3] = {};
     for (int k = 0; k < chunks_ * W; k += W) {
-      const F d[3] = {F::load(soa_.direction[0] + k), F::load(soa_.direction[1] + k), F::load(soa_.direction[2] + k)};
+      const F d[3] = {F::load(lanes_.rays.direction[0] + k), F::load(lanes_.rays.direction[1] + k), F::load(lanes_.rays.direction[2] + k)};
       const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
       const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest;
       for (int a = 0; a < 3; ++a) {
-        const F o = F::load(soa_.origin[a] + k);
+        const F o = F::load(lanes_.rays.origin[a] + k);
         const vm<W> parallel = ~(abs(d[a]) > tiny);
         const F r = select(parallel, xor_sign(limit, sign_bits(d[a])), F(1.0f) / d[a]);
         const F e = select(parallel, F(KdRay::kPad), F(pad_)) * (F(max_coordinate_) + abs(o)) * abs(r) + select(parallel, F(0x1p-100f), F(pad_ * 0x1p-79f));
@@ -93,10 +96,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
         negative[a] |= Mask((sign_bits(r) < vi<W>(0)).bits()) << k;
       }
     }
-    for (unsigned octant = 0; octant < 8; ++octant) {
-      octants[octant] = valid;
-      for (unsigned a = 0; a < 3; ++a) octants[octant] &= (octant >> a & 1u) ? negative[a] : ~negative[a];
-    }
+    Base::octants(negative, octants);
   }
 
   /// Also tells the leaves what they need of the group. Rays that fill two registers or less are not worth an interval of planes.
@@ -106,7 +106,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
     if (!v.usable && !Leaves::kRaysInLanes) return v;
     for (int a = 0; a < 3; ++a) {
       float o0, o1;
-      Base::range(soa_.origin[a], group, o0, o1), Base::range(r_[a], group, v.r0[a], v.r1[a]);
+      Base::range(lanes_.rays.origin[a], group, o0, o1), Base::range(r_[a], group, v.r0[a], v.r1[a]);
       const bool down = __builtin_signbit(v.r0[a]) != 0;
       const float r = down ? -v.r0[a] : v.r1[a], o = -o0 > o1 ? -o0 : o1;
       v.low_origin[a] = down ? o0 : o1, v.high_origin[a] = down ? o1 : o0;
@@ -124,7 +124,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
       const unsigned in = Base::lanes_of(group, c);
       if (in == 0) continue;
       const int k = c * W;
-      F begin = F::load(soa_.tnear + k), end = F::load(t_ + k);
+      F begin = F::load(lanes_.rays.tnear + k), end = F::load(lanes_.t + k);
       for (int a = 0; a < 3; ++a) {
         const float low = (&bounds_.lower.x)[a], high = (&bounds_.upper.x)[a];
         const F r = F::load(r_[a] + k);
@@ -166,6 +166,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
     unsigned far_side[3];  // byte offset within a pair of the child that rays come to last
     for (int a = 0; a < 3; ++a) far_side[a] = __builtin_signbit(r_[a][__builtin_ctzll(group)]) ? 0u : 8u;
     const Interval interval = interval_of(group);
+    Base::look_for_common_origin(group);
     Cell* const stack = stack_.data();
     Cell* top = stack;  // the cell at hand; those below wait
     typename Counting::Depths depths{typename Counting::Depth{}};
@@ -181,6 +182,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
         const unsigned axis = link & 3u;
         if (axis == 3) break;
         if (__builtin_popcountll(mask) <= threshold_) {
+          times_alone_ += unsigned(__builtin_popcountll(mask));
           if constexpr (Counting::kCounting) ++counting_.counters.switches, counting_.counters.rays_alone += unsigned(__builtin_popcountll(mask));
           for (; mask; mask &= mask - 1) alone(__builtin_ctzll(mask), node, *top, far_side, depths.current());
           goto pop;
@@ -253,7 +255,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
       const unsigned in = Base::lanes_of(mask, c);
       if (in == 0) continue;
       const int k = c * W;
-      const F begin = F::load(cell.begin + k), t = F::load(t_ + k), end = min_x86(F::load(cell.end + k), t);
+      const F begin = F::load(cell.begin + k), t = F::load(lanes_.t + k), end = min_x86(F::load(cell.end + k), t);
       end.store(cell.end + k);
       const vm<W> here = ~(begin > t) & vm<W>::from_bits(in);
       left |= Mask(here.bits()) << k;
@@ -268,7 +270,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
     for (int a = 0; a < 3; ++a) planes.r[a] = r_[a][i], planes.enter[a] = enter_[a][i], planes.leave[a] = leave_[a][i], planes.far[a] = far_side[a];
     auto&& ray = Base::data(i);
     if (search(node, cell.begin[i], cell.end[i], planes, rays_[i], ray, best_[i], depth)) Base::occluded(i);
-    t_[i] = best_[i].t;
+    lanes_.t[i] = best_[i].t;
   }
   __attribute__((noinline)) bool search(std::uint64_t node, float begin, float end, const KdRay& planes, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
                                         typename Counting::Depth depth) {
@@ -298,11 +300,24 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting> {
   const Bounds3f bounds_;
   const float max_coordinate_, pad_;
   int threshold_ = 0;
+  std::size_t times_alone_ = 0;
   unsigned rays_of_packet_ = 0;
   alignas(64) float r_[3][kMost], enter_[3][kMost], leave_[3][kMost];
   BatchStack<Cell, 64> stack_;
   KdStack single_stack_;
 };
+
+/// As traversal/packet_rows.h wants it.
+struct KdPacketFamily {
+  static constexpr bool kFewerLanes = false;
+  template <int W, class Leaves, bool AnyHit, class Counting>
+  using Packets = KdPackets<W, Leaves, AnyHit, Counting>;
+};
+
+/// What the wider packets have compiled in: one leaf, since each costs a unit seconds to compile.
+using KdPacketLeaves = std::conditional_t<
+    kRegisterWidth == 1, TypeList<>,
+    std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>>, TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>>>>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

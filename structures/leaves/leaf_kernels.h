@@ -73,7 +73,8 @@ struct ListedLeaves {
     typename Walk<Padded, Counting>::Scratch scratch_;
   };
 
-  static void add(KernelRows& rows) { add_rows<Structure, SingleRayFunctions<Kernel>>(rows, "single", TypeList<>{}); }
+  using Functions = SingleRayFunctions<Kernel>;
+  static void add(KernelRows& rows) { add_rows<Structure, Functions>(rows, "single", TypeList<>{}); }
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -97,6 +97,7 @@ const StructureInfo& TwoLevel::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "a BVH over instances, a structure of another kind (parameter below) for each prototype";
+    i.only_single_rays = "each ray enters an instance's own space, where it is another ray: what packets and streams share is lost at every instance";
     i.builders = binary_builder_names();
     i.takes_below = true;
     for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });

@@ -1,15 +1,15 @@
 // Packets as rows of the kernel table: packet4 to packet64, hybrid4 to hybrid16.
 #pragma once
 
-#include "structures/bvh/bvh_packet.h"
 #include "traversal/kernel_rows.h"
-#include "traversal/usual_leaves.h"
+#include "traversal/packet_leaves.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone.
-template <class Format, int W, class Leaves, class Counting>
+/// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone. `Family::Packets<W, Leaves, AnyHit, Counting>` is a
+/// structure's class for packets of W rays a register.
+template <class Family, int W, class Leaves, class Counting>
 struct PacketBatch {
   static __attribute__((noinline)) std::size_t closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
     return packets<false>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
@@ -22,7 +22,7 @@ struct PacketBatch {
  private:
   template <bool AnyHit, class Report>
   static ARBORETUM_INLINE std::size_t packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
-    BvhPackets<Format, W, Leaves, AnyHit, Counting> packet(static_cast<const bvh::BvhBase&>(accel), row, Counting(counters));
+    typename Family::template Packets<W, Leaves, AnyHit, Counting> packet(accel, row, Counting(counters));
     for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
       const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
       packet.trace(&rays[begin], count, threshold);
@@ -34,8 +34,8 @@ struct PacketBatch {
 };
 
 /// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone. Of `Hybrid` ones the batch may set it.
-template <class Format, int Rays, int Threshold, bool Hybrid = false>
-struct BvhPacketFunctions {
+template <class Family, int Rays, int Threshold, bool Hybrid = false>
+struct PacketFunctions {
   static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
 
   template <class Batch>
@@ -48,26 +48,26 @@ struct BvhPacketFunctions {
   }
   template <class Leaves, bool>
   static RowFunctions timed() {
-    return functions<PacketBatch<Format, (Rays < kNative ? Rays : kNative), Leaves, NoCounters>>();
+    return functions<PacketBatch<Family, Family::kFewerLanes && Rays < kNative ? Rays : kNative, Leaves, NoCounters>>();
   }
   /// What is visited does not depend on the lanes.
   template <bool>
   static RowFunctions counting() {
-    return functions<PacketBatch<Format, kNative, CalledLeaves, WithCounters>>();
+    return functions<PacketBatch<Family, kNative, CalledLeaves, WithCounters>>();
   }
 };
 
-/// `Compiled`: what packet64 has compiled in.
-template <class Structure, class Format, class Compiled>
+/// `Compiled`: what packet32 and packet64 have compiled in. `Family::kFewerLanes`: packets of fewer rays than a register holds have narrower registers.
+template <class Structure, class Family, class Compiled>
 void add_packet_rows(KernelRows& rows, Compiled compiled) {
-  add_rows<Structure, BvhPacketFunctions<Format, 4, 0>>(rows, "packet4", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 8, 0>>(rows, "packet8", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 16, 0>>(rows, "packet16", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 32, 4>>(rows, "packet32", compiled);
-  add_rows<Structure, BvhPacketFunctions<Format, 64, 6>>(rows, "packet64", compiled);
-  add_rows<Structure, BvhPacketFunctions<Format, 4, 1, true>>(rows, "hybrid4", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 8, 2, true>>(rows, "hybrid8", TypeList<>{});
-  add_rows<Structure, BvhPacketFunctions<Format, 16, 3, true>>(rows, "hybrid16", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 4, 0>>(rows, "packet4", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 8, 0>>(rows, "packet8", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 16, 0>>(rows, "packet16", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 32, 4>>(rows, "packet32", compiled);
+  add_rows<Structure, PacketFunctions<Family, 64, 6>>(rows, "packet64", compiled);
+  add_rows<Structure, PacketFunctions<Family, 4, 1, true>>(rows, "hybrid4", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 8, 2, true>>(rows, "hybrid8", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 16, 3, true>>(rows, "hybrid16", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -1,20 +1,21 @@
 // `auto`: looks at a batch's rays, tile by tile, and hands runs of like tiles to the way of traversal that suits them.
 //
 // A tile of 64 rays is coherent when a sample of its rays leaves no wide cone: their directions lie close together. Such tiles go as packets,
-// whose interval test then decides for most rays at once; the others go as streams, whose rays share nodes as long as they can and hide each other's
-// latency after that. Whether packets hold together depends on the scene as well: where triangles are small, rays that are close together meet different ones, and
-// packets that let too many of their rays go on alone hand the tiles that follow to streams, for a while. What a mode
+// whose interval test then decides for most rays at once; the others go as the structure's best way for rays that share little: the BVHs' streams, whose rays share nodes
+// as long as they can and hide each other's latency after that; single rays where there are none. Whether packets hold together depends on the scene as well: where triangles are small, rays that are close together meet different ones, and
+// packets that let too many of their rays go on alone hand the tiles that follow to the other way, for a while. What a mode
 // costs for the wrong rays is in docs/performance.md. Every way gives the same hits, so the choice changes no answer.
 #pragma once
 
-#include "structures/bvh/bvh_packet_rows.h"
-#include "structures/bvh/bvh_stream.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-template <int N>
-struct BvhAuto {
+/// `Family` as in traversal/packet_rows.h; `CompiledPackets`: a TypeList of the leaves that its packets have compiled in. `Incoherent` and `Alone` (traversal/kernel_rows.h): the other way, and
+/// the one for batches of a few rays.
+template <class Family, class CompiledPackets, class Incoherent, class Alone = Incoherent>
+struct AutoFunctions {
   static constexpr std::size_t kTile = 64;
   /// Of the directions' own length, the half extent of those that still count as coherent. Rays towards a light fan out the more the nearer it is, and
   /// share their end all the same.
@@ -25,9 +26,11 @@ struct BvhAuto {
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
   static constexpr int kThreshold = 6;  ///< packet64's
+  /// Smaller batches are too few to share anything.
+  static constexpr std::size_t kFew = kTile / 4;
 
   [[nodiscard]] static bool coherent(const Ray* rays, std::size_t count, float cone) {
-    if (count < kTile / 4) return false;
+    if (count < kFew) return false;
     vf<4> low(std::numeric_limits<float>::infinity()), high(-std::numeric_limits<float>::infinity());
     const std::size_t stride = count / 8;
     for (std::size_t i = 0; i < count; i += stride) {
@@ -73,32 +76,38 @@ struct BvhAuto {
     run(rays.size(), kind);
   }
 
-  /// Scalar kernels are the reference, not a race: independent rays go alone.
-  using Incoherent = std::conditional_t<kRegisterWidth == 1, typename BvhSingle<SoaTests<N>::template Nodes>::Functions, BvhStream<N>>;
   static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
 
-  template <class Packets, RowFunctions (*Other)()>
+  template <class Packets, RowFunctions (*Other)(), RowFunctions (*Few)()>
   struct Batch {
     static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+      if (rays.size() < kFew) return Few().closest_hit(accel, row, rays, hits, counters);
       runs(
           rays, kCone, [&](std::size_t begin, std::size_t count) { return Packets::closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters, int(kTile), kThreshold); },
           [&](std::size_t begin, std::size_t count) { Other().closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters); });
     }
     static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+      if (rays.size() < kFew) return Few().any_hit(accel, row, rays, occluded, counters);
       runs(
           rays, kAnyHitCone, [&](std::size_t begin, std::size_t count) { return Packets::any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters, int(kTile), kThreshold); },
           [&](std::size_t begin, std::size_t count) { Other().any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters); });
     }
   };
 
+  template <class Leaves, class... Compiled>
+  static constexpr bool holds(TypeList<Compiled...>) {
+    return (std::is_same_v<Leaves, Compiled> || ...);
+  }
+
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
-    using B = Batch<PacketBatch<SoaPacketNodes<N>, kNative, Leaves, NoCounters>, &Incoherent::template timed<Leaves, Padded>>;
+    using Packets = std::conditional_t<holds<Leaves>(CompiledPackets{}), Leaves, CalledLeaves>;
+    using B = Batch<PacketBatch<Family, kNative, Packets, NoCounters>, &Incoherent::template timed<Leaves, Padded>, &Alone::template timed<Leaves, Padded>>;
     return {&B::closest_hit, &B::any_hit};
   }
   template <bool Padded>
   static RowFunctions counting() {
-    using B = Batch<PacketBatch<SoaPacketNodes<N>, kNative, CalledLeaves, WithCounters>, &Incoherent::template counting<Padded>>;
+    using B = Batch<PacketBatch<Family, kNative, CalledLeaves, WithCounters>, &Incoherent::template counting<Padded>, &Alone::template counting<Padded>>;
     return {&B::closest_hit, &B::any_hit};
   }
 };

@@ -3,17 +3,18 @@
 // (traversal/packet_interval.h). Each ray gets the bits that it would get alone.
 #pragma once
 
+#include "traversal/lane_rays.h"
 #include "traversal/leaves.h"
 #include "traversal/packet_interval.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// W rays a register.
-template <int W, class Leaves, bool AnyHit, class Counting>
+/// W rays a register. `Rays`: LaneRays, or what a structure makes of them.
+template <int W, class Leaves, bool AnyHit, class Counting, class Rays>
 class PacketLeaves {
  public:
-  static constexpr int kMost = PacketRays::kMost;
+  static constexpr int kMost = LaneRays::kMost;
   using Mask = std::uint64_t;
 
   PacketLeaves(const KernelRow& row, const Vec3f* vertices, Counting counting) : leaves_(row, vertices), form_(*row.tests->form), counting_(counting) {}
@@ -24,49 +25,39 @@ class PacketLeaves {
   using F = vf<W>;
   static constexpr unsigned kAll = (1u << W) - 1u;
 
-  /// Takes `count` rays, 1 to kMost, none of which has met anything. Returns those that are valid (core/ray.h).
-  Mask load(const Ray* rays, int count) {
+  /// Takes `count` rays, 1 to kMost, none of which has met anything. `prepare(ray_at, each)` hands these to the prepare() of lanes_.
+  template <class Prepare>
+  ARBORETUM_INLINE void load(const Ray* rays, int count, const Prepare& prepare) {
     rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0};
-    for (int i = 0; i < count; ++i) {
-      const Ray& ray = rays[i];
-      soa_.origin[0][i] = ray.origin.x, soa_.origin[1][i] = ray.origin.y, soa_.origin[2][i] = ray.origin.z;
-      soa_.direction[0][i] = ray.direction.x, soa_.direction[1][i] = ray.direction.y, soa_.direction[2][i] = ray.direction.z;
-      soa_.tnear[i] = ray.tnear, t_[i] = ray.tfar;
-      best_[i] = NearestHit{ray.tfar};
-    }
-    for (int i = count; i < chunks_ * W; ++i) {  // not valid: no direction
-      for (int a = 0; a < 3; ++a) soa_.origin[a][i] = soa_.direction[a][i] = 0.0f;
-      soa_.tnear[i] = t_[i] = 0.0f;
-    }
-    valid_ = 0;
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
-    const F infinity(std::numeric_limits<float>::infinity());
-    for (int c = 0; c < chunks_; ++c) {
-      const int k = c * W;
-      vm<W> valid = F::load(soa_.tnear + k) <= F::load(t_ + k), moves(false);
-      for (int a = 0; a < 3; ++a) {
-        const F d = F::load(soa_.direction[a] + k);
-        valid = valid & (abs(F::load(soa_.origin[a] + k)) < infinity) & (abs(d) < infinity), moves = moves | (d != F(0.0f));
-      }
-      valid_ |= Mask((valid & moves).bits()) << k;
-      if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(soa_, k);
-    }
+    prepare([this](int i) -> const Ray& { return rays_[i]; },
+            [this](int k) {
+              if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(lanes_.rays, k);
+            });
+    for (int i = 0; i < count; ++i) best_[i] = NearestHit{lanes_.t[i]};
     if constexpr (!Leaves::kRaysInLanes) {
-      for (Mask rest = valid_; rest; rest &= rest - 1) {
+      for (Mask rest = lanes_.valid; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
         new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(rays_[i]));
       }
     }
-    return valid_;
   }
 
   void finish() {
     if constexpr (!AnyHit) {
-      for (Mask rest = valid_; rest; rest &= rest - 1) {
+      for (Mask rest = lanes_.valid; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
         auto&& ray = data(i);
         leaves_.finish(ray, best_[i]);
       }
+    }
+  }
+
+  /// The valid rays of each octant, -0 being a negative direction.
+  void octants(const Mask (&negative)[3], Mask (&of)[8]) const {
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      of[octant] = lanes_.valid;
+      for (unsigned a = 0; a < 3; ++a) of[octant] &= (octant >> a & 1u) ? negative[a] : ~negative[a];
     }
   }
 
@@ -82,11 +73,19 @@ class PacketLeaves {
     low = reduce_min(least), high = -reduce_min(-most);
   }
 
-  /// Before leaves are met by rays of `group`, whose origins and directions lie in these intervals.
+  /// Beyond which no ray of `mask` meets anything that counts.
+  [[nodiscard]] float farthest(Mask mask) const {
+    float low, high;
+    range(lanes_.t, mask, low, high);
+    return high;
+  }
+
+  /// Before leaves are met by rays of `group`: for each axis, the interval of their origins, or of points on their lines that are no farther from those than
+  /// `spread_.reach`.
   void set_axis([[maybe_unused]] int axis, [[maybe_unused]] float o_low, [[maybe_unused]] float o_high, [[maybe_unused]] Mask group) {
     if constexpr (Leaves::kRaysInLanes) {
       float d_low, d_high;
-      range(soa_.direction[axis], group, d_low, d_high);
+      range(lanes_.rays.direction[axis], group, d_low, d_high);
       spread_.set_axis(axis, o_low, o_high, d_low, d_high);
     }
   }
@@ -104,6 +103,20 @@ class PacketLeaves {
 
   void occluded(int i) { best_[i].primitive = 0, active_ &= ~(Mask{1} << i); }
 
+  /// Before leaves are met by rays of `group`: whether their origins are the same, bit for bit.
+  void look_for_common_origin([[maybe_unused]] Mask group) {
+    if constexpr (kSeesFromOrigin) {
+      origin_of_ = __builtin_ctzll(group);
+      Mask others = 0;
+      for (int c = 0; c < chunks_; ++c) {
+        vm<W> same(true);
+        for (const auto& origin : lanes_.rays.origin) same = same & (vi<W>::load(origin + c * W) == vi<W>(__builtin_bit_cast(std::int32_t, origin[origin_of_])));
+        others |= ~same.bits() & lanes_of(group, c);
+      }
+      common_origin_ = others == 0;
+    }
+  }
+
   void leaf(const std::byte* blocks, unsigned count, Mask mask) {
     if constexpr (Leaves::kRaysInLanes) {
       if (__builtin_popcountll(mask) >= kWorthLanes) {
@@ -119,6 +132,14 @@ class PacketLeaves {
   using RayData = typename Leaves::RayData;
   /// From so many rays on the triangles of a leaf are looked at together.
   static constexpr int kWorthLanes = 16;
+  /// The intersector has a form of a block for rays of one origin.
+  static constexpr bool kSeesFromOrigin = [] {
+    if constexpr (Leaves::kRaysInLanes && !AnyHit) {
+      return requires { typename Leaves::Intersector::template FromOrigin<Leaves::Block::kWidth>; };
+    } else {
+      return false;
+    }
+  }();
 
   void one_by_one(const std::byte* blocks, unsigned count, Mask mask) {
     for (; mask; mask &= mask - 1) {
@@ -128,21 +149,38 @@ class PacketLeaves {
       if constexpr (AnyHit) {
         if (leaves_.any_hit(ray, blocks, count, rays_[i].tnear, rays_[i].tfar)) occluded(i);
       } else {
-        if (leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) t_[i] = best_[i].t;
+        if (leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) lanes_.t[i] = best_[i].t;
       }
     }
   }
 
-  /// One block against the rays of `mask`: its triangles in lanes for each ray, or rays in lanes for each triangle that is left, whichever is less work.
+  /// One block against the rays of `mask`, those of its triangles left out that none of them can hit.
   template <class Block>
   void test_block(const Block& block, Mask mask) {
-    const auto* const bytes = reinterpret_cast<const std::byte*>(&block);
     if constexpr (AnyHit) mask &= active_;
-    unsigned triangles = interval_triangles(spread_, block);
+    const unsigned triangles = interval_triangles(spread_, block);
     if (triangles == 0) return;
+    if constexpr (kSeesFromOrigin) {
+      if (common_origin_) {
+        const typename Leaves::Intersector::template FromOrigin<Block::kWidth> seen(block, rays_[origin_of_].origin);
+        return test_triangles(seen, triangles, mask, [&](Mask rays) {
+          for (; rays; rays &= rays - 1) {
+            const int i = __builtin_ctzll(rays);
+            auto&& ray = data(i);
+            if (closest_hit_block<typename Leaves::Intersector>(ray, seen, rays_[i].tnear, best_[i])) lanes_.t[i] = best_[i].t;
+          }
+        });
+      }
+    }
+    test_triangles(block, triangles, mask, [&](Mask rays) { one_by_one(reinterpret_cast<const std::byte*>(&block), 1, rays); });
+  }
+
+  /// The triangles in lanes for each ray, or rays in lanes for each triangle, whichever is less work.
+  template <class Block, class OneByOne>
+  ARBORETUM_INLINE void test_triangles(const Block& block, unsigned triangles, Mask mask, const OneByOne& each_alone) {
     int chunks = 0;
     for (int c = 0; c < chunks_; ++c) chunks += lanes_of(mask, c) != 0;
-    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth)) return one_by_one(bytes, 1, mask);
+    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth)) return each_alone(mask);
     Mask again = 0;
     for (; triangles; triangles &= triangles - 1) {
       const int i = __builtin_ctz(triangles);
@@ -152,7 +190,7 @@ class PacketLeaves {
       }
       if constexpr (AnyHit) mask &= active_;
     }
-    if (__builtin_expect(again != 0, 0)) one_by_one(bytes, 1, again);
+    if (__builtin_expect(again != 0, 0)) each_alone(again);
   }
 
   template <class Block>
@@ -164,10 +202,10 @@ class PacketLeaves {
       if (in == 0) continue;
       TriangleHits<W> hits;
       vm<W> redo;
-      const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(soa_, packet_, group, k, block, triangle, hits, redo);
+      const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, block, triangle, hits, redo);
       again |= Mask(redo.bits() & in) << k;
       if ((inside.bits() & in) == 0) continue;
-      unsigned hit = in & (inside & (hits.t <= F::load(t_ + k)) & (hits.t >= F::load(soa_.tnear + k))).bits();
+      unsigned hit = in & (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
       if (hit == 0) continue;
       alignas(64) float t[W], u[W], v[W], denominator[W];
       hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
@@ -177,7 +215,7 @@ class PacketLeaves {
           occluded(i);
         } else {
           NearestHit& best = best_[i];
-          if (t[lane] < best.t || id < best.primitive) best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, t_[i] = t[lane];
+          if (t[lane] < best.t || id < best.primitive) best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, lanes_.t[i] = t[lane];
         }
       }
     }
@@ -190,9 +228,7 @@ class PacketLeaves {
   const Ray* rays_ = nullptr;
   int chunks_ = 0;       ///< registers that the rays take
   Mask active_ = 0;      ///< rays whose search is not over (any hit)
-  Mask valid_ = 0;
-  PacketRays soa_;
-  alignas(64) float t_[kMost];  ///< beyond which nothing counts
+  Rays lanes_;
   NearestHit best_[kMost];
 
  private:
@@ -204,6 +240,10 @@ class PacketLeaves {
   using Packet = typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
   alignas(64) std::byte data_[Leaves::kRaysInLanes ? 1 : kMost * sizeof(RayData)];
   Packet packet_;
+  bool common_origin_ = false;
+  int origin_of_ = 0;  ///< a ray that has it
+
+ protected:
   PacketInterval spread_;
 };
 
