@@ -18,9 +18,9 @@ namespace {
 
 constexpr std::string_view kPlots[] = {"rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time",
                                        "sah_vs_time", "accuracy_vs_time", "lane_utilization", "published_ratios", "leaks_vs_distance",
-                                       "leaks_vs_aspect", "leak_picture", "self_intersection"};
+                                       "leaks_vs_aspect", "leak_picture", "self_intersection", "traversal_ratios"};
 /// Drawn only where a configuration names them: few experiments have something for them to show.
-constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios"};
+constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios", "traversal_ratios"};
 
 std::vector<std::string> strings(std::span<const std::string_view> views) {
   return {views.begin(), views.end()};
@@ -220,7 +220,7 @@ class ConfigReader {
 
   bool plot_has_data(std::string_view plot) const {
     const Metrics& m = experiment_.metrics;
-    if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" || plot == "published_ratios") return m.trace;
+    if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" || plot == "published_ratios" || plot == "traversal_ratios") return m.trace;
     if (plot == "build_time") return m.build;
     if (plot == "sah_cost" || plot == "epo") return m.quality;
     if (plot == "bytes_per_triangle") return m.trace || m.build;

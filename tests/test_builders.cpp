@@ -1,6 +1,7 @@
 // Every builder of binary trees (binary_builder_names()): what a tree must be, on ordinary and on degenerate meshes, for any
 // number of threads. A new builder is tested because it is in the table.
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <string>
@@ -11,7 +12,9 @@
 #include <tbb/task_arena.h>
 
 #include "core/error.h"
+#include "core/random.h"
 #include "structures/builders/builders.h"
+#include "structures/builders/clip.h"
 #include "structures/statistics.h"
 #include "tests/catch.h"
 #include "tests/kernel_scenes.h"
@@ -341,4 +344,28 @@ TEST_CASE("a leaf does not hold a triangle twice") {
       CHECK(visitor.most > 1);
     }
   }
+}
+
+TEST_CASE("a triangle cut by a plane has the boxes of its two slabs") {
+  std::size_t cut = 0;
+  for (std::uint64_t i = 0; i < 3000; ++i) {
+    std::array<Vec3f, 3> c;
+    for (unsigned k = 0; k < 3; ++k)
+      for (unsigned a = 0; a < 3; ++a) c[k][a] = i % 3 == 0 ? float(int(8 * random_float(91, 9 * i + 3 * k + a, 0))) : random_float(91, 9 * i + 3 * k + a, 0) - 0.5f;
+    Bounds3f box;
+    for (Vec3f p : c) box.extend(p);
+    const int axis = int(i % 3);
+    for (float plane : {c[0][std::size_t(axis)], 0.3f * c[1][std::size_t(axis)] + 0.7f * c[2][std::size_t(axis)], box.upper[std::size_t(axis)] + 1.0f}) {
+      INFO("triangle " << i << ", plane " << plane);
+      Bounds3f low, high;
+      clip_by_plane(c, axis, plane, low, high);
+      const Bounds3f want_low = clip_to_slab(c, axis, box.lower[std::size_t(axis)], plane), want_high = clip_to_slab(c, axis, plane, box.upper[std::size_t(axis)]);
+      CHECK(low.empty() == want_low.empty());
+      CHECK(high.empty() == want_high.empty());
+      if (!want_low.empty()) CHECK(low == want_low);
+      if (!want_high.empty()) CHECK(high == want_high);
+      cut += !low.empty() && !high.empty();
+    }
+  }
+  CHECK(cut > 3000);
 }

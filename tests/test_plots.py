@@ -12,7 +12,7 @@ PLOTS = Path(__file__).resolve().parent.parent / "plots"
 sys.path.insert(0, str(PLOTS))
 sys.dont_write_bytecode = True
 
-from figures import ALL, published_ratios  # noqa: E402
+from figures import ALL, published_ratios, traversal_ratios  # noqa: E402
 from figures.accuracy_vs_time import hard_points, pareto_front  # noqa: E402
 from figures.leak_lines import without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
@@ -156,6 +156,18 @@ class Numbers(unittest.TestCase):
     def test_pareto_front(self):
         self.assertEqual(pareto_front([(3, 0), (1, 9), (2, 9), (2, 4), (4, 0)]), [(1, 9), (2, 4), (3, 0)])
         self.assertEqual(pareto_front([]), [])
+
+    def test_ratios_of_traversals(self):
+        rates = {("bvh8", "single", "bunny"): 2e6, ("bvh8", "packet8", "bunny"): 6e6, ("embree", "single", "bunny"): 3e6, ("embree", "stream", "bunny"): 4e6,
+                 ("bvh8", "single", "city"): 5e6, ("bvh8", "packet8", "city"): 10e6}
+        cells = [Cell(dict(zip(("structure", "traversal", "scene"), k), workload="diffuse", isa="avx2"), [{"rays_per_second": v}]) for k, v in rates.items()]
+        modes = Modes(cells)
+        table = traversal_ratios.ratios(cells, modes, "rays_per_second")
+        self.assertEqual(table["bvh8", "packet8"], {("diffuse", "bunny"): 1.5, ("diffuse", "city"): 2.0})  # Embree's best; without Embree, single rays
+        self.assertEqual(table["embree", "single"], {("diffuse", "bunny"): 0.75})
+        self.assertAlmostEqual(traversal_ratios.value_at(table["bvh8", "packet8"], "diffuse", traversal_ratios.MEAN), 3 ** 0.5)
+        self.assertIsNone(traversal_ratios.value_at(table["embree", "single"], "primary", traversal_ratios.MEAN))
+        self.assertEqual(traversal_ratios.columns_of(cells), [("diffuse", "bunny"), ("diffuse", "city"), ("diffuse", "mean")])
 
     def test_order(self):
         self.assertEqual(ordered(["bvh16", "embree", "bvh4", "octree"], "structure"), ["bvh4", "bvh16", "octree", "embree"])

@@ -1,9 +1,10 @@
 // `auto`: looks at a batch's rays, tile by tile, and hands runs of like tiles to the way of traversal that suits them.
 //
 // A tile of 64 rays is coherent when a sample of its rays leaves no wide cone: their directions lie close together. Such tiles go as packets,
-// whose interval test then decides for most rays at once; the others go as the structure's best way for rays that share little: the BVHs' streams, whose rays share nodes
-// as long as they can and hide each other's latency after that; single rays where there are none. Whether packets hold together depends on the scene as well: where triangles are small, rays that are close together meet different ones, and
-// packets that let too many of their rays go on alone hand the tiles that follow to the other way, for a while. What a mode
+// whose interval test then decides for most rays at once; the others go as the structure's best way for rays that share little: the wide BVHs' streams, whose rays share nodes
+// as long as they can and hide each other's latency after that; single rays where there are none. In structures of small steps (kd-tree, octree, bounding interval hierarchy) packets are worth while
+// for rays that only start near each other, too. In the wide BVHs, whether packets are better than streams depends on the scene as well: where triangles are small, rays that are close together
+// meet different ones, and packets that let too many of their rays go on alone hand the tiles that follow to streams, for a while. What a mode
 // costs for the wrong rays is in docs/performance.md. Every way gives the same hits, so the choice changes no answer.
 #pragma once
 
@@ -20,27 +21,40 @@ struct AutoFunctions {
   /// Of the directions' own length, the half extent of those that still count as coherent. Rays towards a light fan out the more the nearer it is, and
   /// share their end all the same.
   static constexpr float kCone = 0.25f, kAnyHitCone = 0.5f;
+  /// Of the extent of all origins of the batch, that of a tile's which start near each other.
+  static constexpr float kNear = 0.125f;
   /// So many rays in packets show how those do; where a ray goes on alone more often than this, so many rays take the other way (docs/performance.md).
   static constexpr std::size_t kProbe = 8 * kTile, kOtherWay = 7 * kProbe;
   static constexpr float kTimesAlone = 0.4f;
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
   static constexpr int kThreshold = 6;  ///< packet64's
-  /// Smaller batches are too few to share anything.
-  static constexpr std::size_t kFew = kTile / 4;
+  /// Smaller batches are too few to share anything; runs of tiles below the second too few for streams.
+  static constexpr std::size_t kFew = 8, kShort = 96;
+  /// Packets may lose to the other way on coherent rays.
+  static constexpr bool kMayFallApart = !std::is_same_v<Incoherent, Alone>;
 
-  [[nodiscard]] static bool coherent(const Ray* rays, std::size_t count, float cone) {
-    if (count < kFew) return false;
+  /// Of `count` rays' directions or origins, of which some `samples` are looked at: the largest extent along an axis, and the largest |coordinate|.
+  struct Spread {
+    float extent, largest;
+  };
+  [[nodiscard]] static Spread spread(const Ray* rays, std::size_t count, std::size_t samples, Vec3f Ray::*part) {
     vf<4> low(std::numeric_limits<float>::infinity()), high(-std::numeric_limits<float>::infinity());
-    const std::size_t stride = count / 8;
-    for (std::size_t i = 0; i < count; i += stride) {
-      const vf<4> d = vf<4>::load(&rays[i].direction);
-      low = min_x86(low, d), high = max_x86(high, d);
+    for (std::size_t i = 0; i < count; i += std::max(count / samples, std::size_t{1})) {
+      const vf<4> v = vf<4>::load(&(rays[i].*part));
+      low = min_x86(low, v), high = max_x86(high, v);
     }
-    alignas(16) float half[4], size[4];
-    (high - low).store(half), max_x86(abs(low), abs(high)).store(size);
-    const float largest = std::max({size[0], size[1], size[2]});
-    return std::max({half[0], half[1], half[2]}) <= 2.0f * cone * largest;
+    alignas(16) float extent[4], size[4];
+    (high - low).store(extent), max_x86(abs(low), abs(high)).store(size);
+    return {std::max({extent[0], extent[1], extent[2]}), std::max({size[0], size[1], size[2]})};
+  }
+
+  /// Of a tile: packets are for it.
+  [[nodiscard]] static bool together(const Ray* rays, std::size_t count, float cone, float near) {
+    if (count < kFew) return false;
+    const Spread directions = spread(rays, count, 8, &Ray::direction);
+    if (directions.extent <= 2.0f * cone * directions.largest) return true;
+    return Family::kForNearRays && spread(rays, count, 8, &Ray::origin).extent <= near;
   }
 
   /// Calls packets(begin, count), which returns how often a ray went on alone, and other(begin, count) for runs of tiles.
@@ -58,15 +72,16 @@ struct AutoFunctions {
           other_way -= count;
         } else {
           count = std::min(count, kProbe);
-          if (float(packets(begin, count)) > kTimesAlone * float(count)) other_way = kOtherWay;
+          if (float(packets(begin, count)) > kTimesAlone * float(count) && kMayFallApart) other_way = kOtherWay;
         }
         begin += count;
       }
     };
+    const float near = Family::kForNearRays ? kNear * spread(&rays[0], rays.size(), 64, &Ray::origin).extent : 0.0f;
     bool kind = false;
     unsigned others = 0;  // tiles of the other kind, one after the other
     for (std::size_t at = 0; at < rays.size(); at += kTile) {
-      const bool now = coherent(&rays[at], std::min(kTile, rays.size() - at), cone);
+      const bool now = together(&rays[at], std::min(kTile, rays.size() - at), cone, near);
       if (at == 0) kind = now;
       others = now == kind ? 0 : others + 1;
       if (others < kSwitch) continue;
@@ -84,13 +99,13 @@ struct AutoFunctions {
       if (rays.size() < kFew) return Few().closest_hit(accel, row, rays, hits, counters);
       runs(
           rays, kCone, [&](std::size_t begin, std::size_t count) { return Packets::closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters, int(kTile), kThreshold); },
-          [&](std::size_t begin, std::size_t count) { Other().closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters); });
+          [&](std::size_t begin, std::size_t count) { (count < kShort ? Few() : Other()).closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters); });
     }
     static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
       if (rays.size() < kFew) return Few().any_hit(accel, row, rays, occluded, counters);
       runs(
           rays, kAnyHitCone, [&](std::size_t begin, std::size_t count) { return Packets::any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters, int(kTile), kThreshold); },
-          [&](std::size_t begin, std::size_t count) { Other().any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters); });
+          [&](std::size_t begin, std::size_t count) { (count < kShort ? Few() : Other()).any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters); });
     }
   };
 

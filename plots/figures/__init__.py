@@ -3,5 +3,5 @@
 A new figure is a module here and its name in ALL. Other modules here (bars, modes, leak_lines) are what figures share.
 """
 
-ALL = ("rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time", "sah_vs_time",
+ALL = ("rays_per_second", "traversal_ratios", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time", "sah_vs_time",
        "accuracy_vs_time", "lane_utilization", "published_ratios", "leaks_vs_distance", "leaks_vs_aspect", "leak_picture", "self_intersection")

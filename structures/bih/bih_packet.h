@@ -8,7 +8,7 @@
 #pragma once
 
 #include "structures/bih/bih_single.h"
-#include "structures/leaves/packet_leaf_lists.h"
+#include "structures/leaves/leaf_lists_packet.h"
 #include "traversal/box_rays.h"
 
 namespace arboretum {
@@ -157,6 +157,7 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
 /// As traversal/packet_rows.h wants it.
 struct BihPacketFamily {
   static constexpr bool kFewerLanes = false;
+  static constexpr bool kForNearRays = true;
   template <int W, class Leaves, bool AnyHit, class Counting>
   using Packets = BihPackets<W, Leaves, AnyHit, Counting>;
 };

@@ -49,4 +49,19 @@ Bounds3f clip_to_slab(const std::array<Vec3f, 3>& corners, int axis, float lower
   return box;
 }
 
+void clip_by_plane(const std::array<Vec3f, 3>& corners, int axis, float plane, Bounds3f& low, Bounds3f& high) noexcept {
+  Bounds3f cut;
+  low = high = {};
+  for (int i = 0; i < 3; ++i) {
+    const Vec3f a = corners[std::size_t(i)], b = corners[std::size_t((i + 1) % 3)];
+    if (a[axis] <= plane) low.extend(a);
+    if (a[axis] >= plane) high.extend(a);
+    if (std::min(a[axis], b[axis]) < plane && plane < std::max(a[axis], b[axis])) extend_by_crossing(cut, a, b, axis, plane);
+  }
+  if (low.empty() || high.empty()) return;
+  // A cut has no extent along the axis but where it lies.
+  cut.lower[axis] = cut.upper[axis] = plane;
+  low.extend(cut), high.extend(cut);
+}
+
 }  // namespace arboretum

@@ -12,4 +12,7 @@ namespace arboretum {
 /// not reach the slab.
 [[nodiscard]] Bounds3f clip_to_slab(const std::array<Vec3f, 3>& corners, int axis, float lower, float upper) noexcept;
 
+/// Boxes of the parts of a triangle on either side of a plane across an axis, as clip_to_slab() rounds them.
+void clip_by_plane(const std::array<Vec3f, 3>& corners, int axis, float plane, Bounds3f& low, Bounds3f& high) noexcept;
+
 }  // namespace arboretum

@@ -70,18 +70,18 @@ void* create_leaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* pr
   return leaf;
 }
 
-/// What of a part of a triangle lies on either side of a plane: the triangle clipped to the side, within the part's box.
+/// What of a part of a triangle lies on either side of a plane: the triangle clipped to the side, within the part's box, as Embree clips its own triangles.
 void split_primitive(const RTCBuildPrimitive* primitive, unsigned dimension, float position, RTCBounds* left, RTCBounds* right, void* mesh) {
   const RTCBuildPrimitive& p = *primitive;
   const Bounds3f box{{p.lower_x, p.lower_y, p.lower_z}, {p.upper_x, p.upper_y, p.upper_z}};
   const auto corners = static_cast<const TriangleMesh*>(mesh)->corners(p.primID);
-  const auto side = [&](float from, float to, RTCBounds& out) {
-    const Bounds3f part = clip_to_slab(corners, int(dimension), from, to);
+  Bounds3f low, high;
+  clip_by_plane(corners, int(dimension), position, low, high);
+  const auto side = [&](const Bounds3f& part, RTCBounds& out) {
     const Vec3f lower = max(part.lower, box.lower), upper = min(part.upper, box.upper);
     out = {lower.x, lower.y, lower.z, 0.0f, upper.x, upper.y, upper.z, 0.0f};
   };
-  side(box.lower[dimension], position, *left);
-  side(position, box.upper[dimension], *right);
+  side(low, *left), side(high, *right);
 }
 
 /// Embree's tree as ours.

@@ -278,6 +278,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
 template <class Format>
 struct BvhPacketFamily {
   static constexpr bool kFewerLanes = true;
+  static constexpr bool kForNearRays = false;
   template <int W, class Leaves, bool AnyHit, class Counting>
   using Packets = BvhPackets<Format, W, Leaves, AnyHit, Counting>;
 };

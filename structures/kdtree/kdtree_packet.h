@@ -310,6 +310,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
 /// As traversal/packet_rows.h wants it.
 struct KdPacketFamily {
   static constexpr bool kFewerLanes = false;
+  static constexpr bool kForNearRays = true;
   template <int W, class Leaves, bool AnyHit, class Counting>
   using Packets = KdPackets<W, Leaves, AnyHit, Counting>;
 };

@@ -9,7 +9,7 @@
 #pragma once
 
 #include "structures/octree/octree_single.h"
-#include "structures/leaves/packet_leaf_lists.h"
+#include "structures/leaves/leaf_lists_packet.h"
 #include "traversal/box_rays.h"
 
 namespace arboretum {
@@ -155,6 +155,7 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
 /// As traversal/packet_rows.h wants it.
 struct OctreePacketFamily {
   static constexpr bool kFewerLanes = false;
+  static constexpr bool kForNearRays = true;
   template <int W, class Leaves, bool AnyHit, class Counting>
   using Packets = OctreePackets<W, Leaves, AnyHit, Counting>;
 };

@@ -1,0 +1,101 @@
+"""Every way of traversal against the best of Embree's, or against single rays: a panel an instruction set, a square for each scene and workload."""
+
+import math
+
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
+
+from figures.modes import Modes
+from results import NoData, ordered
+from style import panels, short
+
+TITLE = "Ways of traversal"
+CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set (where the sweep has no Embree: of the structure's "
+           "own single rays). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes.")
+# Blue to orange by way of white: readers with any colour vision can tell the ends apart.
+COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FEE9CF", "#FFFFFF", "#D3E4F3", "#5C9BCF", "#1F5A96"])
+MEAN = "mean"
+
+
+def draw(results):
+    metric, _ = results.throughput()
+    cells = [c for c in results.traces if c.estimate(metric)]
+    if len({c["traversal"] for c in cells}) < 2:
+        raise NoData("all cells have one way of traversal")
+    modes = Modes(cells)
+    tables = {isa: table for isa in ordered((c["isa"] for c in cells), "isa") if (table := ratios([c for c in cells if c["isa"] == isa], modes, metric))}
+    if not tables:
+        raise NoData("nothing to compare with: neither embree nor single rays on the same scene and workload")
+    columns = columns_of(cells)
+    rows = {isa: row_names(table, modes) for isa, table in tables.items()}
+    longest = max(map(len, rows.values()))
+    figure, axes = panels(len(tables), 1, max(5.0, 1.9 + 0.52 * len(columns)), 1.6 + 0.26 * longest)
+    for (isa, table), axis in zip(tables.items(), axes.flat):
+        panel(axis, table, rows[isa], columns)
+        axis.set_title(isa, loc="left", pad=36)
+    return figure
+
+
+def ratios(cells, modes, metric):
+    """{(structure, mode): {(workload, scene): ratio}} of one instruction set; the fastest cell stands for those of a kind."""
+    fastest, base = {}, {}
+    for cell in cells:
+        rate = cell.estimate(metric).median
+        place = (cell["workload"], cell["scene"])
+        row = fastest.setdefault((cell["structure"], modes.label(cell)), {})
+        row[place] = max(row.get(place, 0.0), rate)
+        for owner, wanted in (("embree", cell["structure"] == "embree"), (cell["structure"], cell["traversal"] == "single")):
+            if wanted:
+                base[owner, place] = max(base.get((owner, place), 0.0), rate)
+    table = {}
+    for (structure, mode), row in fastest.items():
+        compared = {p: v / b for p, v in row.items() if (b := base.get(("embree", p)) or base.get((structure, p)))}
+        if compared:
+            table[structure, mode] = compared
+    return table
+
+
+def columns_of(cells):
+    """(workload, scene) in order; behind a workload's scenes, where there are several, their mean."""
+    columns = []
+    for workload in ordered((c["workload"] for c in cells), "workload"):
+        scenes = ordered((c["scene"] for c in cells if c["workload"] == workload), "scene")
+        columns += [(workload, s) for s in scenes] + ([(workload, MEAN)] if len(scenes) > 1 else [])
+    return columns
+
+
+def row_names(table, modes):
+    structures = ordered((s for s, _ in table), "structure")
+    return [(s, m) for s in structures for m in modes.labels if (s, m) in table]
+
+
+def value_at(row, workload, scene):
+    if scene != MEAN:
+        return row.get((workload, scene))
+    found = [v for (w, _), v in row.items() if w == workload]
+    return math.exp(sum(map(math.log, found)) / len(found)) if found else None
+
+
+def panel(axis, table, rows, columns):
+    values = np.array([[value_at(table[r], *c) or np.nan for c in columns] for r in rows])
+    axis.imshow(np.log2(values), cmap=COLOURS, vmin=-1.0, vmax=1.0, aspect="auto")
+    for y, line in enumerate(values):
+        for x, v in enumerate(line):
+            if not np.isnan(v):
+                dark = abs(math.log2(v)) > 0.75
+                axis.text(x, y, f"{v:.2f}", ha="center", va="center", fontsize=8, color="white" if dark else "#222222",
+                          fontweight="bold" if columns[x][1] == MEAN else "normal")
+    axis.set_yticks(range(len(rows)), [f"{s}  {m}" for s, m in rows], fontsize=8.5)
+    axis.set_xticks(range(len(columns)), [short(s, 16) for _, s in columns], rotation=30, ha="right", rotation_mode="anchor", fontsize=8)
+    axis.tick_params(length=0)
+    axis.grid(visible=False)
+    for spine in axis.spines.values():
+        spine.set_visible(False)
+    starts = [k for k in range(len(columns)) if k == 0 or columns[k][0] != columns[k - 1][0]]
+    for first, after in zip(starts, [*starts[1:], len(columns)]):
+        axis.text((first + after - 1) / 2, -0.75, columns[first][0].replace("_", " "), ha="center", va="bottom", fontsize=9.5)
+        if first:
+            axis.axvline(first - 0.5, color="white", linewidth=4)
+    for y in range(1, len(rows)):
+        if rows[y][0] != rows[y - 1][0]:
+            axis.axhline(y - 0.5, color="white", linewidth=4)
