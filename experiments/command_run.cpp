@@ -13,6 +13,7 @@
 #include "experiments/plotting.h"
 #include "experiments/progress.h"
 #include "experiments/results_writer.h"
+#include "experiments/runner.h"
 #include "experiments/summary.h"
 #include "scenes/catalogue.h"
 
@@ -26,19 +27,34 @@ std::size_t expected_triangles(const SceneSpec& spec) {
   return spec.catalogue.empty() ? kUnknown : find_catalogue_entry(spec.catalogue).triangles;
 }
 
-/// A rough one: repetitions last min_time, making a cell ready takes a few passes at ten million rays a
-/// second, a build two million triangles a second.
+/// Triangles a second of a builder with one thread, roughly (docs/performance.md); reinsertion after it not counted.
+double triangles_per_second(std::string_view builder) {
+  struct Rate {
+    std::string_view builder;
+    double rate;
+  };
+  static constexpr Rate kRates[] = {{"embree_high", 1.5e5}, {"high", 2e5},  {"embree_", 1e6},  {"sweep_sah", 3.5e5}, {"ploc", 8e5}, {"morton", 4e6},
+                                    {"low", 6e6},           {"octants", 4e5}, {"uniform", 2e6}, {"two_level", 1e6}};
+  for (const Rate& r : kRates)
+    if (builder.starts_with(r.builder)) return r.rate;
+  return 1.5e6;
+}
+constexpr double kReinsertedPerSecond = 7e5;
+
+/// A rough one: repetitions last min_time, making a cell ready takes a few passes at ten million rays a second.
 double estimate_seconds(const Experiment& experiment, const Plan& plan) {
   const MeasureSettings& m = experiment.measure;
   const double pass = double(m.width) * double(m.height) / 1e7;
-  std::vector<double> build;
-  for (const SceneChoice& scene : experiment.scenes)
-    build.push_back(double(expected_triangles(scene.spec)) / 2e6);
+  std::vector<double> triangles;
+  for (const SceneChoice& scene : experiment.scenes) triangles.push_back(double(expected_triangles(scene.spec)));
   double seconds = 0.0;
   for (const Cell& cell : plan.cells) {
-    const bool is_build = cell.metric == Cell::Metric::build;
-    const double repetition = is_build ? build[cell.scene_index] : std::max(m.min_time, pass);
-    seconds += m.repetitions * repetition + (is_build ? repetition : (3.0 + m.warmup) * pass);
+    if (cell.metric == Cell::Metric::build) {
+      const double a_triangle = 1.0 / triangles_per_second(cell.builder) + (cell.builder.ends_with("_reinsertion") ? 1.0 / kReinsertedPerSecond : 0.0);
+      seconds += (1.0 + std::max(m.repetitions, kFewestBuilds)) * triangles[cell.scene_index] * a_triangle;
+    } else {
+      seconds += m.repetitions * std::max(m.min_time, pass) + (3.0 + m.warmup) * pass;
+    }
   }
   return seconds;
 }

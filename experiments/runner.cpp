@@ -22,7 +22,6 @@
 namespace arboretum {
 namespace {
 
-constexpr unsigned kFewestBuilds = 3;     // repetitions of a build cell at least
 constexpr std::size_t kMostSeenPoints = 30000;
 constexpr std::size_t kPrepareUnits = 2;  // making a cell ready takes about two repetitions
 

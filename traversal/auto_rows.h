@@ -23,8 +23,9 @@ struct AutoFunctions {
   static constexpr float kCone = 0.25f, kAnyHitCone = 0.5f;
   /// Of the extent of all origins of the batch, that of a tile's which start near each other.
   static constexpr float kNear = 0.125f;
-  /// So many rays in packets show how those do; where a ray goes on alone more often than this, so many rays take the other way (docs/performance.md).
-  static constexpr std::size_t kProbe = 8 * kTile, kOtherWay = 7 * kProbe;
+  /// So many rays in packets show how those do; where a ray goes on alone more often than this, the next rays take the other way, at first so many, each time twice as many, and so many at most
+  /// (docs/performance.md).
+  static constexpr std::size_t kProbe = 4 * kTile, kFirstOther = 2 * kProbe, kMostOther = 64 * kProbe;
   static constexpr float kTimesAlone = 0.4f;
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
@@ -60,7 +61,7 @@ struct AutoFunctions {
   /// Calls packets(begin, count), which returns how often a ray went on alone, and other(begin, count) for runs of tiles.
   template <class Packets, class Other>
   static void runs(RayBatch rays, float cone, const Packets& packets, const Other& other) {
-    std::size_t begin = 0, other_way = 0;
+    std::size_t begin = 0, other_way = 0, next_other = kFirstOther;
     const auto run = [&](std::size_t end, bool together) {
       while (begin < end) {
         std::size_t count = end - begin;
@@ -72,7 +73,12 @@ struct AutoFunctions {
           other_way -= count;
         } else {
           count = std::min(count, kProbe);
-          if (float(packets(begin, count)) > kTimesAlone * float(count) && kMayFallApart) other_way = kOtherWay;
+          if (float(packets(begin, count)) > kTimesAlone * float(count) && kMayFallApart) {
+            other_way = next_other;
+            next_other = std::min(2 * next_other, kMostOther);
+          } else {
+            next_other = kFirstOther;
+          }
         }
         begin += count;
       }
