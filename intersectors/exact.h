@@ -28,7 +28,8 @@
 #pragma once
 
 #include "intersectors/leaf_block.h"
-#include "intersectors/round_in_double.h"
+#include "intersectors/round_later.h"
+#include "intersectors/sheared_ray.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -38,29 +39,23 @@ struct Exact {
   static constexpr bool reads(TriangleForm form) { return form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = true;
 
-  /// The ray's constants as in watertight.h, and the search's state: the best hit's corners and the low end of its interval.
-  struct RayData {
-    float ox, oy, oz, sx, sy, sz;
-    int kx, ky, kz;
-    Vec3f origin, direction;
+  /// The ray's constants, and the search's state: the best hit's corners and the low end of its interval.
+  struct RayData : ShearedRay {
+    Vec3f origin, towards;
     bool has_best = false;
     float best_low;  ///< of the ray while it has no hit
     CornersInFours best;
 
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction), best_low(ray.tfar) {
-      const float ax = __builtin_fabsf(ray.direction.x), ay = __builtin_fabsf(ray.direction.y), az = __builtin_fabsf(ray.direction.z);
-      kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
-      kx = kz == 2 ? 0 : kz + 1;
-      ky = kx == 2 ? 0 : kx + 1;
-      const float* o = &ray.origin.x;
-      const float* d = &ray.direction.x;
-      ox = o[kx], oy = o[ky], oz = o[kz];
-      sx = d[kx] / d[kz], sy = d[ky] / d[kz], sz = 1.0f / d[kz];
+    ARBORETUM_INLINE explicit RayData(const Ray& ray) : ShearedRay(ray), origin(ray.origin), towards(ray.direction), best_low(ray.tfar) {
       // Where 1 / d_z is not within u of itself: NaN leaves every lane to exact arithmetic.
-      const float largest = __builtin_fabsf(d[kz]);
-      if (__builtin_expect(!(largest >= 0x1p-120f && largest <= 0x1p120f), 0)) sx = sz = std::numeric_limits<float>::quiet_NaN();
+      const float largest = __builtin_fabsf(direction[2]);
+      if (__builtin_expect(!(largest >= 0x1p-120f && largest <= 0x1p120f), 0)) shear[0] = shear[2] = std::numeric_limits<float>::quiet_NaN();
     }
   };
+
+#if ARBORETUM_TARGET != ARBORETUM_TARGET_SCALAR
+  using Unfinished = UnroundedHits;
+#endif
 
   /// True when `best` has changed.
   template <class Block>
@@ -96,7 +91,7 @@ struct Exact {
   static ARBORETUM_INLINE void finish(RayData& ray, NearestHit& best) {
     if (!ray.has_best) return;
     RoundedHit hit;
-    if (__builtin_expect(!round_in_double(ray.origin, ray.direction, ray.best, hit), 0)) hit = round_exactly({ray.origin, 0.0f, ray.direction, best.t}, ray.best.corners());
+    if (__builtin_expect(!round_in_double(ray.origin, ray.towards, ray.best, hit), 0)) hit = round_exactly({ray.origin, 0.0f, ray.towards, best.t}, ray.best.corners());
     best.t = hit.t, best.u = hit.u, best.v = hit.v;
   }
 
@@ -125,11 +120,10 @@ struct Exact {
   template <class Block>
   static ARBORETUM_INLINE Edges<Block::kWidth> filter(const RayData& ray, const Block& block) {
     using F = vf<Block::kWidth>;
-    const F ox(ray.ox), oy(ray.oy), oz(ray.oz), sx(ray.sx), sy(ray.sy);
-    const F az = F::load(block.v0[ray.kz]) - oz, bz = F::load(block.v1[ray.kz]) - oz, cz = F::load(block.v2[ray.kz]) - oz;
-    const F ax = nmadd(sx, az, F::load(block.v0[ray.kx]) - ox), ay = nmadd(sy, az, F::load(block.v0[ray.ky]) - oy);
-    const F bx = nmadd(sx, bz, F::load(block.v1[ray.kx]) - ox), by = nmadd(sy, bz, F::load(block.v1[ray.ky]) - oy);
-    const F cx = nmadd(sx, cz, F::load(block.v2[ray.kx]) - ox), cy = nmadd(sy, cz, F::load(block.v2[ray.ky]) - oy);
+    const ShearedVertices<Block::kWidth> p(ray.in_memory(), block);
+    const auto [ax, ay, az] = p.a;
+    const auto [bx, by, bz] = p.b;
+    const auto [cx, cy, cz] = p.c;
     const F u = msub(cx, by, cy * bx), v = msub(ax, cy, ay * cx), w = msub(bx, ay, by * ax);
     const F width = max_x86(max_x86(max_x86(abs(ax), abs(ay)), max_x86(abs(bx), abs(by))), max_x86(abs(cx), abs(cy)));
     const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz));
@@ -140,7 +134,7 @@ struct Exact {
   template <int W>
   static ARBORETUM_INLINE void find_distances(const RayData& ray, const Edges<W>& l, float tnear, float tfar, Distances<W>& d) {
     using F = vf<W>;
-    const F sz(ray.sz), za = sz * l.az, zb = sz * l.bz, zc = sz * l.cz;
+    const F sz(ray.in_memory().shear[2]), za = sz * l.az, zb = sz * l.bz, zc = sz * l.cz;
     const F nearest = min_x86(min_x86(za, zb), zc), farthest = max_x86(max_x86(za, zb), zc);
     const F size = max_x86(abs(nearest), abs(farthest));
     const F det = l.u + l.v + l.w, inverse = F(1.0f) / det;
@@ -196,7 +190,7 @@ struct Exact {
                                               DistanceInterval t, float tnear, NearestHit& best) {
     if (ray.has_best && (t.low > best.t || id == best.primitive)) return false;
     // Nothing beyond the best hit is asked for, but its t is not known exactly: that is compared below.
-    const Ray exact{ray.origin, tnear, ray.direction, ray.has_best ? std::numeric_limits<float>::infinity() : best.t};
+    const Ray exact{ray.origin, tnear, ray.towards, ray.has_best ? std::numeric_limits<float>::infinity() : best.t};
     if (!certain || t.low < tnear || t.high > exact.tfar) {
       if (!meets_exactly(exact, corner, t)) return false;
     } else if (t.high - t.low > kWide * __builtin_fabsf(t.high)) {
@@ -223,7 +217,7 @@ struct Exact {
     }
     for (unsigned rest = d.candidates; rest; rest &= rest - 1) {
       DistanceInterval t;
-      if (meets_exactly({ray.origin, tnear, ray.direction, tfar}, corners(block, __builtin_ctz(rest)), t)) return true;
+      if (meets_exactly({ray.origin, tnear, ray.towards, tfar}, corners(block, __builtin_ctz(rest)), t)) return true;
     }
     return false;
   }

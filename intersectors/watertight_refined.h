@@ -21,11 +21,11 @@ struct WatertightRefined : Watertight {
 
   /// `corner`: of the nearest hit so far, by corner and axis.
   struct RayData : Watertight::RayData {
-    float origin[3], direction[3], tfar;
+    float origin[3], towards[3], tfar;
     float corner[3][3];
     ARBORETUM_INLINE explicit RayData(const Ray& ray)
         : Watertight::RayData(ray), origin{ray.origin.x, ray.origin.y, ray.origin.z},
-          direction{ray.direction.x, ray.direction.y, ray.direction.z}, tfar(ray.tfar) {}
+          towards{ray.direction.x, ray.direction.y, ray.direction.z}, tfar(ray.tfar) {}
   };
 
   template <class Block>
@@ -39,7 +39,7 @@ struct WatertightRefined : Watertight {
 
   static void finish(RayData& ray, NearestHit& best) {
     const auto widened = [](const float (&p)[3]) { return load3<1>(&p[0], &p[1], &p[2]); };
-    const vd3<1> o = widened(ray.origin), d = widened(ray.direction);
+    const vd3<1> o = widened(ray.origin), d = widened(ray.towards);
     const vd3<1> v0 = widened(ray.corner[0]), e1 = v0 - widened(ray.corner[1]), e2 = widened(ray.corner[2]) - v0;
     const MollerTrumboreTerms<vd<1>> terms(v0, e1, e2, o, d);
     const double det = terms.det.v;
@@ -55,7 +55,7 @@ struct WatertightRefined : Watertight {
       t = (along(terms.c) - u * along(e1) + v * along(e2)) / along(d);
     }
     const float rounded = float(t);
-    best.t = rounded < ray.tnear ? ray.tnear : rounded > ray.tfar ? ray.tfar : rounded;
+    best.t = rounded < ray.tnear() ? ray.tnear() : rounded > ray.tfar ? ray.tfar : rounded;
     best.u = float(u), best.v = float(v);
   }
 };

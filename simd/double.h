@@ -37,6 +37,7 @@ struct vd<1> {
   /// `a` with its sign flipped where b's sign bit is set.
   friend ARBORETUM_INLINE vd flip_sign(vd a, vd b) { return a.v * __builtin_copysign(1.0, b.v); }
   friend ARBORETUM_INLINE unsigned operator>=(vd a, vd b) { return a.v >= b.v; }
+  friend ARBORETUM_INLINE unsigned operator<(vd a, vd b) { return a.v < b.v; }
   friend ARBORETUM_INLINE unsigned operator!=(vd a, vd b) { return a.v != b.v; }
 };
 
@@ -61,6 +62,7 @@ struct vd<2> {
   friend ARBORETUM_INLINE vd msub(vd a, vd b, vd c) { return a * b - c; }
   friend ARBORETUM_INLINE vd flip_sign(vd a, vd b) { return vd(_mm_xor_pd(a.v, _mm_and_pd(b.v, _mm_set1_pd(-0.0)))); }
   friend ARBORETUM_INLINE unsigned operator>=(vd a, vd b) { return unsigned(_mm_movemask_pd(_mm_cmple_pd(b.v, a.v))); }
+  friend ARBORETUM_INLINE unsigned operator<(vd a, vd b) { return unsigned(_mm_movemask_pd(_mm_cmplt_pd(a.v, b.v))); }
   friend ARBORETUM_INLINE unsigned operator!=(vd a, vd b) { return unsigned(_mm_movemask_pd(_mm_cmpneq_pd(a.v, b.v))); }
 };
 #endif
@@ -84,6 +86,7 @@ struct vd<4> {
   friend ARBORETUM_INLINE vd msub(vd a, vd b, vd c) { return vd(_mm256_fmsub_pd(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vd flip_sign(vd a, vd b) { return vd(_mm256_xor_pd(a.v, _mm256_and_pd(b.v, _mm256_set1_pd(-0.0)))); }
   friend ARBORETUM_INLINE unsigned operator>=(vd a, vd b) { return unsigned(_mm256_movemask_pd(_mm256_cmp_pd(a.v, b.v, _CMP_GE_OQ))); }
+  friend ARBORETUM_INLINE unsigned operator<(vd a, vd b) { return unsigned(_mm256_movemask_pd(_mm256_cmp_pd(a.v, b.v, _CMP_LT_OQ))); }
   friend ARBORETUM_INLINE unsigned operator!=(vd a, vd b) { return unsigned(_mm256_movemask_pd(_mm256_cmp_pd(a.v, b.v, _CMP_NEQ_UQ))); }
 };
 #endif
@@ -107,6 +110,7 @@ struct vd<8> {
   friend ARBORETUM_INLINE vd msub(vd a, vd b, vd c) { return vd(_mm512_fmsub_pd(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vd flip_sign(vd a, vd b) { return vd(_mm512_xor_pd(a.v, _mm512_and_pd(b.v, _mm512_set1_pd(-0.0)))); }
   friend ARBORETUM_INLINE unsigned operator>=(vd a, vd b) { return _mm512_cmp_pd_mask(a.v, b.v, _CMP_GE_OQ); }
+  friend ARBORETUM_INLINE unsigned operator<(vd a, vd b) { return _mm512_cmp_pd_mask(a.v, b.v, _CMP_LT_OQ); }
   friend ARBORETUM_INLINE unsigned operator!=(vd a, vd b) { return _mm512_cmp_pd_mask(a.v, b.v, _CMP_NEQ_UQ); }
 };
 #endif

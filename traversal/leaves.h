@@ -63,5 +63,18 @@ struct CompiledLeaves {
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
 
+/// Where the intersector can finish the hits of several rays together (intersectors/round_later.h), what they wait in; else nothing.
+template <class Leaves>
+inline constexpr bool kFinishesLater = requires { typename Leaves::Intersector::Unfinished; };
+struct NothingUnfinished {};
+template <class Leaves, bool Later = kFinishesLater<Leaves>>
+struct UnfinishedOf {
+  using Type = NothingUnfinished;
+};
+template <class Leaves>
+struct UnfinishedOf<Leaves, true> {
+  using Type = typename Leaves::Intersector::Unfinished;
+};
+
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -2,7 +2,8 @@
 //
 // Kernel<Leaves, Padded, Counting> has a constructor (const Accel&, const KernelRow&, Counting), called once a batch, and
 //   template <bool AnyHit> bool trace(const Ray& ray, float time, NearestHit& best)
-// for valid rays: any hit returns whether there is one, closest hit updates `best`.
+// for valid rays: any hit returns whether there is one, closest hit updates `best`. It may have settle(Hit&), the hit of the ray just traced, and
+// finish_all(): t, u and v of hits are then final when that has been called.
 #pragma once
 
 #include "traversal/leaves.h"
@@ -19,7 +20,9 @@ struct SingleRays {
       NearestHit best{rays[i].tfar};
       if (is_valid_in_lanes(rays[i])) kernel.template trace<false>(rays[i], rays.time(i), best);
       hits[i] = to_hit(best);
+      if constexpr (requires { kernel.settle(hits[i]); }) kernel.settle(hits[i]);
     }
+    if constexpr (requires { kernel.finish_all(); }) kernel.finish_all();
     if constexpr (Counting::kCounting) counters->rays += rays.size();
   }
   static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {

@@ -115,6 +115,8 @@ template <template <bool> class Nodes>
 struct BvhSingle {
   template <class Leaves, bool Padded, class Counting>
   class Kernel {
+    static constexpr bool kLater = kFinishesLater<Leaves>;
+
    public:
     Kernel(const Accel& accel, const KernelRow& row, Counting counting)
         : Kernel(static_cast<const bvh::BvhBase&>(accel), row, counting) {}
@@ -124,8 +126,21 @@ struct BvhSingle {
       Nodes<Padded> nodes(ray, max_coordinate_);
       typename Leaves::RayData data = leaves_.prepare(ray);
       const bool hit = search_bvh<AnyHit>(base_, root_, nodes, stack_.data(), ray, leaves_, data, best, form_, counting_);
-      if constexpr (!AnyHit) leaves_.finish(data, best);
+      if constexpr (!AnyHit && !kLater) leaves_.finish(data, best);
+      if constexpr (!AnyHit && kLater) {
+        if (best.primitive != NearestHit::kNone) unfinished_.add(ray, data.best);
+      }
       return hit;
+    }
+    ARBORETUM_INLINE void settle(Hit& hit)
+      requires kLater
+    {
+      if (hit.is_hit()) unfinished_.settle(hit);
+    }
+    void finish_all()
+      requires kLater
+    {
+      unfinished_.finish_all();
     }
 
    private:
@@ -140,6 +155,7 @@ struct BvhSingle {
     const LeafForm& form_;
     Counting counting_;
     TraversalStack stack_;
+    [[no_unique_address]] typename UnfinishedOf<Leaves>::Type unfinished_;
   };
   using Functions = SingleRayFunctions<Kernel>;
 };

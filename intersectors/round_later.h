@@ -1,0 +1,98 @@
+// The last hits of several rays of `exact`, rounded together with the rays in lanes: a third of the instructions of one after the other, and no ray
+// waits for its own. The operations of round_in_double.h on each ray, in the same order, so the same bits.
+#pragma once
+
+#include "intersectors/round_in_double.h"
+#include "simd/double.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+#if ARBORETUM_TARGET != ARBORETUM_TARGET_SCALAR
+
+/// Hits that wait. A ray and its hit stay where they are until finish_all().
+class UnroundedHits {
+  static constexpr int kLanes = kHasFma ? 4 : 2;
+  using D = vd<kLanes>;
+
+ public:
+  /// The hit of `ray`, in the triangle of these corners; settle() says where it is.
+  ARBORETUM_INLINE void add(const Ray& ray, const CornersInFours& corners) {
+    ray_[count_] = &ray;
+    for (int k = 0; k < 3; ++k) _mm_store_ps(corners_[k][count_], _mm_load_ps(corners.at[k]));
+  }
+  ARBORETUM_INLINE void settle(Hit& hit) {
+    hit_[count_] = &hit;
+    if (++count_ == kLanes) round_all();
+  }
+  void finish_all() {
+    if (count_ == 0) return;
+    const int used = count_;
+    for (int i = used; i < kLanes; ++i) {  // the lanes left hold the first once more
+      ray_[i] = ray_[0], hit_[i] = hit_[0];
+      for (int k = 0; k < 3; ++k) _mm_store_ps(corners_[k][i], _mm_load_ps(corners_[k][0]));
+    }
+    count_ = used;
+    round_all();
+  }
+
+ private:
+  static ARBORETUM_INLINE vd3<kLanes> cross(vd3<kLanes> a, vd3<kLanes> b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  }
+  static ARBORETUM_INLINE D dot(vd3<kLanes> a, vd3<kLanes> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+  static ARBORETUM_INLINE D size_of(vd3<kLanes> a) { return max_x86(max_x86(abs(a.x), abs(a.y)), abs(a.z)); }
+
+  /// x, y and z of a vector of each ray, in doubles. `at(i)`: where that of ray i lies.
+  template <class At>
+  static ARBORETUM_INLINE vd3<kLanes> gather(const At& at) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+    const __m128 p = _mm_loadu_ps(at(0)), q = _mm_loadu_ps(at(1)), xy = _mm_unpacklo_ps(p, q);
+    return {D(_mm_cvtps_pd(xy)), D(_mm_cvtps_pd(_mm_movehl_ps(xy, xy))), D(_mm_cvtps_pd(_mm_unpackhi_ps(p, q)))};
+#else
+    const __m128 p = _mm_loadu_ps(at(0)), q = _mm_loadu_ps(at(1)), r = _mm_loadu_ps(at(2)), s = _mm_loadu_ps(at(3));
+    const __m128 pq = _mm_unpacklo_ps(p, q), rs = _mm_unpacklo_ps(r, s);
+    return {D(_mm256_cvtps_pd(_mm_movelh_ps(pq, rs))), D(_mm256_cvtps_pd(_mm_movehl_ps(rs, pq))),
+            D(_mm256_cvtps_pd(_mm_movelh_ps(_mm_unpackhi_ps(p, q), _mm_unpackhi_ps(r, s))))};
+#endif
+  }
+
+  __attribute__((noinline)) void round_all() {
+    constexpr double kBound = 56 * 0x1p-53;
+    count_ = 0;
+    const auto corner = [&](int k) { return gather([&](int i) { return corners_[k][i]; }); };
+    const vd3<kLanes> a = corner(0), e1 = corner(1) - a, e2 = corner(2) - a;
+    const vd3<kLanes> d = gather([&](int i) { return &ray_[i]->direction.x; }), s = gather([&](int i) { return &ray_[i]->origin.x; }) - a;
+    const vd3<kLanes> p = cross(d, e2), q = cross(s, e1);
+    const D det = dot(e1, p);
+    const D size_1 = size_of(e1), size_2 = size_of(e2), size_d = size_of(d), size_s = size_of(s);
+    const D t = dot(e2, q) / det, scale = abs(D(kBound * (1 + 0x1p-8)) / det);
+    const D det_error = scale * size_1 * size_2 * size_d;
+    const D radius = scale * size_1 * size_2 * size_s + abs(t) * (det_error + D(0x1p-50));
+    const D weight_radius = scale * size_d * size_s * max_x86(size_1, size_2) + det_error + D(0x1p-50);
+    const auto weight = [](D w) { return min_x86(max_x86(D(0.0), w), D(1.0)); };
+    float low[kLanes], high[kLanes], u[kLanes], v[kLanes];
+    (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) / det).store(u), weight(dot(d, q) / det).store(v);
+    // Comparisons that a NaN makes false.
+    const unsigned bounded = (det_error < D(0x1p-9)) & (weight_radius < D(0x1p-30));
+    for (int i = 0; i < kLanes; ++i) {
+      RoundedHit hit{low[i], u[i], v[i]};
+      if (__builtin_expect((bounded >> i & 1u) == 0 || low[i] != high[i], 0)) hit = exactly(i);
+      hit_[i]->t = hit.t, hit_[i]->u = hit.u, hit_[i]->v = hit.v;
+    }
+  }
+  [[nodiscard]] __attribute__((noinline)) RoundedHit exactly(int i) const {
+    const auto corner = [&](int k) { return Vec3f{corners_[k][i][0], corners_[k][i][1], corners_[k][i][2]}; };
+    return round_exactly({ray_[i]->origin, 0.0f, ray_[i]->direction, hit_[i]->t}, {corner(0), corner(1), corner(2)});
+  }
+
+  int count_ = 0;
+  const Ray* ray_[kLanes];
+  Hit* hit_[kLanes];
+  alignas(16) float corners_[3][kLanes][4];
+};
+
+#endif
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
