@@ -96,7 +96,7 @@ struct StructureInfo {
   bool holds_motion = false;                ///< takes a mesh with key frames and rays with times; the others hold one moment
   bool needs_motion = false;                ///< measured only where the scene moves
   bool takes_below = false;                 ///< stands above structures of another kind: BuilderParameters::below
-  std::string_view only_single_rays;        ///< why it has no other way of traversal, where that is so: what skipped cells say
+  std::string_view only_single_rays = {};   ///< why it has no other way of traversal, where that is so: what skipped cells say
   bool uses_parameters = true;              ///< false where the builders read none of BuilderParameters: sweeping them makes no new cells
 };
 

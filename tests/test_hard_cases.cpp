@@ -82,8 +82,6 @@ constexpr KnownLimit kKnownLimits[] = {
     {"H06", "pluecker", "wrong_surface", any, kTooSmall},
     {"H10", "moller_trumbore", "missed", any, kBeyondRange},
     {"H10", "pluecker", "missed", any, kBeyondRange},
-    {"H10", "watertight", "missed", any, kBeyondRange},
-    {"H10", "watertight_refined", "missed", any, kBeyondRange},
     {"H13", "moller_trumbore", "wrong_surface", any, kTNotRepresentable},
     {"H13", "pluecker", "wrong_surface", any, kTNotRepresentable},
     {"H13", "watertight", "wrong_surface", any, kTNotRepresentable},

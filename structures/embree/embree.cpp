@@ -47,7 +47,6 @@ const StructureInfo& EmbreeAccel::static_info() {
       .leaves = {std::begin(kLeaves), std::end(kLeaves)},
       .build_depends_on_isa = true,
       .build_depends_on_threads = true,
-      .only_single_rays = {},
       .uses_parameters = false,
   };
   return info;
