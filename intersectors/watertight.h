@@ -1,9 +1,9 @@
-// Watertight ray/triangle intersection (Woop, Benthin, Wald, JCGT 2(1) 2013), with each edge decided by comparing its
-// two rounded products instead of looking at the sign of their difference.
+// Watertight ray/triangle intersection (Woop, Benthin, Wald, JCGT 2(1) 2013), with each edge decided by its two rounded products
+// alone: the sign of their difference, which gradual underflow keeps, so the same as comparing them.
 //
 // Every vertex is translated, permuted and sheared once per (ray, vertex), alike in all triangles that share it, so the
 // rounded 2-D mesh stays closed; rounding is monotone, so an exact Cx*By > Cy*Bx is never computed as <, and a tie is
-// inside on both sides. No contraction can break it (comparisons do not fuse); the shear may fuse, being one expression
+// inside on both sides. The products must not be fused with their difference (-ffp-contract=off); the shear may, being one expression
 // for every vertex. A tie may be rounding alone, and then a triangle far beside the ray would be taken for hit (small
 // triangles seen from a great distance): in lanes that pass with a tie, double products, exact for float inputs, decide,
 // as in the paper.
