@@ -2,6 +2,7 @@
 // all instruction sets: SSE2 is in every x86-64.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -26,6 +27,16 @@ struct Box4 {
   return {lanes[0], lanes[1], lanes[2]};
 }
 
+/// Three coordinates of four points.
+struct Points4 {
+  __m128 x, y, z;
+  Points4(__m128 a, __m128 b, __m128 c, __m128 d) noexcept {
+    const __m128 ab = _mm_unpacklo_ps(a, b), cd = _mm_unpacklo_ps(c, d);
+    x = _mm_movelh_ps(ab, cd), y = _mm_movehl_ps(cd, ab);
+    z = _mm_movelh_ps(_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
+  }
+};
+
 /// A mesh's vertices in lanes x y z; the fourth holds anything.
 class TriangleVertices {
  public:
@@ -45,25 +56,34 @@ class TriangleVertices {
 /// A mesh's triangles as boxes.
 class TriangleBoxes {
  public:
-  explicit TriangleBoxes(const TriangleMesh& mesh) noexcept : triangles_(mesh.triangles.data()), vertices_(mesh.vertices.data()), corner_(mesh) {}
+  explicit TriangleBoxes(const TriangleMesh& mesh) noexcept
+      : triangles_(mesh.triangles.data()), vertices_(mesh.vertices.data()), corner_(mesh), far_(mesh.size() > kNear) {}
 
   [[nodiscard]] Box4 box(std::size_t i) const noexcept {
     const Triangle t = triangles_[i];
     const __m128 a = corner_[t.a], b = corner_[t.b], c = corner_[t.c];
     return {_mm_min_ps(_mm_min_ps(a, b), c), _mm_max_ps(_mm_max_ps(a, b), c)};
   }
-  void prefetch_triangle(std::size_t i) const noexcept { prefetch(triangles_ + i); }
-  /// The triangle itself is read for it.
-  void prefetch_vertices(std::size_t i) const noexcept {
-    const Triangle t = triangles_[i];
-    prefetch(vertices_ + t.a), prefetch(vertices_ + t.b), prefetch(vertices_ + t.c);
+  /// Asks for what boxes of the triangles ids[begin, end) take, of `last` + 1 ids in the order of their use: vertices some triangles ahead,
+  /// triangles twice as many. Not for a small mesh, which the caches hold.
+  template <class Ids>
+  void prefetch(const Ids& id, std::size_t begin, std::size_t end, std::size_t last) const noexcept {
+    if (!far_) return;
+    for (std::size_t i = begin; i < end; ++i) {
+      ask(triangles_ + id(std::min(i + 2 * kAhead, last)));
+      const Triangle t = triangles_[id(std::min(i + kAhead, last))];
+      ask(vertices_ + t.a), ask(vertices_ + t.b), ask(vertices_ + t.c);
+    }
   }
 
  private:
-  static void prefetch(const void* p) noexcept { _mm_prefetch(static_cast<const char*>(p), _MM_HINT_T0); }
+  static constexpr std::size_t kNear = std::size_t{1} << 17;  ///< triangles; some 2 MB
+  static constexpr std::size_t kAhead = 12;
+  static void ask(const void* p) noexcept { _mm_prefetch(static_cast<const char*>(p), _MM_HINT_T0); }
   const Triangle* triangles_;
   const Vec3f* vertices_;
   TriangleVertices corner_;
+  bool far_;
 };
 
 }  // namespace arboretum

@@ -1,7 +1,9 @@
 #include "structures/builders/collapse.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
+#include <utility>
 
 #include <emmintrin.h>
 #include <tbb/parallel_for.h>
@@ -17,24 +19,32 @@ constexpr float kLeafVisit = 0.25f;
 
 /// cost[k - 1]: least cost of the subtree in at most k slots of its parent; infinite above `slots`, and so is what stands before it.
 struct Collapse::Costs {
-  Costs() noexcept {
-    for (int i = 0; i < 2 * int(kMaxBranching); i += 4) _mm_store_ps(before + i, _mm_set1_ps(std::numeric_limits<float>::infinity()));
-  }
   alignas(16) float before[kMaxBranching];
   float cost[kMaxBranching];
   unsigned slots = 1;
+
+  /// Prepares for `most` slots.
+  void clear(unsigned most) noexcept {
+    const __m128 none = _mm_set1_ps(std::numeric_limits<float>::infinity());
+    unsigned i = 0;
+    do {
+      _mm_store_ps(before + kMaxBranching - 4 - i, none), _mm_store_ps(cost + i, none);
+    } while ((i += 4) < most);
+  }
 };
 
-/// least[k - 1]: the least sum of two subtrees' costs in exactly k slots; left[k - 1]: of these the left one's, the fewest of equals. All k in lanes.
+/// least[k - 1]: the least sum of two subtrees' costs in exactly k slots, k up to `slots`; left[k - 1]: of these the left one's, the fewest of
+/// equals. All k in lanes.
 struct Collapse::Shares {
   alignas(16) float least[kMaxBranching];
   alignas(16) std::int32_t left[kMaxBranching];
-  Shares(const Costs& a, const Costs& b, unsigned branching) noexcept {
+  Shares(const Costs& a, const Costs& b, unsigned slots) noexcept {
     unsigned at = 0;
     do {
       __m128 best = _mm_set1_ps(std::numeric_limits<float>::infinity());
       __m128i share = _mm_set1_epi32(1);
-      for (unsigned l = 1; l <= a.slots; ++l) {
+      const unsigned most_left = std::min(a.slots, at + 3);  // these lanes' slots are at + 1 .. at + 4, and the right side needs one too
+      for (unsigned l = at + 1 > b.slots ? at + 1 - b.slots : 1; l <= most_left; ++l) {
         const __m128 sum = _mm_add_ps(_mm_set1_ps(a.cost[l - 1]), _mm_loadu_ps(b.before + kMaxBranching + at - l));
         const __m128i less = _mm_castps_si128(_mm_cmplt_ps(sum, best));
         best = _mm_min_ps(sum, best);
@@ -42,7 +52,7 @@ struct Collapse::Shares {
       }
       _mm_store_ps(least + at, best);
       _mm_store_si128(reinterpret_cast<__m128i*>(left + at), share);
-    } while ((at += 4) < branching);
+    } while ((at += 4) < slots);
   }
 };
 
@@ -50,40 +60,40 @@ Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : t
   plan_.resize(tree.node_count);
   if (tree.primitives.empty()) return;
   if (settings_.optimal) {
-    choice_.resize(tree.node_count * settings_.branching);
+    choice_.resize((tree.node_count / 2 + 1) * settings_.branching);
     Costs root;
     optimise(0, root);
   } else {
     choose_leaves(0);
   }
-  measure(0);
 }
 
-/// Counts what the leaf made from this node would hold. Where a subtree's leaves may repeat primitives, so does not the leaf.
-void Collapse::plan_leaf(std::uint32_t index) {
+/// The references without repetitions, sorted, in `room`.
+static std::span<const std::uint32_t> distinct(std::span<const std::uint32_t> references, LeafPrimitives& room) noexcept {
+  const auto end = std::copy(references.begin(), references.end(), room.begin());
+  std::sort(room.begin(), end);
+  return {room.data(), std::size_t(std::unique(room.begin(), end) - room.begin())};
+}
+
+/// How many references the leaf made from this node would hold. Where a subtree's leaves may repeat primitives, so does not the leaf.
+unsigned Collapse::leaf_references(std::uint32_t index) const noexcept {
   const BinaryNode& node = tree_.nodes[index];
+  const bool repeats = tree_.duplicates && !node.is_leaf() && node.count <= kMaxMergedReferences && blocks_for(node.count) <= 2 * settings_.max_leaf_blocks;
+  if (!repeats) return std::min(node.count, kTooMany);
   LeafPrimitives room;
-  const bool repeats = tree_.duplicates && !node.is_leaf() && node.count <= room.size() && blocks_for(node.count) <= 2 * settings_.max_leaf_blocks;
-  plan_[index].references = repeats ? unsigned(primitives(index, room).size()) : std::min(node.count, kTooMany);
-}
-
-std::span<const std::uint32_t> Collapse::primitives(std::uint32_t index, LeafPrimitives& room) const noexcept {
-  const BinaryNode& node = tree_.nodes[index];
-  const std::span<const std::uint32_t> references{tree_.primitives.data() + tree_.begin_of(index), node.count};
-  if (!tree_.duplicates || node.is_leaf()) return references;
-  std::copy(references.begin(), references.end(), room.begin());
-  std::sort(room.begin(), room.begin() + node.count);
-  return {room.data(), std::size_t(std::unique(room.begin(), room.begin() + node.count) - room.begin())};
+  return unsigned(distinct({tree_.primitives.data() + tree_.begin_of(index), node.count}, room).size());
 }
 
 void Collapse::optimise(std::uint32_t index, Costs& out) {
   const BinaryNode& node = tree_.nodes[index];
   const float area = node.half_area();
-  plan_leaf(index);
-  const float leaf_cost = area * (kLeafVisit + float(blocks(index))) * settings_.intersection_cost;
+  const unsigned n = settings_.branching, references = tree_.duplicates ? leaf_references(index) : std::min(node.count, kTooMany);
+  const unsigned leaf_blocks = blocks_for(references);
+  const float leaf_cost = area * (kLeafVisit + float(leaf_blocks)) * settings_.intersection_cost;
+  out.clear(n);
   if (node.is_leaf()) {
     out.slots = 1, out.cost[0] = leaf_cost;
-    plan_[index].slots = 1, plan_[index].leaf = 1;
+    plan_[index] = {std::uint16_t(references), 1, true};
     return;
   }
   Costs left, right;
@@ -93,35 +103,33 @@ void Collapse::optimise(std::uint32_t index, Costs& out) {
     optimise(node.left, left);
     optimise(node.left + 1, right);
   }
-  const unsigned n = settings_.branching;
-  std::uint8_t* choice = &choice_[std::size_t(index) * n];
-  out.slots = std::min(n, left.slots + right.slots);
-  const Shares shares(left, right, n);
+  std::uint8_t* choice = &choice_[choices_of(index)];
+  const unsigned most = out.slots = std::min(n, left.slots + right.slots);
+  const Shares shares(left, right, most);
   const float* split_cost = shares.least;
   unsigned cheapest = 2;
-  for (unsigned k = 2; k <= out.slots; ++k) {
-    choice[k - 1] = std::uint8_t(shares.left[k - 1] - 1);
+  for (unsigned k = 3; k <= most; ++k) {
     if (split_cost[k - 1] < split_cost[cheapest - 1]) cheapest = k;
   }
   const float inner_cost = area * settings_.traversal_cost + split_cost[cheapest - 1];
-  plan_[index].leaf = node.count <= kMaxMergedReferences && blocks(index) <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;
-  plan_[index].slots = cheapest;
-  out.cost[0] = plan_[index].leaf ? leaf_cost : inner_cost;
+  const bool leaf = node.count <= kMaxMergedReferences && leaf_blocks <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;
+  plan_[index] = {std::uint16_t(references), std::uint16_t(cheapest), leaf};
+  float cost = out.cost[0] = leaf ? leaf_cost : inner_cost;
   // A leaf in one slot may still be opened into several, where the parent has them to spare.
   unsigned used = 1;
-  for (unsigned k = 2; k <= out.slots; ++k) {
-    out.cost[k - 1] = out.cost[k - 2];
-    if (split_cost[k - 1] < out.cost[k - 2]) out.cost[k - 1] = split_cost[k - 1], used = k;
-    choice[k - 1] = std::uint8_t(choice[k - 1] | (used - 1) << 4);
+  for (unsigned k = 2; k <= most; ++k) {
+    if (split_cost[k - 1] < cost) cost = split_cost[k - 1], used = k;
+    out.cost[k - 1] = cost;
+    choice[k - 1] = std::uint8_t(unsigned(shares.left[k - 1] - 1) | (used - 1) << 4);
   }
 }
 
 void Collapse::choose_leaves(std::uint32_t index) {
   const BinaryNode& node = tree_.nodes[index];
-  plan_[index].slots = settings_.branching;
-  plan_leaf(index);
-  plan_[index].leaf = node.is_leaf() || blocks(index) <= 1;
-  if (plan_[index].leaf) return;
+  const unsigned references = leaf_references(index);
+  const bool leaf = node.is_leaf() || blocks_for(references) <= 1;
+  plan_[index] = {std::uint16_t(references), std::uint16_t(settings_.branching), leaf};
+  if (leaf) return;
   if (node.count > kParallel) {
     tbb::parallel_invoke([&] { choose_leaves(node.left); }, [&] { choose_leaves(node.left + 1); });
   } else {
@@ -132,14 +140,14 @@ void Collapse::choose_leaves(std::uint32_t index) {
 
 void Collapse::expand(std::uint32_t index, unsigned slots, Slots& out) const noexcept {
   if (slots > 1) {
-    const std::uint8_t* choice = &choice_[std::size_t(index) * settings_.branching];
+    const std::uint8_t* choice = &choice_[choices_of(index)];
     if (const unsigned used = (choice[slots - 1] >> 4) + 1u; used > 1) return expand_children(index, used, out);
   }
   out.node[out.size++] = index;
 }
 
 void Collapse::expand_children(std::uint32_t index, unsigned slots, Slots& out) const noexcept {
-  const unsigned left_slots = (choice_[std::size_t(index) * settings_.branching + slots - 1] & 15u) + 1;
+  const unsigned left_slots = (choice_[choices_of(index) + slots - 1] & 15u) + 1;
   const std::uint32_t left = tree_.nodes[index].left;
   expand(left, left_slots, out);
   expand(left + 1, slots - left_slots, out);
@@ -168,24 +176,63 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
   return out;
 }
 
-std::uint64_t Collapse::measure(std::uint32_t index) {
-  const auto round_up = [granule = settings_.granule](std::uint64_t bytes) { return (bytes + granule - 1) / granule * granule; };
-  std::uint64_t total;
-  if (is_leaf(index)) {
-    total = round_up(blocks(index) * settings_.block_bytes);
-  } else {
-    total = round_up(settings_.node_bytes);
-    const Slots slots = children(index);
-    if (tree_.nodes[index].count > kParallel) {
-      std::uint64_t part[kMaxBranching];
-      tbb::parallel_for(0u, slots.size, [&](unsigned i) { part[i] = measure(slots.node[i]); });
-      for (unsigned i = 0; i < slots.size; ++i) total += part[i];
-    } else {
-      for (unsigned i = 0; i < slots.size; ++i) total += measure(slots.node[i]);
+/// Places in the array depend on scheduling, the tree does not.
+class Collapse::Writer {
+ public:
+  Writer(const Collapse& collapse, ReservedArray<WideNode>& out) : collapse_(collapse), tree_(collapse.tree_), out_(out) { out.hand_out(1); }
+
+  void write(std::uint32_t index, std::uint32_t place) {
+    const BinaryNode& node = tree_.nodes[index];
+    WideNode& out = out_[place];
+    out.box = {node.lower, node.upper}, out.count = node.count;
+    if (collapse_.is_leaf(index)) {
+      const unsigned blocks = collapse_.blocks(index);
+      out.first = tree_.begin_of(index);
+      out.children = 0, out.blocks = blocks, out.repeats = tree_.duplicates && !node.is_leaf();
+      out.bytes = round_up(blocks * collapse_.settings_.block_bytes);
+      return;
     }
+    const Slots slots = collapse_.children(index);
+    const std::uint32_t first = out.first = next_.fetch_add(slots.size, std::memory_order_relaxed);
+    out_.hand_out(slots.size);
+    out.children = slots.size, out.blocks = 0, out.repeats = false;
+    if (node.count > kParallel) {
+      tbb::parallel_for(0u, slots.size, [&](unsigned i) { write(slots.node[i], first + i); });
+    } else {
+      for (unsigned i = 0; i < slots.size; ++i) write(slots.node[i], first + i);
+    }
+    std::uint64_t bytes = round_up(collapse_.settings_.node_bytes);
+    for (unsigned i = 0; i < slots.size; ++i) bytes += out_[first + i].bytes;
+    out.bytes = bytes;
   }
-  plan_[index].bytes = total;
-  return total;
+
+ private:
+  [[nodiscard]] std::uint64_t round_up(std::uint64_t bytes) const noexcept {
+    const std::uint64_t granule = collapse_.settings_.granule;
+    return (bytes + granule - 1) / granule * granule;
+  }
+  const Collapse& collapse_;
+  const BinaryTree& tree_;
+  ReservedArray<WideNode>& out_;
+  std::atomic<std::uint32_t> next_{1};
+};
+
+void Collapse::write(ReservedArray<WideNode>& out) const {
+  out.reserve(tree_.node_count);
+  if (!tree_.primitives.empty()) Writer(*this, out).write(0, 0);
+}
+
+WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings) {
+  WideTree wide;
+  Collapse(tree, settings).write(wide.nodes);
+  wide.primitives = std::move(tree.primitives);
+  tree.nodes.clear(), tree.first.clear();
+  return wide;
+}
+
+std::span<const std::uint32_t> WideTree::leaf_primitives(const WideNode& leaf, LeafPrimitives& room) const noexcept {
+  const std::span<const std::uint32_t> references{primitives.data() + leaf.first, leaf.count};
+  return leaf.repeats ? distinct(references, room) : references;
 }
 
 }  // namespace arboretum

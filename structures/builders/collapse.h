@@ -35,7 +35,34 @@ struct Slots {
   std::uint32_t node[kMaxBranching];
 };
 
-/// Decides which binary nodes become wide nodes and which leaves, and how many bytes each such subtree takes.
+/// A node or leaf of a wide tree.
+struct WideNode {
+  Bounds3f box;
+  std::uint32_t first;     ///< of a node's children in WideTree::nodes; of a leaf's references in WideTree::primitives
+  std::uint32_t count;     ///< references below
+  std::uint64_t bytes : 48;  ///< of the subtree: its own, in granules, and all below
+  std::uint64_t children : 6;  ///< 0 for a leaf
+  std::uint64_t blocks : 9;    ///< of a leaf
+  std::uint64_t repeats : 1;   ///< the leaf's references may name a primitive more than once
+
+  [[nodiscard]] bool is_leaf() const noexcept { return children == 0; }
+};
+static_assert(sizeof(WideNode) == 40);
+
+/// What of a binary tree becomes of a wide one: all that has to be known to write it. Node 0 is the root, children stand next to each other.
+struct WideTree {
+  ReservedArray<WideNode> nodes;
+  MeteredVector<std::uint32_t> primitives;
+
+  [[nodiscard]] std::span<const WideNode> children(const WideNode& node) const noexcept { return {nodes.data() + node.first, node.children}; }
+  /// The primitives of a leaf, none of them twice; in `room`, or in the tree where it holds them so.
+  [[nodiscard]] std::span<const std::uint32_t> leaf_primitives(const WideNode& leaf, LeafPrimitives& room) const noexcept;
+};
+
+/// The wide tree, and none of the binary one any more.
+[[nodiscard]] WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings);
+
+/// Decides which binary nodes become wide nodes and which leaves.
 class Collapse {
  public:
   Collapse(const BinaryTree& tree, const CollapseSettings& settings);
@@ -44,34 +71,34 @@ class Collapse {
   [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept { return plan_[node].leaf; }
   /// The children of the wide node made from `node`, which is not a leaf.
   [[nodiscard]] Slots children(std::uint32_t node) const noexcept;
-  /// Bytes of the subtree at a node that is_leaf() or is some children()'s: its own, in granules, and all below.
-  [[nodiscard]] std::uint64_t bytes(std::uint32_t node) const noexcept { return plan_[node].bytes; }
   /// Blocks of the leaf made from `node`, which is_leaf().
   [[nodiscard]] unsigned blocks(std::uint32_t node) const noexcept { return blocks_for(plan_[node].references); }
-  /// The primitives of that leaf, none of them twice; in `room`, or in the tree where it holds them so.
-  [[nodiscard]] std::span<const std::uint32_t> primitives(std::uint32_t node, LeafPrimitives& room) const noexcept;
+  /// Writes the wide tree's nodes.
+  void write(ReservedArray<WideNode>& out) const;
 
  private:
   struct Plan {
-    std::uint64_t bytes : 48;
-    std::uint64_t references : 10;  ///< of a leaf: without those that repeat
-    std::uint64_t slots : 5;        ///< optimal: how many children the wide node made from this one has
-    std::uint64_t leaf : 1;
+    std::uint16_t references : 10;  ///< of a leaf: without those that repeat
+    std::uint16_t slots : 5;        ///< optimal: how many children the wide node made from this one has
+    std::uint16_t leaf : 1;
   };
   struct Costs;
   struct Shares;
+  class Writer;
   void optimise(std::uint32_t node, Costs& out);
   void choose_leaves(std::uint32_t node);
-  std::uint64_t measure(std::uint32_t node);
-  void plan_leaf(std::uint32_t node);
+  [[nodiscard]] unsigned leaf_references(std::uint32_t node) const noexcept;
   [[nodiscard]] unsigned blocks_for(unsigned references) const noexcept { return (references + settings_.block_width - 1) / settings_.block_width; }
   void expand(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
   void expand_children(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
 
+  /// Of an inner node: one row for each pair of children.
+  [[nodiscard]] std::size_t choices_of(std::uint32_t node) const noexcept { return std::size_t(tree_.nodes[node].left / 2) * settings_.branching; }
+
   const BinaryTree& tree_;
   const CollapseSettings settings_;
   MeteredVector<Plan> plan_;
-  /// [node * branching + k - 1], k >= 2: below, the left child's share of k slots less one; above (4 bits), how many of at most
+  /// [choices_of(node) + k - 1], k >= 2: below, the left child's share of k slots less one; above (4 bits), how many of at most
   /// k slots to use, less one.
   MeteredVector<std::uint8_t> choice_;
 };

@@ -1,5 +1,7 @@
 // Linear BVH (Lauterbach et al., Eurographics 2009): triangles in Morton order, cut from the top where the highest differing bit
 // of the codes changes; boxes on the way back. Equal codes are cut in the middle, so a million of them are 20 levels.
+//
+// Unlike in the paper a range that a few leaf blocks hold is cut only where those are not made more, so that leaves are full.
 #include <algorithm>
 
 #include <tbb/parallel_invoke.h>
@@ -14,53 +16,56 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kParallel = 1u << 12;
-constexpr std::size_t kAhead = 12;  ///< vertices are asked for so many triangles before their use, triangles twice as many
+constexpr std::size_t kFewBlocks = 4;  ///< ranges of so many leaf blocks are cut where they fill no more
+constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 21 bits of their codes at first, in two passes; more by 30 bits, in three
 
 class Lbvh {
  public:
-  Lbvh(const TriangleMesh& mesh, const MortonOrder& order, unsigned leaf_width, BinaryTree& tree)
+  Lbvh(const TriangleMesh& mesh, MortonOrder& order, unsigned leaf_width, BinaryTree& tree)
       : boxes_(mesh), order_(order), leaf_width_(leaf_width), tree_(tree), pool_(tree, order.size(), kParallel) {}
 
   void build() {
     const std::size_t n = order_.size();
     tree_.primitives.resize(n);
     NodePool::Share share;
-    recurse(0, n, 0, share);
+    recurse(0, n, 0, order_.sorted_bits(), share);
     pool_.finish();
   }
 
  private:
   Box4 leaf(std::size_t begin, std::size_t end) noexcept {
-    const std::size_t last = order_.size() - 1;
+    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, order_.size() - 1);
     Box4 box;
-    for (std::size_t i = begin; i < end; ++i) {
-      boxes_.prefetch_triangle(order_.id(std::min(i + 2 * kAhead, last)));
-      boxes_.prefetch_vertices(order_.id(std::min(i + kAhead, last)));
-      box.extend(boxes_.box(tree_.primitives[i] = order_.id(i)));
-    }
+    for (std::size_t i = begin; i < end; ++i) box.extend(boxes_.box(tree_.primitives[i] = order_.id(i)));
     return box;
   }
 
-  Box4 recurse(std::size_t begin, std::size_t end, std::uint32_t index, NodePool::Share& share) {
+  std::size_t split(std::size_t begin, std::size_t end) const noexcept {
+    return end - begin <= kFewBlocks * leaf_width_ ? order_.split_into_blocks(begin, end, leaf_width_) : order_.split(begin, end);
+  }
+
+  /// [begin, end) is sorted by the first `sorted` bits of the codes.
+  Box4 recurse(std::size_t begin, std::size_t end, std::uint32_t index, unsigned sorted, NodePool::Share& share) {
     Box4 box;
     std::uint32_t left = 0;
     if (end - begin <= leaf_width_) {
       tree_.first[index] = std::uint32_t(begin);
       box = leaf(begin, end);
     } else {
-      const std::size_t middle = order_.split(begin, end);
+      while (order_.refinable(begin, end, sorted)) sorted = order_.refine(begin, end, sorted);
+      const std::size_t middle = split(begin, end);
       left = pool_.take_pair(share);
       Box4 other;
       if (middle - begin > kParallel && end - middle > kParallel) {
         tbb::parallel_invoke(
             [&] {
               NodePool::Share own;
-              box = recurse(begin, middle, left, own);
+              box = recurse(begin, middle, left, sorted, own);
             },
-            [&] { other = recurse(middle, end, left + 1, share); });
+            [&] { other = recurse(middle, end, left + 1, sorted, share); });
       } else {
-        box = recurse(begin, middle, left, share);
-        other = recurse(middle, end, left + 1, share);
+        box = recurse(begin, middle, left, sorted, share);
+        other = recurse(middle, end, left + 1, sorted, share);
       }
       box.extend(other);
     }
@@ -69,7 +74,7 @@ class Lbvh {
   }
 
   const TriangleBoxes boxes_;
-  const MortonOrder& order_;
+  MortonOrder& order_;
   const unsigned leaf_width_;
   BinaryTree& tree_;
   NodePool pool_;
@@ -82,7 +87,7 @@ void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters,
   check_morton_bits(parameters.morton_bits);
   if (mesh.size() == 0) return;
   double start = wall_seconds();
-  const MortonOrder order(mesh, parameters.morton_bits);
+  MortonOrder order(mesh, parameters.morton_bits, mesh.size() <= kSmall ? 21 : MortonOrder::kAtOnce);
   report.phases.emplace_back("order", wall_seconds() - start);
   start = wall_seconds();
   Lbvh(mesh, order, leaf_width, tree).build();

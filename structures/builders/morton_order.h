@@ -1,41 +1,78 @@
 // The order of a mesh's triangles along a Morton curve through their centroids (Lauterbach et al., "Fast BVH Construction on
 // GPUs", Eurographics 2009), with codes of 30 or 63 bits.
+//
+// Only a code's first bits are sorted by; the next ones are looked at where triangles that share those have to be told apart, which in most
+// scenes are few. So a sort takes two or three passes, and whoever cuts the order asks for more bits where he is to cut between equals.
 #pragma once
 
 #include <cstdint>
 
-#include "core/mesh.h"
+#include <emmintrin.h>
+
 #include "core/memory_meter.h"
+#include "core/mesh.h"
+#include "structures/builders/box4.h"
 
 namespace arboretum {
 
 /// Throws UserError unless `bits` is 30 or 63.
 void check_morton_bits(unsigned bits);
 
-/// Triangles sorted by code, those of one code by id. Of 63 bits the lower 31 count only where more than a few triangles have the same upper 32:
-/// most scenes need no look at them.
+/// Cells of a cube around (doubled) points: cells as wide on each axis make better boxes than the scene's own proportions.
+class MortonCells {
+ public:
+  MortonCells() = default;
+  MortonCells(const Box4& points, unsigned bits);
+  /// The code of a point. Points outside count as on the cube's faces, a NaN, as where coordinates overflow, as 0.
+  [[nodiscard]] std::uint64_t code(__m128 point) const noexcept;
+  /// The first 30 bits of four points' codes.
+  [[nodiscard]] __m128i first_bits(const __m128 (&point)[4]) const noexcept;
+
+ private:
+  [[nodiscard]] static __m128i number(__m128 at, __m128 lower, __m128 scale, __m128 last) noexcept {
+    return _mm_cvttps_epi32(_mm_min_ps(_mm_max_ps(_mm_mul_ps(_mm_sub_ps(at, lower), scale), _mm_setzero_ps()), last));
+  }
+  __m128 lower_, last_, scale_;
+  int fine_bits_ = 0;  ///< of a cell's number on an axis, beyond the first ten
+};
+
+/// Triangles sorted by the first bits of their codes, those that share them by id.
 class MortonOrder {
  public:
-  /// `bits`: 30 or 63. Runs in the caller's TBB arena. Coordinates are finite.
-  MortonOrder(const TriangleMesh& mesh, unsigned bits);
+  static constexpr unsigned kAtOnce = 30;  ///< bits of a code that are sorted by at a time, at most
+
+  /// `bits` of a code, 30 or 63, of which the first `sorted`, kAtOnce at most, are sorted by. Runs in the caller's TBB arena. Coordinates are finite.
+  MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorted);
 
   [[nodiscard]] std::size_t size() const noexcept { return keys_.size(); }
   [[nodiscard]] std::uint32_t id(std::size_t i) const noexcept { return std::uint32_t(keys_[i]); }
+  /// Bits that refine() may be told of: those sorted by so far, of all ranges to begin with.
+  [[nodiscard]] unsigned sorted_bits() const noexcept { return sorted_; }
+  /// Whether [begin, end), whose codes are the same as far as they are sorted by, could be told apart by more bits than the first `sorted`.
+  [[nodiscard]] bool refinable(std::size_t begin, std::size_t end, unsigned sorted) const noexcept {
+    return sorted < bits_ && code(begin) == code(end - 1);
+  }
+  /// Sorts such a range by the next bits and returns how many it is sorted by then. From now on it has codes of its own, for cuts inside it.
+  unsigned refine(std::size_t begin, std::size_t end, unsigned sorted);
+  /// Refines every run of more than `longest` equal codes as far as there are bits. No split() any more.
+  void refine_runs(std::size_t longest);
+
   /// Where [begin, end) of two or more parts: behind the last code that lacks the highest bit in which the first and the last
   /// code differ; in the middle where all are equal.
   [[nodiscard]] std::size_t split(std::size_t begin, std::size_t end) const noexcept;
+  /// Where it parts if it is to fill no more blocks of `width` on both sides together than it needs as a whole, two at least: of these places the one
+  /// where the highest bit changes, the first of equals.
+  [[nodiscard]] std::size_t split_into_blocks(std::size_t begin, std::size_t end, std::size_t width) const noexcept;
 
  private:
-  template <class F>
-  void for_runs(const F& f) const;
-  template <class Rest>
-  void refine(const Rest& rest);
-  template <class Code>
-  [[nodiscard]] static std::size_t split_at_bit(std::size_t begin, std::size_t end, const Code& code) noexcept;
+  [[nodiscard]] std::uint32_t code(std::size_t i) const noexcept { return std::uint32_t(keys_[i] >> 32); }
+  Box4 make_keys();
+  void refine_runs(std::size_t begin, std::size_t end, std::size_t longest, unsigned sorted);
 
-  /// The code's upper 32 bits (all 30 of the shorter), then the id.
-  MeteredVector<std::uint64_t> keys_;
-  MeteredVector<std::uint32_t> rest_;  ///< the lower 31 bits by place, 0 in short runs; empty where there are no others
+  TriangleBoxes boxes_;
+  MortonCells cells_;
+  unsigned bits_, sorted_;
+  MeteredVector<std::uint64_t> keys_;  ///< the bits of the code that were sorted by last, then the id
 };
 
 }  // namespace arboretum

@@ -26,6 +26,8 @@ constexpr std::size_t kFew = 1024;        ///< with this many clusters any round
 constexpr std::size_t kLeastShare = 64;   ///< one cluster in so many has to merge
 constexpr unsigned kMaxRadius = 128;
 
+constexpr std::size_t kShortRun = 8;  ///< triangles that may share the first bits of their codes and stand in order of their ids
+
 class Ploc {
  public:
   Ploc(const TriangleMesh& mesh, const MortonOrder& order, unsigned radius, LinkedTree& tree) : radius_(radius), tree_(tree) {
@@ -191,7 +193,8 @@ void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, u
   };
   LinkedTree clusters;
   {
-    const MortonOrder order(mesh, parameters.morton_bits);
+    MortonOrder order(mesh, parameters.morton_bits, MortonOrder::kAtOnce);
+    order.refine_runs(kShortRun);
     phase("order");
     Ploc(mesh, order, parameters.ploc_radius, clusters).run();
   }

@@ -59,8 +59,10 @@ class TreeWriter {
 
   /// For at most `references` references; `ids` are the bytes of a reference buffer, where leaves keep their ids until finish().
   TreeWriter(BinaryTree& tree, std::size_t references, Reference* ids) : tree_(tree), ids_(ids) {
-    // Fewer than n / kParallel + 1 pools (both sides of a split into tasks are larger than that) leave a block unfinished each.
-    tree.nodes.reserve(2 * references + (references / kParallel + 2) * kBlock), tree.first.reserve(tree.nodes.size());
+    // Fewer than n / kParallel + 1 pools (both sides of a split into tasks are larger than that) leave a block unfinished each, and one a thread
+    // where ranges that were set aside are built.
+    const std::size_t pools = references / kParallel + 2 + std::size_t(tbb::this_task_arena::max_concurrency());
+    tree.nodes.reserve(2 * references + pools * kBlock), tree.first.reserve(tree.nodes.size());
     hand_out(1);
   }
 

@@ -45,7 +45,7 @@ class SweepSah {
     for (const Bounds3f& b : boxes_) all.extend(b);
     split(0, 0, n, all);
     tree_.node_count = next_.load();
-    order_[1] = {}, order_[2] = {};
+    for (int axis : {1, 2}) MeteredVector<std::uint32_t>().swap(order_[axis]);  // an assignment would keep the memory
     tree_.primitives = std::move(order_[0]);
     phase("splits");
   }

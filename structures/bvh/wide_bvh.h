@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -33,68 +35,61 @@ class Emitter {
  public:
   using Node = typename Format::Node;
 
-  Emitter(const TriangleMesh& mesh, const LeafForm& form, const BinaryTree& tree, const Collapse& collapse, std::byte* base)
-      : mesh_(mesh), boxes_(mesh), form_(form), tree_(tree), collapse_(collapse), base_(base) {}
+  Emitter(const TriangleMesh& mesh, const LeafForm& form, const WideTree& tree, std::byte* base)
+      : mesh_(mesh), boxes_(mesh), form_(form), tree_(tree), base_(base) {}
 
   /// Returns the depth of the deepest leaf below.
-  unsigned subtree(std::uint32_t index, std::size_t offset) const {
+  unsigned subtree(const WideNode& from, std::size_t offset) const {
     auto* node = new (base_ + offset) Node;
     std::size_t next = offset + round_up<Format>(sizeof(Node));
-    const Slots slots = collapse_.children(index);
+    const std::span<const WideNode> children = tree_.children(from);
+    const auto count = unsigned(children.size());
     std::size_t child_offset[kMaxBranching];
     for (const bool leaves : {true, false}) {
-      for (unsigned i = 0; i < slots.size; ++i) {
-        if (collapse_.is_leaf(slots.node[i]) != leaves) continue;
+      for (unsigned i = 0; i < count; ++i) {
+        if (children[i].is_leaf() != leaves) continue;
         child_offset[i] = next;
-        next += collapse_.bytes(slots.node[i]);
+        next += children[i].bytes;
       }
     }
     Bounds3f boxes[kMaxBranching];
     NodeReference references[kMaxBranching] = {};
-    for (unsigned i = 0; i < slots.size; ++i) {
-      boxes[i] = {tree_.nodes[slots.node[i]].lower, tree_.nodes[slots.node[i]].upper};
-      references[i] = reference(slots.node[i], child_offset[i]);
+    for (unsigned i = 0; i < count; ++i) {
+      boxes[i] = children[i].box;
+      references[i] = reference(children[i], child_offset[i]);
     }
-    Format::write(*node, boxes, references, slots.size);
+    Format::write(*node, boxes, references, count);
     unsigned depth[kMaxBranching] = {};
     const auto descend = [&](unsigned i) {
-      if (collapse_.is_leaf(slots.node[i])) {
-        leaf(slots.node[i], child_offset[i]);
+      if (children[i].is_leaf()) {
+        leaf(children[i], child_offset[i]);
       } else {
-        depth[i] = subtree(slots.node[i], child_offset[i]);
+        depth[i] = subtree(children[i], child_offset[i]);
       }
     };
-    if (tree_.nodes[index].count > kParallel) {
-      tbb::parallel_for(0u, slots.size, descend);
+    if (from.count > kParallel) {
+      tbb::parallel_for(0u, count, descend);
     } else {
-      for (unsigned i = 0; i < slots.size; ++i) descend(i);
+      for (unsigned i = 0; i < count; ++i) descend(i);
     }
-    return 1 + *std::max_element(depth, depth + slots.size);
+    return 1 + *std::max_element(depth, depth + count);
   }
 
-  void leaf(std::uint32_t index, std::size_t offset) const {
-    const std::uint32_t begin = tree_.begin_of(index), end = begin + tree_.nodes[index].count;
-    const std::size_t last = tree_.primitives.size() - 1;
-    for (std::size_t i = begin; i < end; ++i) {
-      boxes_.prefetch_triangle(tree_.primitives[std::min(i + 2 * kAhead, last)]);
-      boxes_.prefetch_vertices(tree_.primitives[std::min(i + kAhead, last)]);
-    }
+  void leaf(const WideNode& from, std::size_t offset) const {
+    boxes_.prefetch([&](std::size_t i) { return tree_.primitives[i]; }, from.first, from.first + from.count, tree_.primitives.size() - 1);
     LeafPrimitives room;
-    form_.fill(base_ + offset, mesh_, collapse_.primitives(index, room));
+    form_.fill(base_ + offset, mesh_, tree_.leaf_primitives(from, room));
   }
 
-  [[nodiscard]] NodeReference reference(std::uint32_t index, std::size_t offset) const {
-    return NodeReference(offset) | (collapse_.is_leaf(index) ? kLeafBit | (collapse_.blocks(index) - 1) : 0u);
+  [[nodiscard]] static NodeReference reference(const WideNode& node, std::size_t offset) noexcept {
+    return NodeReference(offset) | (node.is_leaf() ? kLeafBit | NodeReference(node.blocks - 1) : 0u);
   }
 
  private:
-  static constexpr std::size_t kAhead = 12;  ///< vertices are asked for so many triangles before their use, triangles twice as many
-
   const TriangleMesh& mesh_;
   const TriangleBoxes boxes_;
   const LeafForm& form_;
-  const BinaryTree& tree_;
-  const Collapse& collapse_;
+  const WideTree& tree_;
   std::byte* base_;
 };
 
@@ -128,8 +123,8 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   build_binary_tree(mesh, settings, form->width, tree, report);
 
   double start = wall_seconds();
-  const Collapse collapse(tree, {unsigned(kBranching), form->width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
-                                 p.collapse == "optimal", sizeof(typename Format::Node), form->bytes, Format::kGranule});
+  const WideTree wide = collapse(std::move(tree), {unsigned(kBranching), form->width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
+                                                   p.collapse == "optimal", sizeof(typename Format::Node), form->bytes, Format::kGranule});
   report.phases.emplace_back("collapse", wall_seconds() - start);
 
   start = wall_seconds();
@@ -141,22 +136,23 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
     set_scene(mesh, {});
     return;
   }
-  const std::uint64_t bytes = collapse.bytes(0);
+  const WideNode& root = wide.nodes[0];
+  const std::uint64_t bytes = root.bytes;
   if (bytes > std::numeric_limits<NodeReference>::max()) {
     throw UserError(std::string(kName) + " with " + settings.leaf + " would take " + std::to_string(bytes >> 20) +
                     " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
   }
   arena_ = Arena(bytes);
-  const Emitter<Format> emitter(mesh, *form, tree, collapse, arena_.data());
-  root_ = emitter.reference(0, 0);
+  const Emitter<Format> emitter(mesh, *form, wide, arena_.data());
+  root_ = emitter.reference(root, 0);
   unsigned depth = 0;
   if (is_leaf(root_)) {
-    emitter.leaf(0, 0);
+    emitter.leaf(root, 0);
   } else {
-    depth = emitter.subtree(0, 0);
+    depth = emitter.subtree(root, 0);
   }
   stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
-  set_scene(mesh, {tree.nodes[0].lower, tree.nodes[0].upper});
+  set_scene(mesh, root.box);
   report.phases.emplace_back("leaves", wall_seconds() - start);
 }
 

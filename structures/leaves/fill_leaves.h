@@ -13,16 +13,6 @@ template <class Block>
 inline constexpr bool kFillsByFours =
     (Block::kForm == TriangleForm::edges || Block::kForm == TriangleForm::vertices) && Block::kWidth % 4 == 0;
 
-/// Three coordinates of four points.
-struct Points4 {
-  __m128 x, y, z;
-  Points4(__m128 a, __m128 b, __m128 c, __m128 d) noexcept {
-    const __m128 ab = _mm_unpacklo_ps(a, b), cd = _mm_unpacklo_ps(c, d);
-    x = _mm_movelh_ps(ab, cd), y = _mm_movehl_ps(cd, ab);
-    z = _mm_movelh_ps(_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
-  }
-};
-
 /// Lanes whose points are clearly not collinear in the plane. In float, so fewer than clearly_not_collinear() finds: the same bound for
 /// this precision, and what products lose by underflow. NaN and overflow count as not clear.
 [[nodiscard]] inline __m128 clearly_not_collinear(__m128 ax, __m128 ay, __m128 bx, __m128 by, __m128 cx, __m128 cy) noexcept {
@@ -49,13 +39,16 @@ void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleV
   }
   Points4 a(corner[0][0], corner[0][1], corner[0][2], corner[0][3]), b(corner[1][0], corner[1][1], corner[1][2], corner[1][3]),
       c(corner[2][0], corner[2][1], corner[2][2], corner[2][3]);
-  const __m128 clear = _mm_or_ps(clearly_not_collinear(a.x, a.y, b.x, b.y, c.x, c.y),
-                                 _mm_or_ps(clearly_not_collinear(a.y, a.z, b.y, b.z, c.y, c.z), clearly_not_collinear(a.z, a.x, b.z, b.x, c.z, c.x)));
-  if (const int mask = _mm_movemask_ps(clear), all = (1 << ids.size()) - 1; (mask & all) != all) [[unlikely]] {
+  // Nearly all triangles are clear in the first projection, walls along an axis in one of the others.
+  const int all = (1 << ids.size()) - 1;
+  int clear = _mm_movemask_ps(clearly_not_collinear(a.x, a.y, b.x, b.y, c.x, c.y));
+  if ((clear & all) != all) clear |= _mm_movemask_ps(clearly_not_collinear(a.y, a.z, b.y, b.z, c.y, c.z));
+  if ((clear & all) != all) clear |= _mm_movemask_ps(clearly_not_collinear(a.z, a.x, b.z, b.x, c.z, c.x));
+  if ((clear & all) != all) [[unlikely]] {
     alignas(16) std::uint32_t flat[4] = {};
     for (std::size_t i = 0; i < ids.size(); ++i) {
       const std::array<Vec3f, 3> corners = mesh.corners(ids[i]);
-      if ((mask >> i & 1) == 0 && has_zero_area(corners[0], corners[1], corners[2])) flat[i] = ~0u;
+      if ((clear >> i & 1) == 0 && has_zero_area(corners[0], corners[1], corners[2])) flat[i] = ~0u;
     }
     const __m128 nan = _mm_load_ps(reinterpret_cast<const float*>(flat));  // all bits set are a NaN
     for (Points4* p : {&a, &b, &c}) p->x = _mm_or_ps(p->x, nan), p->y = _mm_or_ps(p->y, nan), p->z = _mm_or_ps(p->z, nan);
