@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -172,9 +174,9 @@ std::vector<KernelScene> degenerate_scenes() {
   return scenes;
 }
 
-double sah_of(std::string_view builder, const TriangleMesh& mesh) {
+double sah_of(std::string_view builder, const TriangleMesh& mesh, const BuilderParameters& parameters = {}) {
   BuildSettings settings;
-  settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa();
+  settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa(), settings.parameters = parameters;
   BuildReport report;
   const auto accel = build_structure("bvh2", mesh, settings, report);
   return compute_statistics(*accel, mesh, {}, false).sah_cost;
@@ -263,6 +265,40 @@ TEST_CASE("more bits tell more triangles apart") {
   CHECK(area(63) < 0.2 * area(30));
 }
 
+TEST_CASE("morton: what three leaf blocks hold fills no more than it needs") {
+  std::vector<Vec3f> centres = random_points(20000, 1.0f, 6);
+  for (int i = 0; i < 5000; ++i) centres.push_back(centres[std::size_t(i % 50)]);  // a hundred and more of one code
+  const TriangleMesh mesh = copies(centres, std::vector<float>(centres.size(), 1e-3f));
+  for (const unsigned width : {1u, 4u, 8u, 16u}) {
+    INFO("blocks of " << width);
+    const BinaryTree tree = build("morton", mesh, width);
+    std::size_t seen = 0, wrong = 0;
+    const auto leaves = [&](const auto& self, std::uint32_t index) -> std::size_t {
+      const BinaryNode& node = tree.nodes[index];
+      const std::size_t count = node.is_leaf() ? 1 : self(self, node.left) + self(self, node.left + 1);
+      if (node.count <= 3 * width) ++seen, wrong += count != (node.count + width - 1) / width;
+      return count;
+    };
+    leaves(leaves, 0);
+    CHECK(seen > 25000 / (4 * width));
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("morton: vertices that no triangle has do not spoil the tree") {
+  TriangleMesh mesh = sphere(100);
+  BuilderParameters parameters;
+  parameters.morton_bits = 30;  // with 63 more bits would be looked at where the first tell nothing apart
+  const double cost = sah_of("morton", mesh, parameters);
+  for (const Vec3f stray : {Vec3f{1e6f, 0, 0}, Vec3f{std::numeric_limits<float>::quiet_NaN(), 0, 0}, Vec3f{0, std::numeric_limits<float>::infinity(), 0}}) {
+    INFO("stray vertex " << stray.x << " " << stray.y);
+    mesh.vertices.push_back(stray);
+    check_tree(build("morton", mesh, 4, 1, best_isa(), parameters), mesh, 4, false);
+    CHECK(std::fabs(sah_of("morton", mesh, parameters) / cost - 1.0) < 0.03);
+    mesh.vertices.pop_back();
+  }
+}
+
 TEST_CASE("reinsertion lowers the SAH cost of every builder's tree") {
   std::vector<KernelScene> scenes;
   scenes.push_back({"random 20000", random_triangles(20000, 0.1f, 6)});
@@ -309,6 +345,17 @@ TEST_CASE("spatial splits keep their budget") {
   BuilderParameters parameters;
   parameters.duplication_budget = 5.0f;
   CHECK_THROWS_AS(build("spatial_sah", mesh, 4, 1, best_isa(), parameters), UserError);
+}
+
+TEST_CASE("binned_sah holds little beside what it builds") {
+  for (const KernelScene& scene : {KernelScene{"needles", needles(100000)}, KernelScene{"sphere", sphere(150)}}) {
+    INFO(scene.name);
+    BuildSettings settings;
+    settings.leaf = "triangle8", settings.isa = best_isa();
+    BuildReport report;
+    const auto accel = build_structure("bvh8", scene.mesh, settings, report);
+    CHECK(double(report.peak_bytes) < 1.6 * double(accel->bytes()));
+  }
 }
 
 TEST_CASE("spatial splits lower the cost of needles; a full sweep costs no more than bins") {

@@ -16,7 +16,7 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kParallel = 1u << 12;
-constexpr std::size_t kFewBlocks = 4;  ///< ranges of so many leaf blocks are cut where they fill no more
+constexpr std::size_t kFewBlocks = 3;  ///< ranges of so many leaf blocks are cut where they fill no more
 constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 21 bits of their codes at first, in two passes; more by 30 bits, in three
 
 class Lbvh {
