@@ -15,7 +15,15 @@ constexpr std::uint32_t kParallel = 1u << 12;
 constexpr std::uint32_t kTooMany = 1000;  // references, more than a leaf holds
 /// What a leaf costs beside its blocks, in blocks. SAH knows none of it; where boxes overlap (`generate: needles`) rays lose by trees that open every leaf.
 constexpr float kLeafVisit = 0.25f;
+
+/// The references without repetitions, sorted, in `room`.
+std::span<const std::uint32_t> distinct(std::span<const std::uint32_t> references, LeafPrimitives& room) noexcept {
+  const auto end = std::copy(references.begin(), references.end(), room.begin());
+  std::sort(room.begin(), end);
+  return {room.data(), std::size_t(std::unique(room.begin(), end) - room.begin())};
 }
+
+}  // namespace
 
 /// cost[k - 1]: least cost of the subtree in at most k slots of its parent; infinite above `slots`, and so is what stands before it.
 struct Collapse::Costs {
@@ -66,13 +74,6 @@ Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : t
   } else {
     choose_leaves(0);
   }
-}
-
-/// The references without repetitions, sorted, in `room`.
-static std::span<const std::uint32_t> distinct(std::span<const std::uint32_t> references, LeafPrimitives& room) noexcept {
-  const auto end = std::copy(references.begin(), references.end(), room.begin());
-  std::sort(room.begin(), end);
-  return {room.data(), std::size_t(std::unique(room.begin(), end) - room.begin())};
 }
 
 /// How many references the leaf made from this node would hold. Where a subtree's leaves may repeat primitives, so does not the leaf.

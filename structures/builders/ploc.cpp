@@ -25,7 +25,6 @@ constexpr std::size_t kChunk = 1u << 12;
 constexpr std::size_t kFew = 1024;        ///< with this many clusters any round is cheap
 constexpr std::size_t kLeastShare = 64;   ///< one cluster in so many has to merge
 constexpr unsigned kMaxRadius = 128;
-
 constexpr std::size_t kShortRun = 8;  ///< triangles that may share the first bits of their codes and stand in order of their ids
 
 class Ploc {
