@@ -23,10 +23,10 @@ struct AutoFunctions {
   static constexpr float kCone = 0.25f, kAnyHitCone = 0.5f;
   /// Of the extent of all origins of the batch, that of a tile's which start near each other.
   static constexpr float kNear = 0.125f;
-  /// So many rays in packets show how those do; where a ray goes on alone more often than this, the next rays take the other way, at first so many, each time twice as many, and so many at most
-  /// (docs/performance.md).
-  static constexpr std::size_t kProbe = 4 * kTile, kFirstOther = 2 * kProbe, kMostOther = 64 * kProbe;
-  static constexpr float kTimesAlone = 0.4f;
+  /// So many rays in packets show how those do: at first, and at most while they do well. Where a ray goes on alone more often than this, the next rays take the other way, at first so many,
+  /// each time twice as many, and so many at most (docs/performance.md).
+  static constexpr std::size_t kProbe = 4 * kTile, kMostPackets = 4 * kProbe, kFirstOther = 2 * kProbe, kMostOther = 64 * kProbe;
+  static constexpr float kTimesAlone = 0.2f;
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
   static constexpr int kThreshold = 6;  ///< packet64's
@@ -61,7 +61,7 @@ struct AutoFunctions {
   /// Calls packets(begin, count), which returns how often a ray went on alone, and other(begin, count) for runs of tiles.
   template <class Packets, class Other>
   static void runs(RayBatch rays, float cone, const Packets& packets, const Other& other) {
-    std::size_t begin = 0, other_way = 0, next_other = kFirstOther;
+    std::size_t begin = 0, other_way = 0, next_other = kFirstOther, next_packets = kProbe;
     const auto run = [&](std::size_t end, bool together) {
       while (begin < end) {
         std::size_t count = end - begin;
@@ -72,12 +72,12 @@ struct AutoFunctions {
           other(begin, count);
           other_way -= count;
         } else {
-          count = std::min(count, kProbe);
+          count = std::min(count, next_packets);
           if (float(packets(begin, count)) > kTimesAlone * float(count) && kMayFallApart) {
             other_way = next_other;
-            next_other = std::min(2 * next_other, kMostOther);
+            next_other = std::min(2 * next_other, kMostOther), next_packets = kProbe;
           } else {
-            next_other = kFirstOther;
+            next_other = kFirstOther, next_packets = std::min(2 * next_packets, kMostPackets);
           }
         }
         begin += count;
