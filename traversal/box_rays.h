@@ -21,19 +21,16 @@ template <class F>
 struct BoxRays : LaneRays {
   alignas(64) float r[3][kMost], near[3][kMost], far[3][kMost];  ///< BoxRay's r, f, g
   alignas(64) float first[kMost];  ///< distance from which boxes count
-  std::uint64_t overflown;    ///< those whose constants overflow, so that BoxRay mended them
-  std::uint64_t negative[3];  ///< by axis: the direction is negative, or -0
+  std::uint64_t overflown;         ///< those whose constants overflow, so that BoxRay mended them
 
   /// As LaneRays::prepare().
   template <int W, int N, class RayAt, class Each>
   ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, bool padded, float max_coordinate, const Each& each) {
-    place(count, ray_at);
-    valid = overflown = negative[0] = negative[1] = negative[2] = 0;
-    for (int k = 0; k < count; k += W) {
+    overflown = 0;
+    LaneRays::prepare<W>(count, ray_at, [&](int k) {
       constants<W, N>(k, padded, max_coordinate);
       each(k);
-    }
-    valid &= first_rays(count);
+    });
     if (__builtin_expect((overflown &= valid) != 0, 0)) {
       for (std::uint64_t rest = overflown; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
@@ -54,7 +51,6 @@ struct BoxRays : LaneRays {
     const F o[3] = {F::load(rays.origin[0] + k), F::load(rays.origin[1] + k), F::load(rays.origin[2] + k)};
     const F d[3] = {F::load(rays.direction[0] + k), F::load(rays.direction[1] + k), F::load(rays.direction[2] + k)};
     const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-    valid |= std::uint64_t(are_rays<W>(k).bits()) << k;
     max_x86(F::load(rays.tnear + k), F(0.0f)).store(first + k);
     vm<W> overflows(false);
     for (int a = 0; a < 3; ++a) {
@@ -66,7 +62,6 @@ struct BoxRays : LaneRays {
       }
       rs.store(r[a] + k), fs.store(near[a] + k), gs.store(far[a] + k);
       overflows = overflows | Box::overflows(fs, gs);
-      negative[a] |= std::uint64_t((sign_bits(rs) < vi<W>(0)).bits()) << k;
     }
     overflown |= std::uint64_t(overflows.bits()) << k;
   }

@@ -33,12 +33,13 @@ const std::map<Key, const KernelRow*>& index() {
   });
 }
 
-/// The values that `key` has in the rows with that box test, of `structure` if one is named: " single, packet8".
-[[nodiscard]] std::string those_with(std::string_view box, std::string_view KernelRow::*key, std::string_view structure) {
+/// The values that `key` has in the rows that are `wanted`: " single, packet8".
+template <class Wanted>
+[[nodiscard]] std::string values_of(std::string_view KernelRow::*key, const Wanted& wanted) {
   std::vector<std::string_view> seen;
   std::string words;
   for (const KernelRow& r : kernel_table()) {
-    if (r.box != box || (!structure.empty() && r.structure != structure) || std::ranges::find(seen, r.*key) != seen.end()) continue;
+    if (!wanted(r) || std::ranges::find(seen, r.*key) != seen.end()) continue;
     words.append(seen.empty() ? " " : ", ").append(r.*key);
     seen.push_back(r.*key);
   }
@@ -48,13 +49,8 @@ const std::map<Key, const KernelRow*>& index() {
 /// Of a way of traversal that the structure has no row of.
 [[nodiscard]] std::string why_no_traversal(std::string_view structure, std::string_view traversal) {
   if (const StructureEntry* entry = find_structure(structure); entry && !entry->info.only_single_rays.empty()) return std::string(entry->info.only_single_rays);
-  std::vector<std::string_view> owners;
-  for (const KernelRow& row : kernel_table())
-    if (row.traversal == traversal && std::ranges::find(owners, row.structure) == owners.end()) owners.push_back(row.structure);
-  if (owners.empty()) return "no structure of this build has it on this machine";
-  std::string words = "that is for";
-  for (std::string_view owner : owners) words.append(&owner == &owners.front() ? " " : ", ").append(owner);
-  return words;
+  const std::string owners = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.traversal == traversal; });
+  return owners.empty() ? "no structure of this build has it on this machine" : "that is for" + owners;
 }
 
 }  // namespace
@@ -127,8 +123,8 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   }
   // A box test that only some ways of traversal, or some structures, have.
   const bool elsewhere = !any_row(structure, "", "", box, traversal, nullptr);
-  if (const std::string ways = those_with(box, &KernelRow::traversal, structure); elsewhere && !ways.empty()) return s + " has the box test " + b + " for" + ways + " alone, not for " + t;
-  if (const std::string others = those_with(box, &KernelRow::structure, ""); elsewhere && !others.empty()) return s + " has no box test " + b + ":" + others + " have it";
+  if (const std::string ways = values_of(&KernelRow::traversal, [&](const KernelRow& r) { return r.box == box && r.structure == structure; }); elsewhere && !ways.empty()) return s + " has the box test " + b + " for" + ways + " alone, not for " + t;
+  if (const std::string others = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.box == box; }); elsewhere && !others.empty()) return s + " has no box test " + b + ":" + others + " have it";
   return s + " with " + l + " and " + i + " has no box test " + b + " for " + t;
 }
 

@@ -13,23 +13,24 @@ struct LaneRays {
   PacketRays rays;
   alignas(64) float t[kMost];  ///< beyond which nothing counts: tfar, and what has been met
   std::uint64_t valid;         ///< rays that are rays (core/ray.h)
+  std::uint64_t negative[3];   ///< by axis: the direction is negative, or -0
 
+ protected:
   /// Of `count` rays, 1 to kMost, of which `ray_at(i)` is the i-th; lanes up to the next multiple of W hold no ray. `each(k)` is called for k = 0, W, 2 W ...
   /// when the W rays from k on stand in `rays`.
   template <int W, class RayAt, class Each>
   ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, const Each& each) {
     place(count, ray_at);
-    valid = 0;
+    valid = negative[0] = negative[1] = negative[2] = 0;
     for (int k = 0; k < count; k += W) {
       valid |= std::uint64_t(are_rays<W>(k).bits()) << k;
+      for (int a = 0; a < 3; ++a) negative[a] |= std::uint64_t((sign_bits(vf<W>::load(rays.direction[a] + k)) < vi<W>(0)).bits()) << k;
       each(k);
     }
-    valid &= first_rays(count);
+    valid &= count == kMost ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
   }
 
- protected:
-  static std::uint64_t first_rays(int count) { return count == kMost ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1; }
-
+ private:
   template <class RayAt>
   ARBORETUM_INLINE void place(int count, const RayAt& ray_at) {
     for (int k = 0; k < count; k += 4) {

@@ -20,12 +20,48 @@ class PacketLeaves {
   PacketLeaves(const KernelRow& row, const Vec3f* vertices, Counting counting) : leaves_(row, vertices), form_(*row.tests->form), counting_(counting) {}
 
   [[nodiscard]] const NearestHit& best(int i) const { return best_[i]; }
+  /// Of all packets so far, how often a ray went on alone.
+  [[nodiscard]] std::size_t times_alone() const { return times_alone_; }
 
  protected:
   using F = vf<W>;
   static constexpr unsigned kAll = (1u << W) - 1u;
 
-  /// Takes `count` rays, 1 to kMost, none of which has met anything. `prepare(ray_at, each)` hands these to the prepare() of lanes_.
+  /// Traces `count` rays, 1 to kMost; their hits are then in best(). `prepare(ray_at, each)` hands these to the prepare() of lanes_; `traverse(mask, octant)` is called
+  /// for the valid rays of each octant that has some. Where no more than `threshold` rays are in a node they may go on alone.
+  template <class Prepare, class Traverse>
+  ARBORETUM_INLINE void trace(const Ray* rays, int count, int threshold, const Prepare& prepare, const Traverse& traverse) {
+    threshold_ = threshold;
+    if constexpr (Counting::kCounting) ++counting_.counters.packets, rays_of_packet_ = unsigned(count);
+    load(rays, count, prepare);
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      Mask mask = lanes_.valid;
+      for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? lanes_.negative[a] : ~lanes_.negative[a];
+      if (mask != 0) traverse(mask, octant);
+    }
+    finish();
+  }
+
+  /// Too few rays for the packet to go on with.
+  ARBORETUM_INLINE bool few(Mask mask) const { return __builtin_popcountll(mask) <= threshold_; }
+
+  /// The rays of `mask` leave the packet: search(i, data) is ray i's search of what is left, as single rays' is, and returns whether it is occluded.
+  template <class Search>
+  ARBORETUM_INLINE void go_on_alone(Mask mask, const Search& search) {
+    const auto count = unsigned(__builtin_popcountll(mask));
+    times_alone_ += count;
+    if constexpr (Counting::kCounting) ++counting_.counters.switches, counting_.counters.rays_alone += count;
+    for (; mask; mask &= mask - 1) {
+      const int i = __builtin_ctzll(mask);
+      auto&& ray = data(i);
+      const bool hit = search(i, ray);
+      if (AnyHit && hit) occluded(i);
+      lanes_.t[i] = best_[i].t;
+    }
+  }
+
+ private:
+  /// None of the rays has met anything.
   template <class Prepare>
   ARBORETUM_INLINE void load(const Ray* rays, int count, const Prepare& prepare) {
     rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0};
@@ -53,14 +89,7 @@ class PacketLeaves {
     }
   }
 
-  /// The valid rays of each octant, -0 being a negative direction.
-  void octants(const Mask (&negative)[3], Mask (&of)[8]) const {
-    for (unsigned octant = 0; octant < 8; ++octant) {
-      of[octant] = lanes_.valid;
-      for (unsigned a = 0; a < 3; ++a) of[octant] &= (octant >> a & 1u) ? negative[a] : ~negative[a];
-    }
-  }
-
+ protected:
   /// The smallest and the largest value of the lanes of `mask`.
   void range(const float* values, Mask mask, float& low, float& high) const {
     const F infinity(std::numeric_limits<float>::infinity());
@@ -227,6 +256,7 @@ class PacketLeaves {
   Counting counting_;
   const Ray* rays_ = nullptr;
   int chunks_ = 0;       ///< registers that the rays take
+  unsigned rays_of_packet_ = 0;  ///< where they are counted
   Mask active_ = 0;      ///< rays whose search is not over (any hit)
   Rays lanes_;
   NearestHit best_[kMost];
@@ -241,6 +271,8 @@ class PacketLeaves {
   alignas(64) std::byte data_[Leaves::kRaysInLanes ? 1 : kMost * sizeof(RayData)];
   Packet packet_;
   bool common_origin_ = false;
+  int threshold_ = 0;
+  std::size_t times_alone_ = 0;
   int origin_of_ = 0;  ///< a ray that has it
 
  protected:

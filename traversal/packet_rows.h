@@ -7,8 +7,8 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone. `Family::Packets<W, Leaves, AnyHit, Counting>` is a
-/// structure's class for packets of W rays a register.
+/// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone. `Family::Packets<W, Leaves, AnyHit, Counting>` is the
+/// class for packets of W rays a register through a `Family::Structure`.
 template <class Family, int W, class Leaves, class Counting>
 struct PacketBatch {
   static __attribute__((noinline)) std::size_t closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
@@ -22,7 +22,7 @@ struct PacketBatch {
  private:
   template <bool AnyHit, class Report>
   static ARBORETUM_INLINE std::size_t packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
-    typename Family::template Packets<W, Leaves, AnyHit, Counting> packet(accel, row, Counting(counters));
+    typename Family::template Packets<W, Leaves, AnyHit, Counting> packet(static_cast<const typename Family::Structure&>(accel), row, Counting(counters));
     for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
       const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
       packet.trace(&rays[begin], count, threshold);

@@ -22,18 +22,14 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
  public:
   using Base::best, Base::times_alone;
 
-  BihPackets(const Accel& accel, const KernelRow& row, Counting counting) : BihPackets(static_cast<const bih::Bih&>(accel), row, counting) {}
+  BihPackets(const bih::Bih& tree, const KernelRow& row, Counting counting)
+      : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded"), stack_(tree.stack_entries() + 1), single_stack_(tree) {}
 
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
-    threshold_ = threshold;
-    if constexpr (Counting::kCounting) ++counting_.counters.packets;
-    Base::load(rays, count, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 2>(count, ray_at, padded_, tree_.max_coordinate(), each); });
-    Mask octants[8];
-    Base::octants(lanes_.negative, octants);
-    for (unsigned octant = 0; octant < 8; ++octant)
-      if (octants[octant] != 0) traverse(octants[octant], octant);
-    Base::finish();
+    Base::trace(
+        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 2>(count, ray_at, padded_, tree_.max_coordinate(), each); },
+        [&](Mask mask, unsigned octant) { traverse(mask, octant); });
   }
 
  private:
@@ -47,9 +43,6 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
     const bih::Node* node;
     Mask mask;
   };
-
-  BihPackets(const bih::Bih& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded"), stack_(tree.stack_entries() + 1), single_stack_(tree) {}
 
   ARBORETUM_INLINE F at_begin(float plane, unsigned axis, int k) const { return plane_distance(F(plane), F::load(lanes_.r[axis] + k), F::load(lanes_.near[axis] + k)); }
   ARBORETUM_INLINE F at_end(float plane, unsigned axis, int k) const { return plane_distance(F(plane), F::load(lanes_.r[axis] + k), F::load(lanes_.far[axis] + k)); }
@@ -81,7 +74,7 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
       const std::uint32_t kind = node->kind();
       if (top->mask != 0 && kind == bih::Node::kLeaf) {
         Base::leaf(node->code(), top->mask);
-      } else if (top->mask != 0 && __builtin_popcountll(top->mask) <= threshold_) {
+      } else if (top->mask != 0 && Base::few(top->mask)) {
         Base::go_on_alone(top->mask, [&](int i, auto& visits) {
           const auto of = [i](const auto& axes) { return Vec3f{axes[0][i], axes[1][i], axes[2][i]}; };
           return search_bih<AnyHit>(tree_, IntervalRay(of(lanes_.r), of(lanes_.near), of(lanes_.far)), node, top->low[i], top->high[i], best_[i], counting_, single_stack_.data(), visits);
@@ -149,13 +142,13 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
 
   const bih::Bih& tree_;
   const bool padded_;
-  int threshold_ = 0;
   BatchStack<Entry, 64> stack_;
   IntervalStack single_stack_;
 };
 
 /// As traversal/packet_rows.h wants it.
 struct BihPacketFamily {
+  using Structure = bih::Bih;
   static constexpr bool kFewerLanes = false;
   static constexpr bool kForNearRays = true;
   template <int W, class Leaves, bool AnyHit, class Counting>

@@ -27,23 +27,18 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   using Base = PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays>;
 
  public:
-  using Base::best, Base::kMost;
+  using Base::best, Base::kMost, Base::times_alone;
 
-  BvhPackets(const Accel& accel, const KernelRow& row, Counting counting) : BvhPackets(static_cast<const bvh::BvhBase&>(accel), row, counting) {}
+  BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
+      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"),
+        stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
 
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
-    threshold_ = threshold;
-    if constexpr (Counting::kCounting) ++counting_.counters.packets, rays_of_packet_ = unsigned(count);
-    Base::load(rays, count, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, N>(count, ray_at, padded_, max_coordinate_, each); });
-    Mask octants[8];
-    Base::octants(lanes_.negative, octants);
-    for (Mask mask : octants)
-      if (mask != 0) traverse(mask);
-    Base::finish();
+    Base::trace(
+        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, N>(count, ray_at, padded_, max_coordinate_, each); },
+        [&](Mask mask, unsigned) { traverse(mask); });
   }
-  /// Of all packets so far, how often a ray went on alone.
-  [[nodiscard]] std::size_t times_alone() const { return times_alone_; }
 
  private:
   using typename Base::Mask;
@@ -51,10 +46,6 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::lanes_, Base::leaves_, Base::range, Base::rays_, Base::spread_;
   static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
   using Children = vf<kLanes>;
-
-  BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"),
-        stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
 
   struct Entry {
     bvh::NodeReference reference;
@@ -176,10 +167,8 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     Entry e{root_, interval.tnear, group};
     for (;;) {
       while (!bvh::is_leaf(e.reference)) {
-        if (__builtin_popcountll(e.mask) <= threshold_) {
-          times_alone_ += unsigned(__builtin_popcountll(e.mask));
-          if constexpr (Counting::kCounting) ++counting_.counters.switches, counting_.counters.rays_alone += unsigned(__builtin_popcountll(e.mask));
-          for (Mask rest = e.mask; rest; rest &= rest - 1) alone(__builtin_ctzll(rest), e.reference, depths.current());
+        if (Base::few(e.mask)) {
+          Base::go_on_alone(e.mask, [&](int i, auto& ray) { return alone(i, ray, e.reference, depths.current()); });
           if constexpr (!AnyHit) tfar = Base::farthest(group);
           goto pop;
         }
@@ -232,18 +221,15 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   template <class Axes>
   static ARBORETUM_INLINE Vec3f of(const Axes& axes, int i) { return {axes[0][i], axes[1][i], axes[2][i]}; }
 
-  void alone(int i, bvh::NodeReference reference, typename Counting::Depth depth) {
-    auto&& ray = Base::data(i);
+  template <class RayData>
+  bool alone(int i, RayData& ray, bvh::NodeReference reference, typename Counting::Depth depth) {
     const auto below = [&](auto padded) {
       const BoxRay<N, decltype(padded)::value> box(of(lanes_.r, i), of(lanes_.near, i), of(lanes_.far, i));
       return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(base_, reference, box, lanes_.first[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_, counting_, depth);
     };
-    const bool hit = padded_ ? below(std::true_type{}) : below(std::false_type{});
-    if constexpr (AnyHit) {
-      if (hit) Base::occluded(i);
-    }
-    lanes_.t[i] = best_[i].t;
+    return padded_ ? below(std::true_type{}) : below(std::false_type{});
   }
+
   /// How many children of a node each ray meets.
   struct WithMetChildren {
     std::uint8_t of_ray[kMost] = {};
@@ -259,7 +245,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   /// A node visit of a packet counts as one of each of its rays.
   void count(const std::byte* node, Mask mask, const MetChildren& met, typename Counting::Depth depth) const {
     const unsigned boxes = Format::boxes(node);
-    counting_.at_depth(depth, rays_of_packet_, unsigned(__builtin_popcountll(mask)));
+    counting_.at_depth(depth, Base::rays_of_packet_, unsigned(__builtin_popcountll(mask)));
     for (; mask; mask &= mask - 1) counting_.node(boxes, kLanes, met.of_ray[__builtin_ctzll(mask)]);
   }
 
@@ -267,9 +253,6 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   const bvh::NodeReference root_;
   const float max_coordinate_;
   const bool padded_;
-  int threshold_ = 0;
-  std::size_t times_alone_ = 0;
-  unsigned rays_of_packet_ = 0;
   BatchStack<Entry, 512> stack_;
   TraversalStack single_stack_;
 };
@@ -277,6 +260,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
 /// As traversal/packet_rows.h wants it.
 template <class Format>
 struct BvhPacketFamily {
+  using Structure = bvh::BvhBase;
   static constexpr bool kFewerLanes = true;
   static constexpr bool kForNearRays = false;
   template <int W, class Leaves, bool AnyHit, class Counting>

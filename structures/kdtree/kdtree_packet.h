@@ -23,29 +23,55 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// Rays side by side with the constants of KdRay, computed W rays at a time by its operations, so they are the same bits.
+struct KdLanes : LaneRays {
+  alignas(64) float r[3][kMost], enter[3][kMost], leave[3][kMost];
+
+  /// As LaneRays::prepare(). `pad`: KdRay::kPad, or 0 for `fast` planes.
+  template <int W, class RayAt, class Each>
+  ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, float pad, float max_coordinate, const Each& each) {
+    LaneRays::prepare<W>(count, ray_at, [&](int k) {
+      constants<W>(k, pad, max_coordinate);
+      each(k);
+    });
+  }
+
+ private:
+  template <int W>
+  ARBORETUM_INLINE void constants(int k, float pad, float max_coordinate) {
+    using F = vf<W>;
+    const F d[3] = {F::load(rays.direction[0] + k), F::load(rays.direction[1] + k), F::load(rays.direction[2] + k)};
+    const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
+    const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest;
+    for (int a = 0; a < 3; ++a) {
+      const F o = F::load(rays.origin[a] + k);
+      const vm<W> parallel = ~(abs(d[a]) > tiny);
+      const F reciprocal = select(parallel, xor_sign(limit, sign_bits(d[a])), F(1.0f) / d[a]);
+      const F e = select(parallel, F(KdRay::kPad), F(pad)) * (F(max_coordinate) + abs(o)) * abs(reciprocal) + select(parallel, F(0x1p-100f), F(pad * 0x1p-79f));
+      const F at = o * reciprocal;
+      reciprocal.store(r[a] + k), (at + e).store(enter[a] + k), (at - e).store(leave[a] + k);
+    }
+  }
+};
+
 /// `fast` and `padded` are one class with other constants.
 template <int W, class Leaves, bool AnyHit, class Counting>
-class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
-  using Base = PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays>;
+class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
+  using Base = PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes>;
 
  public:
-  using Base::best;
+  using Base::best, Base::times_alone;
 
-  KdPackets(const Accel& accel, const KernelRow& row, Counting counting) : KdPackets(static_cast<const kdtree::KdTree&>(accel), row, counting) {}
+  KdPackets(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
+      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()),
+        max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f), stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
 
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
-    threshold_ = threshold;
-    if constexpr (Counting::kCounting) ++counting_.counters.packets, rays_of_packet_ = unsigned(count);
-    Base::load(rays, count, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W>(count, ray_at, each); });
-    Mask octants[8];
-    prepare(octants);
-    for (Mask mask : octants)
-      if (mask != 0) traverse(mask);
-    Base::finish();
+    Base::trace(
+        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W>(count, ray_at, pad_, max_coordinate_, each); },
+        [&](Mask mask, unsigned octant) { traverse(mask, octant); });
   }
-  /// Of all packets so far, how often a ray went on alone.
-  [[nodiscard]] std::size_t times_alone() const { return times_alone_; }
 
  private:
   using typename Base::Mask;
@@ -73,32 +99,6 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
     }
   };
 
-  KdPackets(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()),
-        max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f), stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
-
-  static ARBORETUM_INLINE F fused(F s, F r, F c) { return msub(s, r, c); }
-
-  /// The constants of KdRay, W rays at a time: the same operations, so the same bits. And the rays of each octant.
-  void prepare(Mask (&octants)[8]) {
-    Mask negative[3] = {};
-    for (int k = 0; k < chunks_ * W; k += W) {
-      const F d[3] = {F::load(lanes_.rays.direction[0] + k), F::load(lanes_.rays.direction[1] + k), F::load(lanes_.rays.direction[2] + k)};
-      const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-      const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest;
-      for (int a = 0; a < 3; ++a) {
-        const F o = F::load(lanes_.rays.origin[a] + k);
-        const vm<W> parallel = ~(abs(d[a]) > tiny);
-        const F r = select(parallel, xor_sign(limit, sign_bits(d[a])), F(1.0f) / d[a]);
-        const F e = select(parallel, F(KdRay::kPad), F(pad_)) * (F(max_coordinate_) + abs(o)) * abs(r) + select(parallel, F(0x1p-100f), F(pad_ * 0x1p-79f));
-        const F at = o * r;
-        r.store(r_[a] + k), (at + e).store(enter_[a] + k), (at - e).store(leave_[a] + k);
-        negative[a] |= Mask((sign_bits(r) < vi<W>(0)).bits()) << k;
-      }
-    }
-    Base::octants(negative, octants);
-  }
-
   /// Also tells the leaves what they need of the group. Rays that fill two registers or less are not worth an interval of planes.
   Interval interval_of(Mask group) {
     Interval v;
@@ -106,7 +106,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
     if (!v.usable && !Leaves::kRaysInLanes) return v;
     for (int a = 0; a < 3; ++a) {
       float o0, o1;
-      Base::range(lanes_.rays.origin[a], group, o0, o1), Base::range(r_[a], group, v.r0[a], v.r1[a]);
+      Base::range(lanes_.rays.origin[a], group, o0, o1), Base::range(lanes_.r[a], group, v.r0[a], v.r1[a]);
       const bool down = __builtin_signbit(v.r0[a]) != 0;
       const float r = down ? -v.r0[a] : v.r1[a], o = -o0 > o1 ? -o0 : o1;
       v.low_origin[a] = down ? o0 : o1, v.high_origin[a] = down ? o1 : o0;
@@ -127,9 +127,9 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
       F begin = F::load(lanes_.rays.tnear + k), end = F::load(lanes_.t + k);
       for (int a = 0; a < 3; ++a) {
         const float low = (&bounds_.lower.x)[a], high = (&bounds_.upper.x)[a];
-        const F r = F::load(r_[a] + k);
-        begin = max_x86(fused(F(far[a] ? low : high), r, F::load(enter_[a] + k)), begin);
-        end = min_x86(fused(F(far[a] ? high : low), r, F::load(leave_[a] + k)), end);
+        const F r = F::load(lanes_.r[a] + k);
+        begin = max_x86(msub(F(far[a] ? low : high), r, F::load(lanes_.enter[a] + k)), begin);
+        end = min_x86(msub(F(far[a] ? high : low), r, F::load(lanes_.leave[a] + k)), end);
       }
       begin.store(cell.begin + k), end.store(cell.end + k);
       cell.mask |= Mask((~(begin > end)).bits() & in) << k;
@@ -147,24 +147,24 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
       const unsigned in = Base::lanes_of(mask, c);
       if (in == 0) continue;
       const int k = c * W;
-      const F r = F::load(r_[axis] + k), begin = F::load(cell->begin + k), end = F::load(cell->end + k);
+      const F r = F::load(lanes_.r[axis] + k), begin = F::load(cell->begin + k), end = F::load(cell->end + k);
       if constexpr (Near) {
-        const F leave = fused(s, r, F::load(leave_[axis] + k));
+        const F leave = msub(s, r, F::load(lanes_.leave[axis] + k));
         near |= Mask((~(leave < begin)).bits() & in) << k;
         if constexpr (Far) begin.store(near_cell->begin + k);
         min_x86(leave, end).store(near_cell->end + k);
       }
       if constexpr (Far) {
-        const F enter = fused(s, r, F::load(enter_[axis] + k));
+        const F enter = msub(s, r, F::load(lanes_.enter[axis] + k));
         far |= Mask((~(enter > end)).bits() & in) << k;
         max_x86(enter, begin).store(cell->begin + k);
       }
     }
   }
 
-  void traverse(Mask group) {
+  void traverse(Mask group, unsigned octant) {
     unsigned far_side[3];  // byte offset within a pair of the child that rays come to last
-    for (int a = 0; a < 3; ++a) far_side[a] = __builtin_signbit(r_[a][__builtin_ctzll(group)]) ? 0u : 8u;
+    for (unsigned a = 0; a < 3; ++a) far_side[a] = octant >> a & 1u ? 0u : 8u;
     const Interval interval = interval_of(group);
     Base::look_for_common_origin(group);
     Cell* const stack = stack_.data();
@@ -181,10 +181,8 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
         const auto link = std::uint32_t(node >> 32);
         const unsigned axis = link & 3u;
         if (axis == 3) break;
-        if (__builtin_popcountll(mask) <= threshold_) {
-          times_alone_ += unsigned(__builtin_popcountll(mask));
-          if constexpr (Counting::kCounting) ++counting_.counters.switches, counting_.counters.rays_alone += unsigned(__builtin_popcountll(mask));
-          for (; mask; mask &= mask - 1) alone(__builtin_ctzll(mask), node, *top, far_side, depths.current());
+        if (Base::few(mask)) {
+          Base::go_on_alone(mask, [&](int i, auto& ray) { return alone(i, ray, node, *top, far_side, depths.current()); });
           goto pop;
         }
         const float plane = __builtin_bit_cast(float, std::uint32_t(node));
@@ -265,12 +263,11 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
     return left;
   }
 
-  void alone(int i, std::uint64_t node, const Cell& cell, const unsigned (&far_side)[3], typename Counting::Depth depth) {
+  template <class RayData>
+  bool alone(int i, RayData& ray, std::uint64_t node, const Cell& cell, const unsigned (&far_side)[3], typename Counting::Depth depth) {
     KdRay planes;
-    for (int a = 0; a < 3; ++a) planes.r[a] = r_[a][i], planes.enter[a] = enter_[a][i], planes.leave[a] = leave_[a][i], planes.far[a] = far_side[a];
-    auto&& ray = Base::data(i);
-    if (search(node, cell.begin[i], cell.end[i], planes, rays_[i], ray, best_[i], depth)) Base::occluded(i);
-    lanes_.t[i] = best_[i].t;
+    for (int a = 0; a < 3; ++a) planes.r[a] = lanes_.r[a][i], planes.enter[a] = lanes_.enter[a][i], planes.leave[a] = lanes_.leave[a][i], planes.far[a] = far_side[a];
+    return search(node, cell.begin[i], cell.end[i], planes, rays_[i], ray, best_[i], depth);
   }
   __attribute__((noinline)) bool search(std::uint64_t node, float begin, float end, const KdRay& planes, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
                                         typename Counting::Depth depth) {
@@ -280,7 +277,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
   /// A node visit of a packet counts as one of each of its rays.
   void count([[maybe_unused]] Mask mask, [[maybe_unused]] Mask near, [[maybe_unused]] Mask far, [[maybe_unused]] typename Counting::Depth depth) const {
     if constexpr (Counting::kCounting) {
-      counting_.at_depth(depth, rays_of_packet_, unsigned(__builtin_popcountll(mask)));
+      counting_.at_depth(depth, Base::rays_of_packet_, unsigned(__builtin_popcountll(mask)));
       for (; mask; mask &= mask - 1) {
         const int i = __builtin_ctzll(mask);
         counting_.node(2, 2, unsigned(near >> i & 1u) + unsigned(far >> i & 1u));
@@ -299,16 +296,13 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, LaneRays> {
   const std::uint64_t root_;
   const Bounds3f bounds_;
   const float max_coordinate_, pad_;
-  int threshold_ = 0;
-  std::size_t times_alone_ = 0;
-  unsigned rays_of_packet_ = 0;
-  alignas(64) float r_[3][kMost], enter_[3][kMost], leave_[3][kMost];
   BatchStack<Cell, 64> stack_;
   KdStack single_stack_;
 };
 
 /// As traversal/packet_rows.h wants it.
 struct KdPacketFamily {
+  using Structure = kdtree::KdTree;
   static constexpr bool kFewerLanes = false;
   static constexpr bool kForNearRays = true;
   template <int W, class Leaves, bool AnyHit, class Counting>

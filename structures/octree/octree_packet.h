@@ -8,8 +8,8 @@
 // visit alone, and some that begin beyond its nearest hit.
 #pragma once
 
-#include "structures/octree/octree_single.h"
 #include "structures/leaves/leaf_lists_packet.h"
+#include "structures/octree/octree_single.h"
 #include "traversal/box_rays.h"
 
 namespace arboretum {
@@ -23,18 +23,14 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
  public:
   using Base::best, Base::times_alone;
 
-  OctreePackets(const Accel& accel, const KernelRow& row, Counting counting) : OctreePackets(static_cast<const octree::Octree&>(accel), row, counting) {}
+  OctreePackets(const octree::Octree& tree, const KernelRow& row, Counting counting)
+      : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded") {}
 
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
-    threshold_ = threshold;
-    if constexpr (Counting::kCounting) ++counting_.counters.packets;
-    Base::load(rays, count, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 8>(count, ray_at, padded_, tree_.max_coordinate(), each); });
-    Mask octants[8];
-    Base::octants(lanes_.negative, octants);
-    for (unsigned octant = 0; octant < 8; ++octant)
-      if (octants[octant] != 0) traverse(octants[octant], octant);
-    Base::finish();
+    Base::trace(
+        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 8>(count, ray_at, padded_, tree_.max_coordinate(), each); },
+        [&](Mask mask, unsigned octant) { traverse(mask, octant); });
   }
 
  private:
@@ -47,9 +43,6 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
     Mask mask;
     float first;  ///< no ray enters it before
   };
-
-  OctreePackets(const octree::Octree& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded") {}
 
   void traverse(Mask group, unsigned octant) {
     const octree::Node* const nodes = tree_.nodes();
@@ -64,7 +57,7 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
           Base::leaf(e.cell.node.first, rays);
           if constexpr (!AnyHit) last = Base::farthest(group);
         }
-      } else if (__builtin_popcountll(e.mask) <= threshold_) {
+      } else if (Base::few(e.mask)) {
         Base::go_on_alone(e.mask, [&](int i, auto& visits) {
           const auto of = [i](const auto& axes) { return Vec3f{axes[0][i], axes[1][i], axes[2][i]}; };
           return search_octree<AnyHit>(tree_, OctreeRay(of(lanes_.r), of(lanes_.near), of(lanes_.far)), e.cell, rays_[i].tnear, best_[i], last_leaf_[i], counting_, visits);
@@ -106,8 +99,10 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
 
   /// The rays of `mask` that are in each of the children that exist, by their number as the rays meet them, and where the first of those enters it.
   ARBORETUM_INLINE void children(const OctreePlanes& planes, unsigned exist, Mask mask, Mask (&in)[8], float (&first)[8]) const {
-    F earliest[8];
-    for (F& f : earliest) f = F(std::numeric_limits<float>::infinity());
+    [[maybe_unused]] F earliest[8];
+    if constexpr (!AnyHit) {
+      for (F& f : earliest) f = F(std::numeric_limits<float>::infinity());
+    }
     alignas(16) float in_plane[4], middle[4], out_plane[4];
     planes.in.store(in_plane), planes.middle.store(middle), planes.out.store(out_plane);
     for (int c = 0; c < chunks_; ++c) {
@@ -128,10 +123,14 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
         const F exit = min_x86(min_x86(leave[0][x], leave[1][y]), min_x86(leave[2][z], t));
         const vm<W> meets = (entry <= exit) & vm<W>::from_bits(here);
         in[number] |= Mask(meets.bits()) << k;
-        earliest[number] = min_x86(select(meets, entry, earliest[number]), earliest[number]);
+        if constexpr (!AnyHit) earliest[number] = min_x86(select(meets, entry, earliest[number]), earliest[number]);
       }
     }
-    for (unsigned number = 0; number < 8; ++number) first[number] = reduce_min(earliest[number]);
+    for (unsigned rest = exist; rest; rest &= rest - 1) {
+      const auto number = unsigned(__builtin_ctz(rest));
+      first[number] = 0.0f;
+      if constexpr (!AnyHit) first[number] = reduce_min(earliest[number]);
+    }
   }
 
   /// A node visit of a packet counts as one of each of its rays.
@@ -148,12 +147,12 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
   const octree::Octree& tree_;
   const bool padded_;
   alignas(64) LeafCode last_leaf_[Base::kMost];  ///< of each ray
-  int threshold_ = 0;
   Entry stack_[kMostOctreeCells];
 };
 
 /// As traversal/packet_rows.h wants it.
 struct OctreePacketFamily {
+  using Structure = octree::Octree;
   static constexpr bool kFewerLanes = false;
   static constexpr bool kForNearRays = true;
   template <int W, class Leaves, bool AnyHit, class Counting>
