@@ -17,6 +17,7 @@
 #include "core/random.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/clip.h"
+#include "structures/builders/morton_order.h"
 #include "structures/statistics.h"
 #include "tests/catch.h"
 #include "tests/kernel_scenes.h"
@@ -263,6 +264,40 @@ TEST_CASE("more bits tell more triangles apart") {
     return sum - tree.nodes[0].half_area();
   };
   CHECK(area(63) < 0.2 * area(30));
+}
+
+TEST_CASE("the Morton order told apart as far as there are bits is that of the whole codes, equals by id") {
+  // Crowds that share the first 30 bits, of sizes that are sorted in different ways; then some of one place.
+  std::vector<Vec3f> centres{{0, 0, 0}, {1, 1, 1}};
+  for (const std::size_t crowd : {3, 24, 25, 100, 700, 2048, 2049, 20000}) {
+    const Vec3f at = random_points(1, 0.4f, 100 + crowd)[0] + Vec3f{0.5f, 0.5f, 0.5f};
+    for (const Vec3f& p : random_points(crowd, 1e-4f, crowd)) centres.push_back(at + p);
+    for (int i = 0; i < 5; ++i) centres.push_back(at);
+  }
+  const TriangleMesh mesh = copies(centres, std::vector<float>(centres.size(), 1e-7f));
+  Box4 bounds;
+  for (const Vec3f& v : mesh.vertices) bounds.extend(_mm_setr_ps(2 * v.x, 2 * v.y, 2 * v.z, 0));
+  const TriangleBoxes boxes(mesh);
+  for (const unsigned bits : {30u, 63u}) {
+    const MortonCells cells(bounds, bits);
+    const auto code = [&](std::uint32_t id) {
+      const Box4 box = boxes.box(id);
+      return cells.code(_mm_add_ps(box.lower, box.upper));
+    };
+    for (const unsigned sorted : {21u, 30u}) {
+      MortonOrder order(mesh, bits, sorted);
+      order.refine_runs(1);
+      std::size_t wrong = 0, equal = 0;
+      for (std::size_t i = 1; i < order.size(); ++i) {
+        const std::uint64_t before = code(order.id(i - 1)), here = code(order.id(i));
+        equal += before == here, wrong += before > here || (before == here && order.id(i - 1) >= order.id(i));
+      }
+      INFO(bits << " bits, " << sorted << " of them at first");
+      CHECK(wrong == 0);
+      CHECK(equal > (bits == 30 ? 20000 : 30));
+      CHECK(equal < (bits == 30 ? order.size() : 1000));
+    }
+  }
 }
 
 TEST_CASE("morton: what three leaf blocks hold fills no more than it needs") {

@@ -28,13 +28,13 @@ class Lbvh {
     const std::size_t n = order_.size();
     tree_.primitives.resize(n);
     NodePool::Share share;
-    recurse(0, n, 0, order_.sorted_bits(), share);
+    recurse(0, n, n - 1, 0, order_.sorted_bits(), share);
     pool_.finish();
   }
 
  private:
-  Box4 leaf(std::size_t begin, std::size_t end) noexcept {
-    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, order_.size() - 1);
+  Box4 leaf(std::size_t begin, std::size_t end, std::size_t last) noexcept {
+    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, last);
     Box4 box;
     for (std::size_t i = begin; i < end; ++i) box.extend(boxes_.box(tree_.primitives[i] = order_.id(i)));
     return box;
@@ -44,13 +44,13 @@ class Lbvh {
     return end - begin <= kFewBlocks * leaf_width_ ? order_.split_into_blocks(begin, end, leaf_width_) : order_.split(begin, end);
   }
 
-  /// [begin, end) is sorted by the first `sorted` bits of the codes.
-  Box4 recurse(std::size_t begin, std::size_t end, std::uint32_t index, unsigned sorted, NodePool::Share& share) {
+  /// [begin, end) is sorted by the first `sorted` bits of the codes; the task that calls goes on up to `last`.
+  Box4 recurse(std::size_t begin, std::size_t end, std::size_t last, std::uint32_t index, unsigned sorted, NodePool::Share& share) {
     Box4 box;
     std::uint32_t left = 0;
     if (end - begin <= leaf_width_) {
       tree_.first[index] = std::uint32_t(begin);
-      box = leaf(begin, end);
+      box = leaf(begin, end, last);
     } else {
       while (order_.refinable(begin, end, sorted)) sorted = order_.refine(begin, end, sorted);
       const std::size_t middle = split(begin, end);
@@ -60,12 +60,12 @@ class Lbvh {
         tbb::parallel_invoke(
             [&] {
               NodePool::Share own;
-              box = recurse(begin, middle, left, sorted, own);
+              box = recurse(begin, middle, middle - 1, left, sorted, own);
             },
-            [&] { other = recurse(middle, end, left + 1, sorted, share); });
+            [&] { other = recurse(middle, end, last, left + 1, sorted, share); });
       } else {
-        box = recurse(begin, middle, left, sorted, share);
-        other = recurse(middle, end, left + 1, sorted, share);
+        box = recurse(begin, middle, last, left, sorted, share);
+        other = recurse(middle, end, last, left + 1, sorted, share);
       }
       box.extend(other);
     }

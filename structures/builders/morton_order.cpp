@@ -1,6 +1,7 @@
 #include "structures/builders/morton_order.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <string>
 #include <utility>
@@ -16,6 +17,8 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kChunk = 1u << 14;
+constexpr std::size_t kFew = 2048, kVeryFew = 24;  ///< keys that are sorted by small digits; by insertion
+constexpr unsigned kMostDigitBits = 8;             ///< of a small digit
 
 template <class F>
 void for_chunks(std::size_t n, const F& f) {
@@ -48,10 +51,42 @@ Box4 doubled_vertex_bounds(const TriangleMesh& mesh) {
   return {_mm_add_ps(all.lower, all.lower), _mm_add_ps(all.upper, all.upper)};
 }
 
+/// Four keys of codes and ids.
+void put_keys(std::uint64_t* to, __m128i code, __m128i id) noexcept {
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_unpacklo_epi32(id, code));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to + 2), _mm_unpackhi_epi32(id, code));
+}
+
+/// Sorts n keys, whose ids ascend, by the `bits` of their codes, by digits that suit a few hundred. They are then in `keys` or `room`: where is returned.
+std::uint64_t* sort_few(std::uint64_t* keys, std::uint64_t* room, std::size_t n, unsigned bits) noexcept {
+  if (n <= kVeryFew) {
+    for (std::size_t i = 1; i < n; ++i) {
+      const std::uint64_t key = keys[i];
+      std::size_t at = i;
+      for (; at > 0 && keys[at - 1] > key; --at) keys[at] = keys[at - 1];
+      keys[at] = key;
+    }
+    return keys;
+  }
+  const unsigned most = std::clamp(unsigned(std::bit_width(n)), 6u, kMostDigitBits), passes = (bits + most - 1) / most;
+  for (unsigned pass = 0; pass < passes; ++pass) {
+    const unsigned shift = 32 + bits * pass / passes, digit_bits = 32 + bits * (pass + 1) / passes - shift;
+    const std::uint64_t mask = (std::uint64_t{1} << digit_bits) - 1;
+    std::uint32_t place[1u << kMostDigitBits];
+    std::fill_n(place, mask + 1, 0u);
+    for (std::size_t i = 0; i < n; ++i) ++place[keys[i] >> shift & mask];
+    std::uint32_t next = 0;
+    for (std::size_t d = 0; d <= mask; ++d) next += std::exchange(place[d], next);
+    for (std::size_t i = 0; i < n; ++i) room[place[keys[i] >> shift & mask]++] = keys[i];
+    std::swap(keys, room);
+  }
+  return keys;
+}
+
 }  // namespace
 
 MortonCells::MortonCells(const Box4& points, unsigned bits)
-    : lower_(points.lower), last_(_mm_set1_ps(float((1u << bits / 3) - 1))), fine_bits_(int(bits / 3) - 10) {
+    : lower_(points.lower), last_(_mm_set1_ps(float((1u << bits / 3) - 1))), axis_bits_(bits / 3) {
   const float largest = largest_extent(points);
   scale_ = _mm_set1_ps(largest > 1e-30f ? float(1u << bits / 3) / largest : 0.0f);
 }
@@ -62,11 +97,12 @@ std::uint64_t MortonCells::code(__m128 point) const noexcept {
   return morton_code(c[0], c[1], c[2]);
 }
 
-__m128i MortonCells::first_bits(const __m128 (&point)[4]) const noexcept {
+__m128i MortonCells::bits(const __m128 (&point)[4], unsigned skipped, unsigned count) const noexcept {
   const Points4 p(point[0], point[1], point[2], point[3]);
-  const auto axis = [this](__m128 at, __m128 lower) {
-    __m128i v = _mm_srl_epi32(number(at, lower, scale_, last_), _mm_cvtsi32_si128(fine_bits_));
-    const auto spread = [&v](int by, int mask) { v = _mm_and_si128(_mm_or_si128(v, _mm_slli_epi32(v, by)), _mm_set1_epi32(mask)); };
+  const __m128i shift = _mm_cvtsi32_si128(int(axis_bits_ - (skipped + count) / 3)), mask = _mm_set1_epi32((1 << count / 3) - 1);
+  const auto axis = [&](__m128 at, __m128 lower) {
+    __m128i v = _mm_and_si128(_mm_srl_epi32(number(at, lower, scale_, last_), shift), mask);
+    const auto spread = [&v](int by, int kept) { v = _mm_and_si128(_mm_or_si128(v, _mm_slli_epi32(v, by)), _mm_set1_epi32(kept)); };
     spread(16, 0x030000ff), spread(8, 0x0300f00f), spread(4, 0x030c30c3), spread(2, 0x09249249);  // as spread_bits()
     return v;
   };
@@ -105,13 +141,10 @@ Box4 MortonOrder::make_keys() {
       all.extend(at);
       return at;
     };
-    const __m128i left_out = _mm_cvtsi32_si128(int(kAtOnce - sorted_));
     std::size_t i = begin;
     for (; i + 4 <= end; i += 4) {
-      const __m128i code = _mm_srl_epi32(cells.first_bits({centroid(i), centroid(i + 1), centroid(i + 2), centroid(i + 3)}), left_out);
-      const __m128i id = _mm_add_epi32(_mm_set1_epi32(int(i)), _mm_setr_epi32(0, 1, 2, 3));
-      _mm_storeu_si128(reinterpret_cast<__m128i*>(&keys_[i]), _mm_unpacklo_epi32(id, code));
-      _mm_storeu_si128(reinterpret_cast<__m128i*>(&keys_[i + 2]), _mm_unpackhi_epi32(id, code));
+      const __m128i code = cells.bits({centroid(i), centroid(i + 1), centroid(i + 2), centroid(i + 3)}, 0, sorted_);
+      put_keys(&keys_[i], code, _mm_add_epi32(_mm_set1_epi32(int(i)), _mm_setr_epi32(0, 1, 2, 3)));
     }
     for (; i < end; ++i) keys_[i] = cells.code(centroid(i)) >> (bits_ - sorted_) << 32 | i;
     partial[c] = all;
@@ -121,21 +154,31 @@ Box4 MortonOrder::make_keys() {
   return all;
 }
 
+/// Writes the keys of [begin, end) with `more` bits of their codes behind the first `sorted`.
+void MortonOrder::next_codes(std::size_t begin, std::size_t end, unsigned sorted, unsigned more, std::uint64_t* keys) const noexcept {
+  for (std::size_t i = begin; i < end; i += 4, keys += 4) {
+    boxes_.prefetch([this](std::size_t k) { return id(k); }, i, i + 4, end - 1);
+    std::uint32_t ids[4];
+    __m128 centroids[4];
+    for (std::size_t k = 0; k < 4; ++k) ids[k] = id(std::min(i + k, end - 1)), centroids[k] = doubled_centroid(boxes_.box(ids[k]));
+    put_keys(keys, cells_.bits(centroids, sorted, more), _mm_loadu_si128(reinterpret_cast<const __m128i*>(ids)));
+  }
+}
+
 unsigned MortonOrder::refine(std::size_t begin, std::size_t end, unsigned sorted) {
-  const unsigned more = std::min(bits_ - sorted, kAtOnce);
-  const auto next_bits = [&](std::uint32_t triangle) {
-    return cells_.code(doubled_centroid(boxes_.box(triangle))) >> (bits_ - sorted - more) & ((std::uint64_t{1} << more) - 1);
-  };
-  const auto put = [&](std::size_t i) { keys_[i] = next_bits(id(i)) << 32 | id(i); };
-  const auto first = keys_.begin() + std::ptrdiff_t(begin), last = keys_.begin() + std::ptrdiff_t(end);
-  if (end - begin < kChunk) {
-    for (std::size_t i = begin; i < end; ++i) put(i);
-    std::sort(first, last);
+  const std::size_t n = end - begin;
+  const auto first = keys_.begin() + std::ptrdiff_t(begin);
+  // A surface of n triangles is in some 2^(2/3 b) of the cells that b bits tell apart; the rest is left for where it is asked for.
+  const unsigned enough = 3 * ((unsigned(std::bit_width(n)) + 1) / 2);
+  const unsigned more = std::min({bits_ - sorted, kAtOnce, enough});
+  if (n <= kFew) {
+    std::array<std::uint64_t, kFew + 3> run, room;
+    next_codes(begin, end, sorted, more, run.data());
+    std::copy_n(sort_few(run.data(), room.data(), n, more), n, first);
   } else {
-    for_chunks(end - begin, [&](std::size_t, std::size_t b, std::size_t e) {
-      for (std::size_t i = b; i < e; ++i) put(begin + i);
-    });
-    MeteredVector<std::uint64_t> run(first, last);
+    MeteredVector<std::uint64_t> run((n + 3) / 4 * 4);
+    for_chunks(n, [&](std::size_t, std::size_t b, std::size_t e) { next_codes(begin + b, begin + e, sorted, more, &run[b]); });
+    run.resize(n);
     radix_sort(run, 32, 32 + more);
     std::copy(run.begin(), run.end(), first);
   }

@@ -25,15 +25,15 @@ class MortonCells {
   MortonCells(const Box4& points, unsigned bits);
   /// The code of a point. Points outside count as on the cube's faces, a NaN, as where coordinates overflow, as 0.
   [[nodiscard]] std::uint64_t code(__m128 point) const noexcept;
-  /// The first 30 bits of four points' codes.
-  [[nodiscard]] __m128i first_bits(const __m128 (&point)[4]) const noexcept;
+  /// Of four points' codes `count` bits, 30 at most, behind the first `skipped`; both are multiples of 3.
+  [[nodiscard]] __m128i bits(const __m128 (&point)[4], unsigned skipped, unsigned count) const noexcept;
 
  private:
   [[nodiscard]] static __m128i number(__m128 at, __m128 lower, __m128 scale, __m128 last) noexcept {
     return _mm_cvttps_epi32(_mm_min_ps(_mm_max_ps(_mm_mul_ps(_mm_sub_ps(at, lower), scale), _mm_setzero_ps()), last));
   }
   __m128 lower_, last_, scale_;
-  int fine_bits_ = 0;  ///< of a cell's number on an axis, beyond the first ten
+  unsigned axis_bits_ = 0;  ///< of a cell's number on an axis
 };
 
 /// Triangles sorted by the first bits of their codes, those that share them by id.
@@ -67,6 +67,7 @@ class MortonOrder {
  private:
   [[nodiscard]] std::uint32_t code(std::size_t i) const noexcept { return std::uint32_t(keys_[i] >> 32); }
   Box4 make_keys();
+  void next_codes(std::size_t begin, std::size_t end, unsigned sorted, unsigned more, std::uint64_t* keys) const noexcept;
   void refine_runs(std::size_t begin, std::size_t end, std::size_t longest, unsigned sorted);
 
   TriangleBoxes boxes_;
