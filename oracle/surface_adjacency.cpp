@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <set>
 #include <tuple>
+#include <unordered_set>
 
 #include "oracle/sheared.h"
 
@@ -30,6 +30,14 @@ double distance(const Seen& a, const Seen& b) {
   const double s = square > 0 ? std::clamp(-(a.x * x + a.y * y) / square, 0.0, 1.0) : 0.0;
   return std::hypot(a.x + s * x, a.y + s * y);
 }
+
+struct HashOfCorners {
+  std::size_t operator()(const std::array<std::uint32_t, 3>& c) const noexcept {
+    std::uint64_t h = 0;
+    for (const std::uint32_t v : c) h = (h ^ v) * 0x9e3779b97f4a7c15u, h ^= h >> 32;
+    return std::size_t(h);
+  }
+};
 
 }  // namespace
 
@@ -104,13 +112,12 @@ SurfaceAdjacency::Corner3 SurfaceAdjacency::corners(std::uint32_t triangle) cons
 }
 
 bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, std::uint32_t answer) const {
-  constexpr std::size_t kMostTriangles = 4096;  // a larger patch is taken for one that the ray passes through
-  std::set<Corner3> seen{corners(triangle)};
+  constexpr std::size_t kMostTriangles = 1u << 18;  // a larger patch is taken for one that the ray passes through
+  std::unordered_set<Corner3, HashOfCorners> seen{corners(triangle)};
   std::vector<Corner3> waiting(seen.begin(), seen.end());
   const Sheared sheared(ray);
-  while (!waiting.empty()) {
-    const Corner3 c = waiting.back();
-    waiting.pop_back();
+  for (std::size_t turn = 0; turn < waiting.size(); ++turn) {  // in the order found: on all sides at once, so that the nearest border ends it
+    const Corner3 c = waiting[turn];
     if (c[0] == c[1] || c[1] == c[2]) return false;
     const Seen p[3] = {sheared(mesh_.position(c[0], at)), sheared(mesh_.position(c[1], at)), sheared(mesh_.position(c[2], at))};
     const RoundedDistance t = rounded_distance(sheared, p[0], p[1], p[2]);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -140,6 +141,15 @@ TEST_CASE("a miss is a crack where the surface is closed and not at its silhouet
     cases.push_back(
         {"vertex at the silhouette", *mesh, {widest - Vec3f{0, 3, 0}, 0, {0, 3, 0}, kInf}, false});
   }
+  TriangleMesh cone;  // so many triangles about its tip that a search which gave up would take its silhouette for a crack
+  constexpr int kSides = 40000;
+  const auto on_rim = [](int i) {
+    const double angle = 2 * std::numbers::pi * (i % kSides) / kSides;
+    return Vec3f{float(std::cos(angle)), float(std::sin(angle)), 0};
+  };
+  for (int i = 0; i < kSides; ++i) add_triangle(cone, {0, 0, 1}, on_rim(i), on_rim(i + 1));
+  cases.push_back({"tip of a cone from above", cone, {{0, 0, 3}, 0, {0, 0, -1}, kInf}, true});
+  cases.push_back({"tip of a cone from the side", cone, {{-3, 0, 1}, 0, {1, 0, 0}, kInf}, false});
   for (const Case& c : cases) {
     INFO(c.name);
     const Oracle oracle(c.mesh);
