@@ -27,7 +27,7 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kBatch = std::size_t{1} << 17;     // rays made, answered and traced at a time
-constexpr std::size_t kSpreadBatch = std::size_t{1} << 14;
+constexpr std::size_t kSpreadBatch = std::size_t{1} << 14, kLeastSpreadBatch = 256;
 constexpr std::size_t kSubjectRays = 64;                 // of one random mesh
 constexpr std::size_t kBruteForceTriangles = 2000;       // left out above it, unless it is asked for
 constexpr std::size_t kMostCases = 20;                   // breaches that are told
@@ -167,7 +167,7 @@ class Verify {
     }
     if (kinds.empty()) throw UserError(fmt::format("verify: {}: has nothing that rays of these --kinds are aimed at", name));
     StructureShelf shelf(mesh, registry_, threads_);
-    const std::size_t batch_size = command_.spread ? kSpreadBatch : kBatch;
+    const std::size_t batch_size = command_.spread ? spread_batch(rays) : kBatch;
     for (std::uint64_t begin = 0; begin < rays; begin += batch_size) {
       const std::size_t count = std::min<std::uint64_t>(batch_size, rays - begin);
       const HardRays made = maker.make(command_.seed, begin, count, kinds);
@@ -182,6 +182,11 @@ class Verify {
       keep_breaches(mesh, name);
       progress.step(name, count);
     }
+  }
+
+  /// So that each cell has a share, where the rays are enough for shares that are worth it.
+  std::size_t spread_batch(std::uint64_t rays) const {
+    return std::clamp(std::size_t(rays / cells_.size()), kLeastSpreadBatch, kSpreadBatch);
   }
 
   void cases() {
@@ -258,14 +263,19 @@ class Verify {
   }
 
   ExitStatus report() {
-    const std::uint64_t rays = cells_.front().sum().rays;
-    fmt::print("{}, {} rays{}, {} cells\n{}", title_, rays, command_.spread ? " a cell" : "", cells_.size(),
+    std::uint64_t rays = 0;
+    for (const VerifiedCell& cell : cells_) rays = command_.spread ? rays + cell.sum().rays : cell.sum().rays;
+    fmt::print("{}, {} rays{}, {} cells\n{}", title_, rays, command_.spread ? " in all" : "", cells_.size(),
                verify_tables(cells_, subject_ != Subject::cases || command_.rays));
     fmt::print("{}", skipped_lines(plan_, {}));
-    std::size_t broken = 0, promising = 0;
+    std::size_t broken = 0, promising = 0, untested = 0;
     std::string lines;
     for (const VerifiedCell& cell : cells_) {
       const VerifyTally sum = cell.sum();
+      if (sum.rays == 0) {
+        ++untested;
+        continue;
+      }
       promising += cell.promise.any();
       if (sum.broken == 0) continue;
       if (++broken <= kMostCases) lines += describe_breach(cell, sum) + "\n";
@@ -278,11 +288,13 @@ class Verify {
       if (!cases_.empty()) write_whole(command_.out / "cases.json", document);
       fmt::print("\n{}\n", (command_.out / "verify.csv").string());
     }
+    if (untested > 0)
+      fmt::print("{} of {} cells had no ray and are not judged: --rays {} and more reaches all of them\n", untested, cells_.size(), kLeastSpreadBatch * cells_.size());
     if (broken > 0) {
       fmt::print("{} of {} cells that promise something break it\n", broken, promising);
       return ExitStatus::kWrongAnswers;
     }
-    fmt::print("all {} cells that promise something keep it; {} promise nothing\n", promising, cells_.size() - promising);
+    fmt::print("all {} cells that promise something keep it; {} promise nothing\n", promising, cells_.size() - untested - promising);
     return ExitStatus::kDone;
   }
 

@@ -9,6 +9,7 @@
 // It may have
 //   finish(RayData&, NearestHit&): the search is over, and this is its hit. Without it RayData never changes;
 //   accept(RayData&, const Block&, lane): that lane has become the nearest hit;
+//   ForManyRays<Block>(const Block&): a block with what is the same for all rays, which intersect() takes in the block's place, with the same answers;
 //   closest_hit_block(RayData&, const Block&, tnear, NearestHit&) and any_hit_block(RayData&, const Block&, tnear, tfar): instead of those below.
 #pragma once
 
@@ -120,6 +121,29 @@ ARBORETUM_INLINE bool any_hit_block(RayDataOf<Intersector>& ray, const Block& bl
     const vm<W> m = Intersector::intersect(ray, block, hits);
     if (none(m)) return false;
     return any(m & (hits.t >= vf<W>(tnear)) & (hits.t <= vf<W>(tfar)));
+  }
+}
+
+/// The intersector has a form of blocks for many rays.
+template <class Intersector, class Block>
+inline constexpr bool kSharesBlocks = requires { typename Intersector::template ForManyRays<Block>; };
+
+/// Tests the blocks of a leaf with `rays`, a bit each, a block after the other. `ray(i)` and `data(i)`: the i-th ray and what the intersector keeps for it. Of any hit `hit(i)` is
+/// called once, for one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
+template <bool AnyHit, class Intersector, class Block, class RayAt, class DataOf, class BestOf, class OnHit>
+ARBORETUM_INLINE void test_block_by_block(const Block* block, unsigned count, std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best, const OnHit& hit) {
+  for (const Block* const end = block + count; block != end && rays != 0; ++block) {
+    const typename Intersector::template ForManyRays<Block> seen(*block);
+    for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
+      const int i = __builtin_ctzll(rest);
+      const Ray& r = ray(i);
+      auto&& of_ray = data(i);
+      if constexpr (AnyHit) {
+        if (any_hit_block<Intersector>(of_ray, seen, r.tnear, r.tfar)) hit(i), rays &= ~(std::uint64_t{1} << i);
+      } else {
+        if (closest_hit_block<Intersector>(of_ray, seen, r.tnear, best(i))) hit(i);
+      }
+    }
   }
 }
 

@@ -60,6 +60,20 @@ struct MollerTrumbore {
     }
   };
 
+  /// A block with what core() makes of it alone, its normals, once for all rays that meet it.
+  template <class Block>
+  struct ForManyRays {
+    static constexpr int kWidth = Block::kWidth;
+    const Block& block;
+    const std::uint32_t (&id)[kWidth];
+    vf3<kWidth> n;
+
+    ARBORETUM_INLINE explicit ForManyRays(const Block& b) : block(b), id(b.id) {
+      const auto t = corners(b, [](const float(&p)[kWidth]) { return vf<kWidth>::load(p); });
+      n = cross(t.e2, t.e1);
+    }
+  };
+
   /// What a packet keeps beside its rays: nothing.
   struct PacketData {
     static constexpr int kGroups = 1;
@@ -106,6 +120,13 @@ struct MollerTrumbore {
   static ARBORETUM_INLINE auto core(vec3<F> o, vec3<F> d, const Block& block, const Get& get, Hits& hits) {
     const Corners<F> t = corners(block, get);
     const MollerTrumboreTerms<F> terms(t.v0, t.e1, t.e2, o, d);
+    return decide(terms, [&] { return dot(terms.n, terms.c); }, hits);
+  }
+  template <class F, class Block, class Get, class Hits>
+  static ARBORETUM_INLINE auto core(vec3<F> o, vec3<F> d, const ForManyRays<Block>& with_normals, const Get& get, Hits& hits) {
+    const Corners<F> t = corners(with_normals.block, get);
+    MollerTrumboreTerms<F> terms(with_normals.n, t.v0 - o);
+    terms.meet(t.e1, t.e2, d);
     return decide(terms, [&] { return dot(terms.n, terms.c); }, hits);
   }
   template <class F, int M, class Get, class Hits>

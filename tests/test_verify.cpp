@@ -302,6 +302,18 @@ TEST_CASE("the command's verdicts and words") {
   CHECK(verify(command).out == kept.out);
   command.threads = 1;
   CHECK(verify(command).out == kept.out);
+
+  command.spread = true;
+  const Outcome shared = verify(command);
+  CHECK(shared.out.find("3000 rays in all, 2 cells") != std::string::npos);
+  CHECK(shared.out.find("all 2 cells that promise something keep it") != std::string::npos);
+  command.rays = 100;
+  const Outcome few = verify(command);  // one cell has them all: of the other nothing is said
+  CHECK(few.out.find("all 1 cells that promise something keep it") != std::string::npos);
+  CHECK(few.out.find("1 of 2 cells had no ray") != std::string::npos);
+  CHECK(few.out.find("--rays 512") != std::string::npos);
+  command.spread = false, command.rays = 3000;
+
   command.axes = {"structure=bvh8", "intersector=moller_trumbore", "box=fast", isa};
   const Outcome leaks = verify(command);
   CHECK(leaks.status == 0);  // it promises nothing

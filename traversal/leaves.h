@@ -31,7 +31,7 @@ struct CalledLeaves {
     if (tests->finish && best.primitive != NearestHit::kNone) tests->finish(data, best);
   }
   ARBORETUM_INLINE std::size_t block_bytes() const { return tests->form->bytes; }
-  static constexpr bool kRaysInLanes = false;
+  static constexpr bool kRaysInLanes = false, kBlockByBlock = false;
   static constexpr std::size_t kBytesAhead = sizeof(EdgeBlock<8>);  ///< what of a leaf is worth asking for in advance
 };
 
@@ -60,6 +60,8 @@ struct CompiledLeaves {
   static constexpr std::size_t block_bytes() { return sizeof(Block); }
   /// The intersector can test many rays against one triangle as well (packets).
   static constexpr bool kRaysInLanes = requires { typename Intersector::PacketData; };
+  /// Many rays are better tested with one block after the other (test_block_by_block()).
+  static constexpr bool kBlockByBlock = kSharesBlocks<Intersector, Block>;
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
 

@@ -171,14 +171,22 @@ class PacketLeaves {
   }();
 
   void one_by_one(const std::byte* blocks, unsigned count, Mask mask) {
-    for (; mask; mask &= mask - 1) {
-      const int i = __builtin_ctzll(mask);
-      if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
-      auto&& ray = data(i);
+    const auto hit = [this](int i) {
       if constexpr (AnyHit) {
-        if (leaves_.any_hit(ray, blocks, count, rays_[i].tnear, rays_[i].tfar)) occluded(i);
+        occluded(i);
       } else {
-        if (leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) lanes_.t[i] = best_[i].t;
+        lanes_.t[i] = best_[i].t;
+      }
+    };
+    if constexpr (Leaves::kBlockByBlock) {
+      test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks), count, mask, [this](int i) -> const Ray& { return rays_[i]; },
+                                                                [this](int i) -> decltype(auto) { return data(i); }, [this](int i) -> NearestHit& { return best_[i]; }, hit);
+    } else {
+      for (; mask; mask &= mask - 1) {
+        const int i = __builtin_ctzll(mask);
+        if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
+        auto&& ray = data(i);
+        if (AnyHit ? leaves_.any_hit(ray, blocks, count, rays_[i].tnear, rays_[i].tfar) : leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) hit(i);
       }
     }
   }

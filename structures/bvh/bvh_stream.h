@@ -55,40 +55,53 @@ class Stream {
   static constexpr int W = Test::W, kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth, kBytes = (W + 7) / 8;
   using F = vf<W>;
 
-  /// What nodes need of a ray, in one cache line: BoxRay's r, f and g, and the distance from which boxes count.
+  /// BoxRay's g is not its f.
+  static constexpr bool kTwoOffsets = Padded || !kHasFma;
+  /// What nodes need of a ray, in one cache line: BoxRay's r, the distance from which boxes count, f and g; where f serves as g there is room for the ray.
   struct alignas(64) Constants {
     float number[12];
   };
+  struct alignas(64) ConstantsAndRay {
+    float number[8];
+    Ray ray;
+  };
+  using Line = std::conditional_t<kTwoOffsets, Constants, ConstantsAndRay>;
+  struct Nothing {};
   struct Entry {
     std::uint64_t rays;
     bvh::NodeReference target;
     float t;  ///< the least at which one of them enters
   };
-  struct NoPacket {};
-  template <class L>
-  struct PacketOf {
-    using type = typename L::Intersector::PacketData;
-  };
-  using Packet = typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
+  using RayData = typename Leaves::RayData;
+  /// What the intersector keeps for a ray is more than the ray itself.
+  static constexpr bool kKeepsData = sizeof(RayData) > sizeof(Ray);
   struct alignas(64) Group {
-    Constants constants[kRays];
+    Line line[kRays];
+    [[no_unique_address]] std::conditional_t<kTwoOffsets, std::array<Ray, kRays>, Nothing> rays;
     float t[kRays];  ///< nearest hit so far
     NearestHit best[kRays];
     std::uint32_t index[kRays];
-    Packet packet;
-    alignas(64) std::byte data[Leaves::kRaysInLanes ? 1 : kRays * sizeof(typename Leaves::RayData)];
+    alignas(64) std::byte data[kKeepsData ? kRays * sizeof(RayData) : 1];
     unsigned count = 0, octant = 0;
     std::uint64_t active = 0;  ///< rays whose search is not over
     Entry *bottom = nullptr, *top = nullptr;
     typename Counting::Depths depths{typename Counting::Depth{}};
   };
 
-  /// What the intersector keeps for ray i: where it can be made of little it is, whenever it is asked for.
-  static ARBORETUM_INLINE decltype(auto) data(Group& g, unsigned i, [[maybe_unused]] const Ray& ray) {
-    if constexpr (Leaves::kRaysInLanes) {
-      return g.packet.alone(ray, int(i));
+  static ARBORETUM_INLINE Ray& ray(Group& g, unsigned i) {
+    if constexpr (kTwoOffsets) {
+      return g.rays[i];
     } else {
-      return (*reinterpret_cast<typename Leaves::RayData*>(g.data + i * sizeof(typename Leaves::RayData)));
+      return g.line[i].ray;
+    }
+  }
+
+  /// What the intersector keeps for ray i.
+  ARBORETUM_INLINE decltype(auto) data(Group& g, unsigned i) const {
+    if constexpr (kKeepsData) {
+      return (*reinterpret_cast<RayData*>(g.data + i * sizeof(RayData)));
+    } else {
+      return leaves_.prepare(ray(g, i));
     }
   }
 
@@ -110,17 +123,13 @@ class Stream {
     const std::uint32_t* const list = list_[octant];
     const int count = int(std::exchange(waiting_[octant], 0u));
     const auto ray_at = [&](int i) -> const Ray& { return rays_[list[i]]; };
-    if constexpr (Leaves::kRaysInLanes) g.packet.clear();
-    lanes_.template prepare<kNative, N>(count, ray_at, Padded, max_coordinate_, [&](int k) {
-      if constexpr (Leaves::kRaysInLanes) g.packet.template prepare<kNative>(lanes_.rays, k);
-    });
+    lanes_.template prepare<kNative, N>(count, ray_at, Padded, max_coordinate_, [](int) {});
     for (int k = 0; k < count; k += 4) gather(g, k);
     for (int i = 0; i < count; ++i) {
-      g.index[i] = list[i];
+      g.index[i] = list[i], ray(g, unsigned(i)) = ray_at(i);
       g.best[i] = NearestHit{lanes_.t[i]};
-      if constexpr (!Leaves::kRaysInLanes) {
-        if (lanes_.valid >> i & 1u)
-          new (static_cast<void*>(g.data + std::size_t(i) * sizeof(typename Leaves::RayData))) std::remove_const_t<typename Leaves::RayData>(leaves_.prepare(ray_at(i)));
+      if constexpr (kKeepsData) {
+        if (lanes_.valid >> i & 1u) new (static_cast<void*>(g.data + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(ray_at(i)));
       }
     }
     std::memcpy(g.t, lanes_.t, sizeof g.t);
@@ -135,19 +144,19 @@ class Stream {
     const auto four = [&](int at, const float* a, const float* b, const float* c, const float* d) {
       vf<4> row[4] = {vf<4>::load(a + k), vf<4>::load(b + k), vf<4>::load(c + k), vf<4>::load(d + k)};
       transpose(row);
-      for (int i = 0; i < 4; ++i) row[i].store(g.constants[k + i].number + at);
+      for (int i = 0; i < 4; ++i) row[i].store(g.line[k + i].number + at);
     };
-    four(0, lanes_.r[0], lanes_.r[1], lanes_.r[2], lanes_.near[0]);
-    four(4, lanes_.near[1], lanes_.near[2], lanes_.far[0], lanes_.far[1]);
-    four(8, lanes_.far[2], lanes_.first, lanes_.first, lanes_.first);
+    four(0, lanes_.r[0], lanes_.r[1], lanes_.r[2], lanes_.first);
+    four(4, lanes_.near[0], lanes_.near[1], lanes_.near[2], lanes_.far[0]);
+    if constexpr (kTwoOffsets) four(8, lanes_.far[1], lanes_.far[2], lanes_.far[2], lanes_.far[2]);
   }
 
   template <class Report>
   void finish(Group& g, const Report& report) {
     for (unsigned i = 0; i < g.count; ++i) {
       if constexpr (!AnyHit) {
-        auto&& ray = data(g, i, rays_[g.index[i]]);
-        leaves_.finish(ray, g.best[i]);
+        auto&& of_ray = data(g, i);
+        leaves_.finish(of_ray, g.best[i]);
       }
       report(g.index[i], g.best[i]);
     }
@@ -188,11 +197,11 @@ class Stream {
     unsigned any = 0;
     for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
       const unsigned i = unsigned(__builtin_ctzll(rest));
-      const float* const c = g.constants[i].number;
-      BoxLanes<N, Padded> box(Box({c[0], c[1], c[2]}, {c[3], c[4], c[5]}, {c[6], c[7], c[8]}));
+      const float *const c = g.line[i].number, *const f = c + 4, *const far = kTwoOffsets ? f + 3 : f;
+      BoxLanes<N, Padded> box(Box({c[0], c[1], c[2]}, {f[0], f[1], f[2]}, {far[0], far[1], far[2]}));
       box.near_x = 0, box.near_y = 2 * kSide, box.near_z = 4 * kSide;
       F entry;
-      const vm<W> meets = box.meets([&](unsigned offset) { return planes[offset / kSide]; }, F(c[9]), F(g.t[i]), entry);
+      const vm<W> meets = box.meets([&](unsigned offset) { return planes[offset / kSide]; }, F(c[3]), F(g.t[i]), entry);
       const unsigned hit = meets.bits() & kChildren;
       for (int b = 0; b < kBytes; ++b) met[b][i] = std::uint8_t(hit >> (8 * b));
       any |= hit;
@@ -233,15 +242,23 @@ class Stream {
   ARBORETUM_INLINE void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
     const std::byte* const blocks = base_ + bvh::offset_of(target);
     const unsigned count = bvh::block_count(target);
-    for (; rays; rays &= rays - 1) {
-      const unsigned i = unsigned(__builtin_ctzll(rays));
-      if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
-      const Ray& ray = rays_[g.index[i]];
-      auto&& of_ray = data(g, i, ray);
+    const auto hit = [&g](int i) {
       if constexpr (AnyHit) {
-        if (leaves_.any_hit(of_ray, blocks, count, ray.tnear, ray.tfar)) g.best[i].primitive = 0, g.active &= ~(std::uint64_t{1} << i);
+        g.best[i].primitive = 0, g.active &= ~(std::uint64_t{1} << i);
       } else {
-        if (leaves_.closest_hit(of_ray, blocks, count, ray.tnear, g.best[i])) g.t[i] = g.best[i].t;
+        g.t[i] = g.best[i].t;
+      }
+    };
+    if constexpr (Leaves::kBlockByBlock) {
+      test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks), count, rays, [&](int i) -> const Ray& { return ray(g, unsigned(i)); },
+                                                                [&](int i) -> decltype(auto) { return data(g, unsigned(i)); }, [&](int i) -> NearestHit& { return g.best[i]; }, hit);
+    } else {
+      for (; rays; rays &= rays - 1) {
+        const int i = __builtin_ctzll(rays);
+        if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
+        const Ray& r = ray(g, unsigned(i));
+        auto&& of_ray = data(g, unsigned(i));
+        if (AnyHit ? leaves_.any_hit(of_ray, blocks, count, r.tnear, r.tfar) : leaves_.closest_hit(of_ray, blocks, count, r.tnear, g.best[i])) hit(i);
       }
     }
   }
