@@ -31,7 +31,8 @@ Progress::Progress(std::size_t cells, std::size_t units)
     : terminal_(::isatty(STDERR_FILENO) == 1),
       cells_(cells),
       units_(std::max<std::size_t>(units, 1)),
-      begin_(wall_seconds()) {}
+      begin_(wall_seconds()),
+      said_(begin_) {}
 
 Progress::~Progress() {
   wipe();
@@ -49,8 +50,14 @@ void Progress::wipe() {
   if (terminal_) fmt::print(stderr, "\r\033[K");
 }
 
+/// A plain line where none has been written for long: preparing many structures takes minutes.
+void Progress::say_where() {
+  constexpr double kSilence = 30.0;
+  if (wall_seconds() - said_ > kSilence) note(fmt::format("[{}/{}] {} is under way  {}", cells_done_, cells_, cell_, time_left()));
+}
+
 void Progress::draw() {
-  if (!terminal_) return;
+  if (!terminal_) return say_where();
   const double now = wall_seconds();
   if (now - drawn_ < 0.1) return;
   drawn_ = now;
@@ -67,6 +74,7 @@ void Progress::note(const std::string& line) {
   wipe();
   fmt::print(stderr, "{}\n", line);
   std::fflush(stderr);
+  said_ = wall_seconds();
 }
 
 void Progress::step(const std::string& cell, std::size_t units) {

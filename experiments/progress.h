@@ -1,4 +1,5 @@
-// Progress: on a terminal a bar with the cell's name and the time left, else plain lines. Goes to stderr.
+// Progress: on a terminal a bar with the cell's name and the time left, else plain lines, one a cell and one in half a minute at least while
+// cells are under way. Goes to stderr.
 #pragma once
 
 #include <cstddef>
@@ -24,11 +25,12 @@ class Progress {
  private:
   void draw();
   void wipe();
+  void say_where();
   [[nodiscard]] std::string time_left() const;
 
   bool terminal_;
   std::size_t cells_, units_, cells_done_ = 0, units_done_ = 0;
-  double begin_, drawn_ = 0.0;
+  double begin_, drawn_ = 0.0, said_;
   std::string cell_;
 };
 
