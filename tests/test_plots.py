@@ -12,7 +12,7 @@ PLOTS = Path(__file__).resolve().parent.parent / "plots"
 sys.path.insert(0, str(PLOTS))
 sys.dont_write_bytecode = True
 
-from figures import ALL, published_ratios, traversal_ratios  # noqa: E402
+from figures import ALL, published_ratios, squares, traversal_ratios  # noqa: E402
 from figures.accuracy_vs_time import hard_points, pareto_front  # noqa: E402
 from figures.leak_lines import without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
@@ -168,6 +168,28 @@ class Numbers(unittest.TestCase):
         self.assertAlmostEqual(traversal_ratios.value_at(table["bvh8", "packet8"], "diffuse", traversal_ratios.MEAN), 3 ** 0.5)
         self.assertIsNone(traversal_ratios.value_at(table["embree", "single"], "primary", traversal_ratios.MEAN))
         self.assertEqual(traversal_ratios.columns_of(cells), [("diffuse", "bunny"), ("diffuse", "city"), ("diffuse", "mean")])
+
+    def test_squares_for_many_bars(self):
+        import matplotlib.pyplot as plt
+
+        bars = [Cell({"structure": s, "builder": b, "scene": "bunny"}, [{"sah_cost": 10.0 + i}])
+                for i, (s, b) in enumerate((s, b) for s in ("bvh2", "bvh4", "bvh8", "bvh16", "bih") for b in map("builder{}".format, range(9)))]
+        self.assertTrue(squares.are_due([bars], ["builder"]))
+        self.assertFalse(squares.are_due([bars[:squares.MOST_BARS]], ["builder"]))
+        self.assertFalse(squares.are_due([bars], ["builder", "isa"]))  # a square would stand for two cells
+        figure = squares.square_panels([("bunny", bars), ("city", bars[:12])], lambda c: (c.value("sah_cost"),) * 3, str, "SAH cost", higher_is_better=False)
+        first, second = figure.axes
+        self.assertEqual([t.get_text() for t in first.get_yticklabels()], ["bih", "bvh2", "bvh4", "bvh8", "bvh16"])
+        self.assertEqual([len(first.texts), len(second.texts)], [45, 12])
+        self.assertEqual([t.get_text() for t in first.texts if t.get_fontweight() == "bold"], ["10.0"])
+        plt.close(figure)
+
+    def test_shades_of_squares(self):
+        shade = squares.shades([1.0, 10.0, 100.0], higher_is_better=True)
+        self.assertEqual([round(shade(v), 6) for v in (1, 10, 100)], [0, 0.5, 1])
+        shade = squares.shades([0.0, 1e-9, 10.0, 100.0], higher_is_better=False)  # what is next to nothing does not take the colours from the others
+        self.assertEqual([round(shade(v), 3) for v in (0, 1e-9, 10, 100)], [1, 1, 0.5, 0])
+        self.assertEqual(squares.shades([0.0, 0.0], higher_is_better=False)(0.0), 0)
 
     def test_order(self):
         self.assertEqual(ordered(["bvh16", "embree", "bvh4", "octree"], "structure"), ["bvh4", "bvh16", "octree", "embree"])

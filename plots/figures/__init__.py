@@ -1,6 +1,6 @@
 """One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, or raises NoData.
 
-A new figure is a module here and its name in ALL. Other modules here (bars, modes, leak_lines) are what figures share.
+A new figure is a module here and its name in ALL. Other modules here (bars, squares, modes, leak_lines) are what figures share.
 """
 
 ALL = ("rays_per_second", "traversal_ratios", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time", "sah_vs_time",

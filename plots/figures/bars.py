@@ -1,12 +1,13 @@
 """Horizontal bars, one a built structure, one panel a scene: what sah_cost and build_time have in common."""
 
+from figures import squares
 from results import NoData, axis_sort_key, ordered, undetermined_axes
 from style import colour, hatch, legends_right, panels, part_colour, part_legend, short
 
 
 def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None):
     """`value_of(cell)` gives (median, low, high) or None; `note_of(cell)` the text at a bar's end; `parts_of(cell)`, where
-    given, (name, value) of what the bar consists of: it is then stacked, and what the parts leave is drawn as the rest.
+    given, (name, value) of what the bar consists of: it is then stacked, and what the parts leave is drawn as the rest. Lower is better.
 
     `label_axes` are the axes that may tell bars of a scene apart; those that the ones before settle are not written.
     """
@@ -16,6 +17,8 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
     varied = [a for a in undetermined_axes(cells, ("scene", "structure", *label_axes)) if a in label_axes]
     scenes = ordered((c["scene"] for c in cells), "scene")
     bars = {scene: scene_bars([c for c in cells if c["scene"] == scene], varied) for scene in scenes}
+    if squares.are_due(bars.values(), varied):
+        return squares.square_panels([(short(scene), bars[scene]) for scene in scenes], value_of, digits, axis_label, higher_is_better=False)
 
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)

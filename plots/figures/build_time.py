@@ -1,11 +1,13 @@
 """Build time, from mesh to a structure ready for rays: one panel a scene."""
 
+from figures import squares
 from figures.bars import bar_panels, digits
 
 TITLE = "Build time"
 CAPTION = ("Wall time from mesh to a structure ready for rays, with the 95 % confidence interval of the median where a build "
            "was repeated; beside it, triangles a second. The parts are the build's own phases, grey what none of them covers. "
-           "Lower is better.")
+           "Lower is better."
+           + squares.CAPTION)
 
 
 def draw(results):

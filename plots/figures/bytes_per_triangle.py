@@ -1,11 +1,13 @@
 """Memory of what was built, by part: one panel a scene."""
 
+from figures import squares
 from figures.bars import bar_panels, digits
 
 TITLE = "Bytes per triangle"
 CAPTION = ("What tracing needs besides the mesh, a triangle of the mesh: nodes, leaves (references that are shared count as often as "
            "they are stored), and what is neither. Structures that cannot be looked into, as embree, have one part. Beside it, the "
-           "most memory held while building, as a multiple of the result. Lower is better.")
+           "most memory held while building, as a multiple of the result. Lower is better."
+           + squares.CAPTION)
 PARTS = (("nodes", "node_bytes"), ("leaves", "leaf_bytes"), ("other", "other_bytes"))
 
 

@@ -1,5 +1,6 @@
 """Throughput by structure and builder: one panel a scene, workload and instruction set, a bar for each structure as built."""
 
+from figures import squares
 from figures.bars import digits, draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
@@ -7,7 +8,8 @@ from style import MARKERS, legends_right, marker_legend, marker_map, panels, sho
 
 TITLE = "Rays per second by structure and builder"
 CAPTION = ("A bar reaches the fastest mode of a structure as built, with the 95 % confidence interval of the median; markers "
-           "show its other modes. Higher is better. The wrong answers of each cell stand in the table.")
+           "show its other modes. Higher is better. The wrong answers of each cell stand in the table."
+           + squares.CAPTION)
 BUILT = ("scene", "workload", "isa", "structure", "builder", "threads")
 
 
@@ -30,26 +32,29 @@ def draw(results):
             for w in ordered((c["workload"] for c in cells), "workload") for i in ordered((c["isa"] for c in cells), "isa")
             if any((c["scene"], c["workload"], c["isa"]) == (s, w, i) for c in best)]
     shown = {key: scene_bars([c for c in best if (c["scene"], c["workload"], c["isa"]) == key], varied) for key in keys}
-    columns = min(2, len(keys))
-    figure, axes = panels(-(-len(keys) // columns), columns, 5.6, 0.9 + 0.26 * max(map(len, shown.values())))
-    figure.get_layout_engine().set(w_pad=0.15)
 
     def value(cell):
         rate = cell.estimate(metric)
         return rate.median / 1e6, rate.low / 1e6, rate.high / 1e6
 
+    titles = {key: f"{short(key[0])}, {key[1].replace('_', ' ')}, {key[2]}" for key in keys}
+    if squares.are_due(shown.values(), varied):
+        return squares.square_panels([(titles[key], shown[key]) for key in keys], value, digits, unit, higher_is_better=True)
+    columns = min(2, len(keys))
+    figure, axes = panels(-(-len(keys) // columns), columns, 5.6, 0.9 + 0.26 * max(map(len, shown.values())))
+    figure.get_layout_engine().set(w_pad=0.15)
+
     for index, axis in enumerate(axes.flat):
         if index >= len(keys):
             axis.set_visible(False)
             continue
-        scene, workload, isa = keys[index]
         bars = shown[keys[index]]
         draw_panel(axis, bars, value, lambda c: digits(value(c)[0]), varied)
         for place, bar in enumerate(bars):
             for cell in groups[tuple(bar[a] for a in BUILT)] if markers else ():
                 axis.plot(cell.estimate(metric).median / 1e6, place, markers[modes.label(cell)], color="#222222", markersize=4,
                           markerfacecolor="white", markeredgewidth=0.8)
-        axis.set_title(f"{short(scene)}, {workload.replace('_', ' ')}, {isa}")
+        axis.set_title(titles[keys[index]])
         axis.set_xlabel(unit)
     if markers:
         legends_right(figure, [("mode", marker_legend(markers))])

@@ -1,10 +1,12 @@
 """SAH cost of what was built: one panel a scene."""
 
+from figures import squares
 from figures.bars import bar_panels
 
 TITLE = "SAH cost"
 CAPTION = ("Expected cost of a ray through the root's box, in units of a leaf block test. Lower is better. Structures that "
-           "cannot be looked into, as embree, have none.")
+           "cannot be looked into, as embree, have none."
+           + squares.CAPTION)
 
 
 def draw(results):
