@@ -261,6 +261,26 @@ TEST_CASE("exact kernels of every mode where the constants of box tests overflow
   check(mesh, rays, Truth::by_oracle(mesh, rays), rows);
 }
 
+TEST_CASE("exact kernels of every mode of the kd-tree where the constants of planes overflow") {
+  std::vector<KernelRow> rows;
+  for (const KernelRow& row : kernel_table())
+    if (row.structure == "kdtree" && row.intersector == "exact" && row.box == "padded" && row.leaf == "triangle4v" && is_available(row.isa)) rows.push_back(row);
+  REQUIRE(rows.size() >= 2 * 10);
+  // A direction of length 1 far out: what stands for the reciprocal of its zeros is 2^60.
+  const TriangleMesh mesh = moved(test::sphere(24), 0x1p60f, {0x1p70f, -0x1p70f, 0x1p69f});
+  std::vector<Ray> rays;
+  for (std::size_t i = 0; i < mesh.size(); i += 3) {
+    const std::array<Vec3f, 3> corner = mesh.corners(i);
+    const Vec3f middle = (corner[0] + corner[1] + corner[2]) * (1.0f / 3.0f);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      Ray ray{middle, 0, {0, 0, 0}, kInfinity};
+      ray.origin[axis] += 0x1p62f, ray.direction[axis] = -1.0f;
+      rays.push_back(ray);
+    }
+  }
+  check(mesh, rays, Truth::by_oracle(mesh, rays), rows);
+}
+
 TEST_CASE("exact kernels on inputs that once failed") {
   // The edge functions are finite, their sum is not: weights of 0 made a distance of 0 that looked certain.
   TriangleMesh mesh;

@@ -48,8 +48,15 @@ struct KdLanes : LaneRays {
       const vm<W> parallel = ~(abs(d[a]) > tiny);
       const F reciprocal = select(parallel, xor_sign(limit, sign_bits(d[a])), F(1.0f) / d[a]);
       const F e = select(parallel, F(KdRay::kPad), F(pad)) * (F(max_coordinate) + abs(o)) * abs(reciprocal) + select(parallel, F(0x1p-100f), F(pad * 0x1p-79f));
-      const F at = o * reciprocal;
-      reciprocal.store(r[a] + k), (at + e).store(enter[a] + k), (at - e).store(leave[a] + k);
+      const F at = o * reciprocal, in = at + e, out = at - e;
+      if constexpr (kHasFma) {
+        const vm<W> fits = abs(in) + abs(out) < F(KdRay::kTooLarge);
+        const F all(KdRay::kAllOfT);
+        select(fits, reciprocal, xor_sign(F(1.0f), sign_bits(reciprocal))).store(r[a] + k);
+        select(fits, in, all).store(enter[a] + k), select(fits, out, -all).store(leave[a] + k);
+      } else {
+        reciprocal.store(r[a] + k), in.store(enter[a] + k), out.store(leave[a] + k);
+      }
     }
   }
 };
@@ -112,6 +119,11 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
       v.low_origin[a] = down ? o0 : o1, v.high_origin[a] = down ? o1 : o0;
       v.pad[a] = 0x1p-19f * (max_coordinate_ + o) * r + 0x1p-98f;
       v.usable &= v.pad[a] < 0x1p100f;
+      if constexpr (kHasFma) {  // an axis that is left out has another reciprocal
+        float least, most;
+        Base::range(lanes_.enter[a], group, least, most);
+        v.usable &= most < KdRay::kTooLarge;
+      }
       Base::set_axis(a, o0, o1, group);
     }
     return v;
