@@ -6,6 +6,7 @@
 #include <tuple>
 #include <unordered_set>
 
+#include "core/random.h"
 #include "oracle/sheared.h"
 
 namespace arboretum {
@@ -33,9 +34,7 @@ double distance(const Seen& a, const Seen& b) {
 
 struct HashOfCorners {
   std::size_t operator()(const std::array<std::uint32_t, 3>& c) const noexcept {
-    std::uint64_t h = 0;
-    for (const std::uint32_t v : c) h = (h ^ v) * 0x9e3779b97f4a7c15u, h ^= h >> 32;
-    return std::size_t(h);
+    return std::size_t(random_bits(c[0], c[1], c[2]));
   }
 };
 

@@ -17,7 +17,7 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kChunk = 1u << 14;
-constexpr std::size_t kFew = 2048, kVeryFew = 24;  ///< keys that are sorted by small digits; by insertion
+constexpr std::size_t kFew = 2048, kVeryFew = 24;  ///< keys that are sorted by small digits; by comparison
 constexpr unsigned kMostDigitBits = 8;             ///< of a small digit
 
 template <class F>
@@ -60,12 +60,7 @@ void put_keys(std::uint64_t* to, __m128i code, __m128i id) noexcept {
 /// Sorts n keys, whose ids ascend, by the `bits` of their codes, by digits that suit a few hundred. They are then in `keys` or `room`: where is returned.
 std::uint64_t* sort_few(std::uint64_t* keys, std::uint64_t* room, std::size_t n, unsigned bits) noexcept {
   if (n <= kVeryFew) {
-    for (std::size_t i = 1; i < n; ++i) {
-      const std::uint64_t key = keys[i];
-      std::size_t at = i;
-      for (; at > 0 && keys[at - 1] > key; --at) keys[at] = keys[at - 1];
-      keys[at] = key;
-    }
+    std::sort(keys, keys + n);
     return keys;
   }
   const unsigned most = std::clamp(unsigned(std::bit_width(n)), 6u, kMostDigitBits), passes = (bits + most - 1) / most;

@@ -26,10 +26,12 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Rays side by side with the constants of KdRay, computed W rays at a time by its operations, so they are the same bits.
 struct KdLanes : LaneRays {
   alignas(64) float r[3][kMost], enter[3][kMost], leave[3][kMost];
+  std::uint64_t overflown;  ///< those of which an axis is left out
 
   /// As LaneRays::prepare(). `pad`: KdRay::kPad, or 0 for `fast` planes.
   template <int W, class RayAt, class Each>
   ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, float pad, float max_coordinate, const Each& each) {
+    overflown = 0;
     LaneRays::prepare<W>(count, ray_at, [&](int k) {
       constants<W>(k, pad, max_coordinate);
       each(k);
@@ -48,15 +50,11 @@ struct KdLanes : LaneRays {
       const vm<W> parallel = ~(abs(d[a]) > tiny);
       const F reciprocal = select(parallel, xor_sign(limit, sign_bits(d[a])), F(1.0f) / d[a]);
       const F e = select(parallel, F(KdRay::kPad), F(pad)) * (F(max_coordinate) + abs(o)) * abs(reciprocal) + select(parallel, F(0x1p-100f), F(pad * 0x1p-79f));
-      const F at = o * reciprocal, in = at + e, out = at - e;
-      if constexpr (kHasFma) {
-        const vm<W> fits = abs(in) + abs(out) < F(KdRay::kTooLarge);
-        const F all(KdRay::kAllOfT);
-        select(fits, reciprocal, xor_sign(F(1.0f), sign_bits(reciprocal))).store(r[a] + k);
-        select(fits, in, all).store(enter[a] + k), select(fits, out, -all).store(leave[a] + k);
-      } else {
-        reciprocal.store(r[a] + k), in.store(enter[a] + k), out.store(leave[a] + k);
-      }
+      const F at = o * reciprocal, in = at + e, out = at - e, all(KdRay::kAllOfT);
+      const vm<W> fits = abs(in) + abs(out) < F(KdRay::kTooLarge);
+      select(fits, reciprocal, xor_sign(F(1.0f), sign_bits(reciprocal))).store(r[a] + k);
+      select(fits, in, all).store(enter[a] + k), select(fits, out, -all).store(leave[a] + k);
+      overflown |= std::uint64_t((~fits).bits()) << k;
     }
   }
 };
@@ -109,7 +107,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   /// Also tells the leaves what they need of the group. Rays that fill two registers or less are not worth an interval of planes.
   Interval interval_of(Mask group) {
     Interval v;
-    v.usable = chunks_ > 2;
+    v.usable = chunks_ > 2 && (lanes_.overflown & group) == 0;
     if (!v.usable && !Leaves::kRaysInLanes) return v;
     for (int a = 0; a < 3; ++a) {
       float o0, o1;
@@ -119,11 +117,6 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
       v.low_origin[a] = down ? o0 : o1, v.high_origin[a] = down ? o1 : o0;
       v.pad[a] = 0x1p-19f * (max_coordinate_ + o) * r + 0x1p-98f;
       v.usable &= v.pad[a] < 0x1p100f;
-      if constexpr (kHasFma) {  // an axis that is left out has another reciprocal
-        float least, most;
-        Base::range(lanes_.enter[a], group, least, most);
-        v.usable &= most < KdRay::kTooLarge;
-      }
       Base::set_axis(a, o0, o1, group);
     }
     return v;

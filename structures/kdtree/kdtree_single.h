@@ -7,8 +7,7 @@
 // cells without thickness nor neighbours across a plane that the ray lies in: a component below 2^-60 of the largest gets
 // r = 2^60 / |d|max, and where the origin is within the pad of such a plane both sides are visited. Rays with such a component
 // get this pad for it with `fast`, too; otherwise `fast` pads nothing and keeps no promise. The two differ in constants, not in code.
-// Where s * r - o * r overflows both sides are visited: unfused it is NaN then, and comparisons are written so; fused it would be infinite, so an
-// axis whose constants overflow is left out.
+// An axis whose constants overflow is left out: both sides of its planes are visited. So they are where a t is NaN, by the way comparisons are written.
 //
 // A hit counts wherever it lies on the ray, in its cell or beyond. A cell is left out only when it begins, rounded down, beyond the
 // nearest hit: one that begins at an equal t may hold the triangle with the lower id.
@@ -46,9 +45,7 @@ struct KdRay {
       const float e = (parallel ? kPad : pad) * (max_coordinate + __builtin_fabsf(o[k])) * __builtin_fabsf(r[k]) + (parallel ? 0x1p-100f : pad * 0x1p-79f);
       const float at = o[k] * r[k];
       enter[k] = at + e, leave[k] = at - e;
-      if constexpr (kHasFma) {
-        if (__builtin_expect(!(__builtin_fabsf(enter[k]) + __builtin_fabsf(leave[k]) < kTooLarge), 0)) r[k] = __builtin_copysignf(1.0f, r[k]), enter[k] = kAllOfT, leave[k] = -kAllOfT;
-      }
+      if (__builtin_expect(!(__builtin_fabsf(enter[k]) + __builtin_fabsf(leave[k]) < kTooLarge), 0)) r[k] = __builtin_copysignf(1.0f, r[k]), enter[k] = kAllOfT, leave[k] = -kAllOfT;
       far[k] = __builtin_signbit(r[k]) ? 0u : 8u;
     }
     r[3] = enter[3] = leave[3] = 0.0f, far[3] = 0u;
