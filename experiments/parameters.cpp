@@ -13,16 +13,21 @@ struct Field {
   std::string_view name;
   double low, high;  ///< inclusive
   unsigned BuilderParameters::*integer = nullptr;
-  unsigned TraversalSettings::*setting = nullptr;  ///< of a way of traversal; `auto` is its own
+  unsigned TraversalSettings::*setting = nullptr;  ///< of a way of traversal
   float BuilderParameters::*real = nullptr;
   std::string BuilderParameters::*word = nullptr;
   std::span<const std::string_view> words = {};
   std::span<const unsigned> choices = {};  ///< of an integer that may take no other value between low and high
+  bool has_own = setting != nullptr;       ///< `auto` is a value, and the default
+
+  /// Where has_own.
+  [[nodiscard]] unsigned& of(Parameters& all) const { return setting ? all.traversal.*setting : all.builder.*integer; }
 };
 
 constexpr std::string_view kCollapses[] = {"optimal", "greedy"};
 constexpr unsigned kMortonBits[] = {30, 63};
-constexpr std::string_view kOwn = "auto";
+constexpr std::string_view kOwn = "auto";  ///< the builder's or the way of traversal's own choice
+static_assert(BuilderParameters::kOwn == TraversalSettings::kOwn);
 
 /// What may stand below another structure, and what cannot: the plan says why not.
 std::span<const std::string_view> structure_names() {
@@ -46,6 +51,7 @@ const std::vector<Field>& fields() {
       {.name = "spatial_overlap", .low = 0, .high = 1, .real = &BuilderParameters::spatial_overlap},
       {.name = "spatial_gain", .low = 0.01, .high = 1, .real = &BuilderParameters::spatial_gain},
       {.name = "reinsertion_rounds", .low = 1, .high = 64, .integer = &BuilderParameters::reinsertion_rounds},
+      {.name = "reinsertion_top", .low = 0, .high = 65536, .integer = &BuilderParameters::reinsertion_top, .has_own = true},
       {.name = "empty_bonus", .low = 0, .high = 0.95, .real = &BuilderParameters::empty_bonus},
       {.name = "max_depth", .low = 0, .high = 63, .integer = &BuilderParameters::max_depth},
       {.name = "grid_density", .low = 0.01, .high = 64, .real = &BuilderParameters::grid_density},
@@ -64,7 +70,7 @@ const Field& field(std::string_view name) {
 std::string expectation(const Field& f) {
   if (f.word) return fmt::format("one of {}", fmt::join(f.words, ", "));
   if (!f.choices.empty()) return fmt::format("one of {}", fmt::join(f.choices, ", "));
-  if (f.setting) return fmt::format("{} or an integer from {} to {}", kOwn, f.low, f.high);
+  if (f.has_own) return fmt::format("{} or an integer from {} to {}", kOwn, f.low, f.high);
   return fmt::format("{} from {} to {}", f.integer ? "an integer" : "a number", f.low, f.high);
 }
 
@@ -89,7 +95,7 @@ std::vector<std::string> parameter_names() {
 std::string default_parameter(std::string_view name) {
   const BuilderParameters defaults;
   const Field& f = field(name);
-  if (f.setting) return std::string(kOwn);
+  if (f.has_own) return std::string(kOwn);
   if (f.word) return defaults.*f.word;
   return f.integer ? fmt::format("{}", defaults.*f.integer) : fmt::format("{}", defaults.*f.real);
 }
@@ -98,10 +104,10 @@ std::string set_parameter(Parameters& all, std::string_view name, const std::str
   const Field& f = field(name);
   BuilderParameters& parameters = all.builder;
   bool done = false;
-  if (f.setting) {
-    unsigned& setting = all.traversal.*f.setting;
+  if (f.has_own) {
+    unsigned& setting = f.of(all);
     done = value == kOwn || parse_within(value, f.low, f.high, setting);
-    if (value == kOwn) setting = TraversalSettings::kOwn;
+    if (value == kOwn) setting = BuilderParameters::kOwn;
   } else if (f.word) {
     done = std::ranges::find(f.words, value) != f.words.end();
     if (done) parameters.*f.word = value;

@@ -54,7 +54,7 @@ struct MollerTrumbore {
       using F = vf<M>;
       const auto store = [](vf3<M> from, float(&to)[3][M]) { from.x.store(to[0]), from.y.store(to[1]), from.z.store(to[2]); };
       const Corners<F> t = corners(block, [](const float(&p)[M]) { return F::load(p); });
-      const MollerTrumboreTerms<F> terms(cross(t.e2, t.e1), t.v0 - vf3<M>{F(origin.x), F(origin.y), F(origin.z)});
+      const MollerTrumboreTerms<F> terms(normal(block, t), t.v0 - vf3<M>{F(origin.x), F(origin.y), F(origin.z)});
       store(terms.c, c), store(terms.n, n), store(t.e1, e1), store(t.e2, e2), dot(terms.n, terms.c).store(n_dot_c);
       std::memcpy(id, block.id, sizeof id);
     }
@@ -70,7 +70,7 @@ struct MollerTrumbore {
 
     ARBORETUM_INLINE explicit ForManyRays(const Block& b) : block(b), id(b.id) {
       const auto t = corners(b, [](const float(&p)[kWidth]) { return vf<kWidth>::load(p); });
-      n = cross(t.e2, t.e1);
+      n = normal(b, t);
     }
   };
 
@@ -116,16 +116,24 @@ struct MollerTrumbore {
     return t;
   }
 
+  template <class Block, class Get>
+  static ARBORETUM_INLINE auto corners(const ForManyRays<Block>& seen, const Get& get) {
+    return corners(seen.block, get);
+  }
+
+  template <class Block, class F>
+  static ARBORETUM_INLINE vec3<F> normal(const Block&, const Corners<F>& t) {
+    return cross(t.e2, t.e1);
+  }
+  template <class Block, class F>
+  static ARBORETUM_INLINE vec3<F> normal(const ForManyRays<Block>& seen, const Corners<F>&) {
+    return seen.n;
+  }
+
   template <class F, class Block, class Get, class Hits>
   static ARBORETUM_INLINE auto core(vec3<F> o, vec3<F> d, const Block& block, const Get& get, Hits& hits) {
     const Corners<F> t = corners(block, get);
-    const MollerTrumboreTerms<F> terms(t.v0, t.e1, t.e2, o, d);
-    return decide(terms, [&] { return dot(terms.n, terms.c); }, hits);
-  }
-  template <class F, class Block, class Get, class Hits>
-  static ARBORETUM_INLINE auto core(vec3<F> o, vec3<F> d, const ForManyRays<Block>& with_normals, const Get& get, Hits& hits) {
-    const Corners<F> t = corners(with_normals.block, get);
-    MollerTrumboreTerms<F> terms(with_normals.n, t.v0 - o);
+    MollerTrumboreTerms<F> terms(normal(block, t), t.v0 - o);
     terms.meet(t.e1, t.e2, d);
     return decide(terms, [&] { return dot(terms.n, terms.c); }, hits);
   }

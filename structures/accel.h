@@ -23,6 +23,7 @@ class Archive;
 
 /// Parameters of a builder; a builder reads those that concern it. Part of the cell when they are swept.
 struct BuilderParameters {
+  static constexpr unsigned kOwn = ~0u;  ///< the builder's own choice
   unsigned bins = 32;             ///< binned SAH: bins an axis, 4 .. 64
   float traversal_cost = 1.0f;    ///< cost of a node visit, in units of one block test
   float intersection_cost = 1.0f; ///< cost of testing one leaf block
@@ -33,6 +34,7 @@ struct BuilderParameters {
   float spatial_overlap = 1e-5f;  ///< spatial_sah: least overlap of an object split for a spatial one to be tried, and least area that a reference more must save: shares of the root's area
   float spatial_gain = 0.8f;      ///< spatial_sah: a share x of references more must lower the estimated cost by (1 - this) x, 0.01 .. 1
   unsigned reinsertion_rounds = 4;  ///< builders that end in _reinsertion: passes over the tree, 1 .. 64
+  unsigned reinsertion_top = kOwn;  ///< BVHs: how many of the tree's largest nodes the builder ends by reinserting, 0 .. 65536; kOwn: 512 after binned_sah, sweep_sah and spatial_sah, else none
   float empty_bonus = 0.2f;       ///< kdtree: share of the cost taken off a split that cuts away empty space, 0 .. 0.95
   unsigned max_depth = 0;         ///< kdtree, octree: deepest leaf; 0: 8 + 1.3 log2 n for the kdtree, 21 for the octree
   float grid_density = 0.25f;     ///< grid: cells a triangle, 0.01 .. 64

@@ -84,11 +84,12 @@ StructureFileHeader header_of(const TriangleMesh& mesh) {
 template <class F>
 void for_each_parameter(const BuilderParameters& parameters, F&& f) {
   const auto& [bins, traversal_cost, intersection_cost, max_leaf_blocks, morton_bits, ploc_radius, duplication_budget, spatial_overlap,
-               spatial_gain, reinsertion_rounds, empty_bonus, max_depth, grid_density, below, collapse] = parameters;
+               spatial_gain, reinsertion_rounds, reinsertion_top, empty_bonus, max_depth, grid_density, below, collapse] = parameters;
   f("bins", bins), f("traversal_cost", traversal_cost), f("intersection_cost", intersection_cost), f("max_leaf_blocks", max_leaf_blocks);
   f("morton_bits", morton_bits), f("ploc_radius", ploc_radius), f("duplication_budget", duplication_budget);
   f("spatial_overlap", spatial_overlap), f("spatial_gain", spatial_gain), f("reinsertion_rounds", reinsertion_rounds);
-  f("empty_bonus", empty_bonus), f("max_depth", max_depth), f("grid_density", grid_density), f("below", below), f("collapse", collapse);
+  f("reinsertion_top", reinsertion_top), f("empty_bonus", empty_bonus), f("max_depth", max_depth);
+  f("grid_density", grid_density), f("below", below), f("collapse", collapse);
 }
 
 /// What of the settings' parameters the structure depends on.

@@ -349,6 +349,33 @@ TEST_CASE("reinsertion lowers the SAH cost of every builder's tree") {
   }
 }
 
+TEST_CASE("reinsertion of the top lowers the SAH cost where triangles differ in size") {
+  // Many small triangles among a few that span the scene: what a plane cannot part.
+  TriangleMesh crowded = random_triangles(20000, 0.01f, 6);
+  const TriangleMesh walls = random_triangles(300, 1.0f, 7);
+  for (const Triangle& t : walls.triangles) {
+    const auto first = std::uint32_t(crowded.vertices.size());
+    for (const std::uint32_t v : {t.a, t.b, t.c}) crowded.vertices.push_back(walls.vertices[v]);
+    crowded.triangles.push_back({first, first + 1, first + 2});
+  }
+  const TriangleMesh even = sphere(80);
+  for (const std::string_view builder : binary_builder_names()) {
+    if (builder.ends_with(kReinsertion)) continue;
+    INFO(builder);
+    BuilderParameters with, without;
+    with.reinsertion_top = 512, without.reinsertion_top = 0;
+    for (unsigned threads : {1u, 3u}) check_tree(build(builder, crowded, 8, threads, best_isa(), with), crowded, 8, splits_triangles(builder));
+    // Left to itself a builder from the top down does it.
+    const bool does = builder == "binned_sah" || builder == "sweep_sah" || builder == "spatial_sah";
+    CHECK(sah_of(builder, crowded, with) < (does ? 0.99 : 1.0) * sah_of(builder, crowded, without));
+    CHECK(sah_of(builder, even, with) < 1.001 * sah_of(builder, even, without));
+    CHECK(sah_of(builder, crowded) == sah_of(builder, crowded, does ? with : without));
+  }
+  BuilderParameters parameters;
+  parameters.reinsertion_top = 65537;
+  CHECK_THROWS_AS(build("binned_sah", even, 4, 1, best_isa(), parameters), UserError);
+}
+
 namespace {
 
 /// Long thin triangles in any direction.

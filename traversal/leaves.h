@@ -65,6 +65,24 @@ struct CompiledLeaves {
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
 
+/// Tests a leaf with `rays`, a bit each: one ray after the other, or one block after the other where that is better. `ray(i)` and `data(i)`: the i-th ray and what
+/// the intersector keeps for it. Of any hit `hit(i)` is called once, for one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
+template <bool AnyHit, class Leaves, class Counting, class RayAt, class DataOf, class BestOf, class OnHit>
+ARBORETUM_INLINE void test_leaf(const Leaves& leaves, [[maybe_unused]] const LeafForm& form, [[maybe_unused]] const Counting& counting, const std::byte* blocks, unsigned count, std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best,
+                                const OnHit& hit) {
+  if constexpr (Leaves::kBlockByBlock) {
+    test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks), count, rays, ray, data, best, hit);
+  } else {
+    for (; rays; rays &= rays - 1) {
+      const int i = __builtin_ctzll(rays);
+      if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
+      const Ray& r = ray(i);
+      auto&& of_ray = data(i);
+      if (AnyHit ? leaves.any_hit(of_ray, blocks, count, r.tnear, r.tfar) : leaves.closest_hit(of_ray, blocks, count, r.tnear, best(i))) hit(i);
+    }
+  }
+}
+
 /// Where the intersector can finish the hits of several rays together (intersectors/round_later.h), what they wait in; else nothing.
 template <class Leaves>
 inline constexpr bool kFinishesLater = requires { typename Leaves::Intersector::Unfinished; };

@@ -178,17 +178,8 @@ class PacketLeaves {
         lanes_.t[i] = best_[i].t;
       }
     };
-    if constexpr (Leaves::kBlockByBlock) {
-      test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks), count, mask, [this](int i) -> const Ray& { return rays_[i]; },
-                                                                [this](int i) -> decltype(auto) { return data(i); }, [this](int i) -> NearestHit& { return best_[i]; }, hit);
-    } else {
-      for (; mask; mask &= mask - 1) {
-        const int i = __builtin_ctzll(mask);
-        if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
-        auto&& ray = data(i);
-        if (AnyHit ? leaves_.any_hit(ray, blocks, count, rays_[i].tnear, rays_[i].tfar) : leaves_.closest_hit(ray, blocks, count, rays_[i].tnear, best_[i])) hit(i);
-      }
-    }
+    test_leaf<AnyHit>(leaves_, form_, counting_, blocks, count, mask, [this](int i) -> const Ray& { return rays_[i]; }, [this](int i) -> decltype(auto) { return data(i); },
+                      [this](int i) -> NearestHit& { return best_[i]; }, hit);
   }
 
   /// One block against the rays of `mask`, those of its triangles left out that none of them can hit.

@@ -5,6 +5,7 @@
 #include "structures/builders/embree_builders.h"
 #include "structures/builders/fast_builders.h"
 #include "structures/builders/reinsertion.h"
+#include "structures/builders/top_reinsertion.h"
 
 namespace arboretum {
 
@@ -36,12 +37,16 @@ BinaryBuilder on_any(Isa) {
 struct Entry {
   std::string_view name;
   BinaryBuilder (*on)(Isa);
+  unsigned reinserted_top = 0;  ///< where reinsertion_top leaves it to the builder
 };
 
+/// Nodes that top-down builders reinsert: hardly more is gained by all (docs/performance.md).
+constexpr unsigned kTop = 512, kMostTop = 65536;
+
 constexpr Entry kBuilders[] = {
-    {"binned_sah", on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>},
-    {"sweep_sah", on_any<build_sweep_sah>},
-    {"spatial_sah", on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>},
+    {"binned_sah", on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>, kTop},
+    {"sweep_sah", on_any<build_sweep_sah>, kTop},
+    {"spatial_sah", on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>, kTop},
     {"morton", on_any<build_morton>},
     {"ploc", on_any<build_ploc>},
 #ifdef ARBORETUM_HAVE_EMBREE
@@ -87,11 +92,17 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
   if (reinserts) builder.remove_suffix(kReinsertion.size());
   const unsigned rounds = settings.parameters.reinsertion_rounds;
   if (reinserts && (rounds < 1 || rounds > 64)) throw UserError("reinsertion_rounds: " + std::to_string(rounds) + " is not within 1 .. 64");
+  const unsigned top = settings.parameters.reinsertion_top;
+  if (top != BuilderParameters::kOwn && top > kMostTop) throw UserError("reinsertion_top: " + std::to_string(top) + " is not within 0 .. " + std::to_string(kMostTop));
   for (const Entry& e : kBuilders) {
     if (e.name != builder) continue;
     if (builder == "spatial_sah") require_budget(mesh.size(), settings.parameters.duplication_budget);
     e.on(settings.isa)(mesh, settings.parameters, leaf_width, tree, report);
-    if (reinserts) reinsert(tree, rounds, leaf_width, report);
+    if (reinserts) {
+      reinsert(tree, rounds, leaf_width, report);
+    } else {
+      reinsert_top(tree, top == BuilderParameters::kOwn ? e.reinserted_top : top, report);
+    }
     return;
   }
   const std::vector<std::string> names(binary_builder_names().begin(), binary_builder_names().end());

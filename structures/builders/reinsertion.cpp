@@ -17,7 +17,7 @@ namespace arboretum {
 namespace {
 
 constexpr std::uint32_t kNone = ~0u;
-constexpr std::size_t kGrain = 512;
+constexpr std::size_t kGrain = 128;
 constexpr unsigned kMostVisits = 1024;  ///< of one search: where all boxes overlap nothing can be left out
 
 struct Move {
@@ -156,6 +156,13 @@ class Reinsertion {
 
 }  // namespace
 
+bool reinsert(LinkedTree& tree, unsigned rounds) {
+  Reinsertion passes(tree);
+  unsigned done = 0;
+  while (done < rounds && passes.pass()) ++done;
+  return done > 0;
+}
+
 void reinsert(BinaryTree& tree, unsigned rounds, unsigned leaf_width, BuildReport& report) {
   if (tree.primitives.empty()) return;
   const bool duplicates = tree.duplicates;
@@ -164,9 +171,7 @@ void reinsert(BinaryTree& tree, unsigned rounds, unsigned leaf_width, BuildRepor
   LinkedTree linked = to_linked(std::move(tree));
   tree = lay_out(linked, leaf_width);
   linked = to_linked(std::move(tree));
-  Reinsertion passes(linked);
-  for (unsigned i = 0; i < rounds && passes.pass(); ++i) {
-  }
+  (void)reinsert(linked, rounds);
   tree = lay_out(linked, leaf_width);
   tree.duplicates = duplicates;
   report.phases.emplace_back("reinsertion", wall_seconds() - start);

@@ -4,6 +4,7 @@
 
 #include "structures/accel.h"
 #include "structures/builders/binary_tree.h"
+#include "structures/builders/linked_tree.h"
 
 namespace arboretum {
 
@@ -11,5 +12,9 @@ namespace arboretum {
 /// `leaf_width` references. The sum of the inner nodes' areas never grows. The result depends on the tree and not on threads or
 /// on how its nodes are numbered. Runs in the caller's TBB arena; adds phases to the report.
 void reinsert(BinaryTree& tree, unsigned rounds, unsigned leaf_width, BuildReport& report);
+
+/// Improves `tree` in place as above; whether anything was gained. A node's number, which decides between equal gains, should depend on the
+/// tree alone.
+bool reinsert(LinkedTree& tree, unsigned rounds);
 
 }  // namespace arboretum

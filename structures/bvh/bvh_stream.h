@@ -249,18 +249,8 @@ class Stream {
         g.t[i] = g.best[i].t;
       }
     };
-    if constexpr (Leaves::kBlockByBlock) {
-      test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks), count, rays, [&](int i) -> const Ray& { return ray(g, unsigned(i)); },
-                                                                [&](int i) -> decltype(auto) { return data(g, unsigned(i)); }, [&](int i) -> NearestHit& { return g.best[i]; }, hit);
-    } else {
-      for (; rays; rays &= rays - 1) {
-        const int i = __builtin_ctzll(rays);
-        if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
-        const Ray& r = ray(g, unsigned(i));
-        auto&& of_ray = data(g, unsigned(i));
-        if (AnyHit ? leaves_.any_hit(of_ray, blocks, count, r.tnear, r.tfar) : leaves_.closest_hit(of_ray, blocks, count, r.tnear, g.best[i])) hit(i);
-      }
-    }
+    test_leaf<AnyHit>(leaves_, form_, counting_, blocks, count, rays, [&](int i) -> const Ray& { return ray(g, unsigned(i)); }, [&](int i) -> decltype(auto) { return data(g, unsigned(i)); },
+                      [&](int i) -> NearestHit& { return g.best[i]; }, hit);
   }
 
   const std::byte* const base_;

@@ -44,16 +44,10 @@ struct KdLanes : LaneRays {
     using F = vf<W>;
     const F d[3] = {F::load(rays.direction[0] + k), F::load(rays.direction[1] + k), F::load(rays.direction[2] + k)};
     const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-    const F tiny = largest * F(0x1p-60f), limit = F(0x1p60f) / largest;
     for (int a = 0; a < 3; ++a) {
-      const F o = F::load(rays.origin[a] + k);
-      const vm<W> parallel = ~(abs(d[a]) > tiny);
-      const F reciprocal = select(parallel, xor_sign(limit, sign_bits(d[a])), F(1.0f) / d[a]);
-      const F e = select(parallel, F(KdRay::kPad), F(pad)) * (F(max_coordinate) + abs(o)) * abs(reciprocal) + select(parallel, F(0x1p-100f), F(pad * 0x1p-79f));
-      const F at = o * reciprocal, in = at + e, out = at - e, all(KdRay::kAllOfT);
-      const vm<W> fits = abs(in) + abs(out) < F(KdRay::kTooLarge);
-      select(fits, reciprocal, xor_sign(F(1.0f), sign_bits(reciprocal))).store(r[a] + k);
-      select(fits, in, all).store(enter[a] + k), select(fits, out, -all).store(leave[a] + k);
+      F reciprocal, in, out;
+      const vm<W> fits = KdRay::constants(F::load(rays.origin[a] + k), d[a], largest, max_coordinate, pad, reciprocal, in, out);
+      reciprocal.store(r[a] + k), in.store(enter[a] + k), out.store(leave[a] + k);
       overflown |= std::uint64_t((~fits).bits()) << k;
     }
   }

@@ -32,22 +32,33 @@ struct KdRay {
   float r[4], enter[4], leave[4];  ///< t of a plane at s, rounded down: s * r - enter; rounded up: s * r - leave
   std::uint32_t far[4];            ///< byte offset within a pair of the child that the ray comes to last
 
+  static constexpr float kPad = 0x1p-21f;
+  static constexpr float kTooLarge = 0x1p124f, kAllOfT = std::numeric_limits<float>::max();
+
+  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest`: the largest |component| of the ray's direction; `pad`: kPad, or 0 for `fast` planes. Returns
+  /// the lanes whose axis counts: where constants may have overflown it is left out, with a reciprocal of 1 and constants by which every plane is met at all t.
+  template <class F>
+  static ARBORETUM_INLINE auto constants(F o, F d, F largest, float max_coordinate, float pad, F& r, F& enter, F& leave) {
+    const auto parallel = ~(abs(d) > largest * F(0x1p-60f));
+    const F reciprocal = select(parallel, xor_sign(F(0x1p60f) / largest, sign_bits(d)), F(1.0f) / d);
+    const F e = select(parallel, F(kPad), F(pad)) * (F(max_coordinate) + abs(o)) * abs(reciprocal) + select(parallel, F(0x1p-100f), F(pad * 0x1p-79f));
+    const F at = o * reciprocal, in = at + e, out = at - e, all(kAllOfT);
+    const auto fits = abs(in) + abs(out) < F(kTooLarge);
+    r = select(fits, reciprocal, xor_sign(F(1.0f), sign_bits(reciprocal)));
+    enter = select(fits, in, all), leave = select(fits, out, -all);
+    return fits;
+  }
+
   KdRay() = default;
   ARBORETUM_INLINE KdRay(const Ray& ray, float max_coordinate, float pad) {
+    using F = vf<4>;  // the axes stand in lanes
     const float x = __builtin_fabsf(ray.direction.x), y = __builtin_fabsf(ray.direction.y), z = __builtin_fabsf(ray.direction.z);
-    const float xy = x > y ? x : y, largest = xy > z ? xy : z;
-    const float tiny = largest * 0x1p-60f, limit = 0x1p60f / largest;
-    const float* o = &ray.origin.x;
-    const float* d = &ray.direction.x;
-    for (int k = 0; k < 3; ++k) {
-      const bool parallel = !(__builtin_fabsf(d[k]) > tiny);
-      r[k] = parallel ? __builtin_copysignf(limit, d[k]) : 1.0f / d[k];
-      const float e = (parallel ? kPad : pad) * (max_coordinate + __builtin_fabsf(o[k])) * __builtin_fabsf(r[k]) + (parallel ? 0x1p-100f : pad * 0x1p-79f);
-      const float at = o[k] * r[k];
-      enter[k] = at + e, leave[k] = at - e;
-      if (__builtin_expect(!(__builtin_fabsf(enter[k]) + __builtin_fabsf(leave[k]) < kTooLarge), 0)) r[k] = __builtin_copysignf(1.0f, r[k]), enter[k] = kAllOfT, leave[k] = -kAllOfT;
-      far[k] = __builtin_signbit(r[k]) ? 0u : 8u;
-    }
+    const float xy = x > y ? x : y;
+    F rs, in, out;
+    constants(F::load(&ray.origin), F::load(&ray.direction), F(xy > z ? xy : z), max_coordinate, pad, rs, in, out);
+    rs.store(r), in.store(enter), out.store(leave);
+    const unsigned negative = sign_mask(rs);
+    for (unsigned k = 0; k < 3; ++k) far[k] = negative >> k & 1u ? 0u : 8u;
     r[3] = enter[3] = leave[3] = 0.0f, far[3] = 0u;
   }
 
@@ -60,10 +71,6 @@ struct KdRay {
       begin = in > begin ? in : begin, end = out < end ? out : end;
     }
   }
-
-  static constexpr float kPad = 0x1p-21f;
-  /// Beyond which constants may have overflown: an axis is left out then, with a reciprocal of 1 and constants by which every plane is met at all t.
-  static constexpr float kTooLarge = 0x1p124f, kAllOfT = std::numeric_limits<float>::max();
 
   static ARBORETUM_INLINE float fused(float s, float r, float c) {
     if constexpr (kHasFma) {
