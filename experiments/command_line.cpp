@@ -20,6 +20,7 @@ namespace {
 
 struct Arguments {
   RunCommand run;
+  MergeCommand merge;
   VerifyCommand verify;
   std::string axis, scene;
   bool json = false;
@@ -40,6 +41,7 @@ void declare_run(CLI::App& app, RunCommand& run) {
   c->add_option("--filter", run.filter, "Only cells whose name this regular expression finds");
   c->add_option("--skip", run.skip, "No cells whose name this regular expression finds");
   c->add_flag("--resume", run.resume, "Go on with a run that was cut off");
+  c->add_option("--shard", run.shard, "I/N: the I-th of N parts of the plan; `merge` joins them");
   c->add_option("--repetitions", run.overrides.repetitions, "Timed repetitions of each cell")
       ->check(CLI::Range(1, 100000));
   c->add_option("--threads", run.overrides.threads, "Threads, in place of the configuration's")
@@ -48,6 +50,16 @@ void declare_run(CLI::App& app, RunCommand& run) {
   c->add_flag("--fail-fast", run.fail_fast, "Stop at the first wrong answer");
   c->add_flag("--no-plots", run.no_plots, "Draw no plots and write no report");
   c->footer("Google Benchmark's --benchmark_* flags pass through.");
+}
+
+void declare_merge(CLI::App& app, MergeCommand& merge) {
+  CLI::App* c = app.add_subcommand("merge", "Join result folders (shards) of one configuration into one");
+  c->add_option("OUT", merge.out, "The folder to write; must hold no results yet")->required();
+  c->add_option("PART", merge.parts, "Result folders, as `run --shard` wrote them")->required();
+  c->add_flag("--allow-different-machines", merge.options.allow_different_machines, "Also parts measured on different machines or builds");
+  c->add_flag("--allow-different-revisions", merge.options.allow_different_revisions, "Also parts of different git revisions");
+  c->add_flag("--require-all", merge.require_all, "An error where a cell of the plan is missing; nothing is written");
+  c->add_flag("--no-plots", merge.no_plots, "Draw no plots and write no report");
 }
 
 void declare_verify(CLI::App& app, VerifyCommand& verify) {
@@ -71,6 +83,7 @@ void declare(CLI::App& app, Arguments& a) {
   app.require_subcommand(0, 1);
   app.set_version_flag("--version", std::string(build_info::kVersion));
   declare_run(app, a.run);
+  declare_merge(app, a.merge);
   declare_verify(app, a.verify);
   CLI::App* list = app.add_subcommand("list", "What can be swept");
   list->add_option(
@@ -111,7 +124,7 @@ void refuse_extras(const CLI::App& command) {
 
 ExitStatus dispatch(std::vector<std::string> words) {
   Arguments a;
-  a.run.command_line = fmt::format("arboretum {}", fmt::join(words, " "));
+  a.run.command_line = a.merge.command_line = fmt::format("arboretum {}", fmt::join(words, " "));
   CLI::App app("Arboretum: a research testbed of ray-tracing acceleration structures", "arboretum");
   declare(app, a);
   const std::vector<std::string> commands = command_names(app);
@@ -140,6 +153,7 @@ ExitStatus dispatch(std::vector<std::string> words) {
   refuse_extras(*used.front());
   const std::string name = used.front()->get_name();
   if (name == "run") return command_run(std::move(a.run));
+  if (name == "merge") return command_merge(a.merge);
   if (name == "verify") return command_verify(a.verify);
   if (name == "list") return command_list(a.axis, a.json);
   if (name == "info") return command_info(a.scene, a.json);

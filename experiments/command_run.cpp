@@ -1,62 +1,35 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <numeric>
 #include <system_error>
+#include <thread>
 
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
+#include "experiments/conclusion.h"
 #include "experiments/effective.h"
+#include "experiments/estimate.h"
 #include "experiments/interleave.h"
 #include "experiments/machine_info.h"
 #include "experiments/plan.h"
-#include "experiments/plotting.h"
+#include "experiments/plan_record.h"
 #include "experiments/progress.h"
+#include "experiments/result_folder.h"
 #include "experiments/results_writer.h"
 #include "experiments/runner.h"
+#include "experiments/shard.h"
 #include "experiments/summary.h"
 #include "scenes/catalogue.h"
 
 namespace arboretum {
 namespace {
 
-/// What a scene is likely to hold, without loading it.
-std::size_t expected_triangles(const SceneSpec& spec) {
-  constexpr std::size_t kUnknown = 200'000;
-  if (!spec.generator.empty()) return spec.triangles;
-  return spec.catalogue.empty() ? kUnknown : find_catalogue_entry(spec.catalogue).triangles;
-}
-
-/// Triangles a second of a builder with one thread, roughly (docs/performance.md); reinsertion after it not counted.
-double triangles_per_second(std::string_view builder) {
-  struct Rate {
-    std::string_view builder;
-    double rate;
-  };
-  static constexpr Rate kRates[] = {{"embree_high", 1.5e5}, {"high", 2e5},  {"embree_", 1e6},  {"sweep_sah", 3.5e5}, {"ploc", 8e5}, {"morton", 4e6},
-                                    {"low", 6e6},           {"octants", 4e5}, {"uniform", 2e6}, {"two_level", 1e6}};
-  for (const Rate& r : kRates)
-    if (builder.starts_with(r.builder)) return r.rate;
-  return 1.5e6;
-}
-constexpr double kReinsertedPerSecond = 7e5;
-
-/// A rough one: repetitions last min_time, making a cell ready takes a few passes at ten million rays a second.
-double estimate_seconds(const Experiment& experiment, const Plan& plan) {
-  const MeasureSettings& m = experiment.measure;
-  const double pass = double(m.width) * double(m.height) / 1e7;
-  std::vector<double> triangles;
-  for (const SceneChoice& scene : experiment.scenes) triangles.push_back(double(expected_triangles(scene.spec)));
-  double seconds = 0.0;
-  for (const Cell& cell : plan.cells) {
-    if (cell.metric == Cell::Metric::build) {
-      const double a_triangle = 1.0 / triangles_per_second(cell.builder) + (cell.builder.ends_with("_reinsertion") ? 1.0 / kReinsertedPerSecond : 0.0);
-      seconds += (1.0 + std::max(m.repetitions, kFewestBuilds)) * triangles[cell.scene_index] * a_triangle;
-    } else {
-      seconds += m.repetitions * std::max(m.min_time, pass) + (3.0 + m.warmup) * pass;
-    }
-  }
-  return seconds;
+double total_seconds(const Experiment& experiment, const Plan& plan) {
+  const std::vector<double> seconds = estimate_seconds(experiment, plan.cells);
+  return std::accumulate(seconds.begin(), seconds.end(), 0.0);
 }
 
 ExitStatus print_list(const Plan& plan) {
@@ -67,9 +40,9 @@ ExitStatus print_list(const Plan& plan) {
 ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
   for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.name());
   for (const SkippedCell& cell : plan.skipped) fmt::print("{}  skipped: {}\n", cell.name, cell.reason);
-  fmt::print("\n{} cells, {} skipped, {} excluded, {} filtered out; about {}\n", plan.cells.size(),
-             plan.skipped.size(), plan.excluded, plan.filtered,
-             format_duration(estimate_seconds(experiment, plan)));
+  const std::string others = plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "";
+  fmt::print("\n{} cells, {} skipped,{} {} excluded, {} filtered out; about {}\n", plan.cells.size(), plan.skipped.size(), others,
+             plan.excluded, plan.filtered, format_duration(total_seconds(experiment, plan)));
   fmt::print("{}", skipped_lines(plan, {}));
   return ExitStatus::kDone;
 }
@@ -95,6 +68,30 @@ void refuse_other_configuration(const std::filesystem::path& folder, const std::
                   folder.string()));
 }
 
+/// A shard's folder takes no other shard: its results.json would lose what is there. The whole plan may go on from a shard.
+void refuse_other_shard(const std::filesystem::path& folder, const Shard& shard) {
+  const std::optional<PlanRecord> before = read_plan_record(folder);
+  if (!before || shard.is_whole() || before->shard == shard) return;
+  throw UserError(fmt::format("{}: holds {}, this is shard {}; choose another folder with --out, then `merge` them", folder.string(),
+                              before->shard.is_whole() ? "results of the whole plan" : "shard " + before->shard.text(), shard.text()));
+}
+
+/// What a run that goes on has under other conditions than its beginning: its results then do not compare with each other.
+std::vector<std::string> changed_conditions(const std::filesystem::path& folder, const Json& now) {
+  const std::optional<PlanRecord> before = read_plan_record(folder);
+  if (!before) return {};
+  std::vector<std::string> warnings;
+  for (const std::string& difference : machine_differences(before->context, now)) warnings.push_back("begun under other conditions: " + difference);
+  const std::string then = before->context.value("git_revision", ""), at = now.value("git_revision", "");
+  if (then != at) warnings.push_back(fmt::format("begun at revision {}, gone on with at {}", then.substr(0, 12), at.substr(0, 12)));
+  return warnings;
+}
+
+std::filesystem::path default_folder(const Experiment& experiment, const Shard& shard) {
+  const std::string part = shard.is_whole() ? "" : fmt::format("-shard-{}-of-{}", shard.index, shard.of);
+  return std::filesystem::path("results") / (experiment.name + part);
+}
+
 void write_results(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan,
                    const Json& context, const BenchmarkFlags& flags) {
   const std::string json = results_json(outcome, plan, context), csv = results_csv(outcome);
@@ -105,15 +102,15 @@ void write_results(const std::filesystem::path& folder, const RunOutcome& outcom
   if (flags.format == "csv") fmt::print("{}", csv);
 }
 
-ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registry& registry,
+ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord record, const Registry& registry,
                    const RunCommand& command) {
-  const std::filesystem::path folder =
-      command.out.empty() ? std::filesystem::path("results") / experiment.name : command.out;
+  const Shard shard = record.shard;
+  const std::filesystem::path folder = command.out.empty() ? default_folder(experiment, shard) : command.out;
   const std::string hash = configuration_hash(experiment);
   initialize_benchmark(command.benchmark.others);
   require_scenes(experiment);
   make_output_folder(folder);
-  if (command.resume) refuse_other_configuration(folder, hash);
+  if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
   if (!command.benchmark.out.empty())
     AppendFile(command.benchmark.out, true);  // cannot be written: say so now
   const bool replaces = !command.resume && std::filesystem::exists(folder / "cells.jsonl");
@@ -124,14 +121,19 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registr
     std::filesystem::remove(folder / stale, ignored);
   }
   write_whole(folder / "effective.yaml",
-              fmt::format("# configuration hash: {}\n{}", hash, effective_yaml(experiment)));
-  const Json context = machine_context(experiment, hash, command.command_line);
-  fmt::print(stderr, "{}: {} cells ({} done before), {} skipped; about {}\n", experiment.name,
-             plan.cells.size(), journal.done().size(), plan.skipped.size(),
-             format_duration(estimate_seconds(experiment, plan)));
+              fmt::format("# configuration hash: {}\n{}{}", hash, shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
+  Json context = machine_context(experiment, hash, command.command_line);
+  if (!shard.is_whole()) context["shard"] = shard.text();
+  record.context = context;
+  const std::vector<std::string> changed = command.resume ? changed_conditions(folder, context) : std::vector<std::string>{};
+  write_whole(folder / kPlanFile, to_text(record));
+  fmt::print(stderr, "{}: {} cells ({} done before), {} skipped{}; about {}\n", experiment.name, plan.cells.size(), journal.done().size(),
+             plan.skipped.size(), shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
+             format_duration(total_seconds(experiment, plan)));
 
   RunOutcome outcome = run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast});
-  outcome.warnings = machine_warnings(outcome, plan);
+  outcome.warnings = changed;
+  std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())), std::back_inserter(outcome.warnings));
   try {
     write_results(folder, outcome, plan, context, command.benchmark);
   } catch (const UserError&) {
@@ -139,26 +141,11 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, const Registr
   }
   if (!outcome.error.empty()) throw UserError(outcome.error);
 
-  for (const std::string& warning : outcome.warnings) fmt::print(stderr, "warning: {}\n", warning);
-  const auto [status, why] = verdict(outcome);
-  if (command.benchmark.format != "console") return status;
-  fmt::print("{}\n{}", result_tables(outcome), skipped_lines(plan, outcome));
-  std::fflush(stdout);
-  if (status == ExitStatus::kNothingMeasured) {
-    fmt::print(stderr, "arboretum: {}\n", why);
-    return status;
+  if (command.benchmark.format != "console") {
+    print_warnings(outcome.warnings);
+    return verdict(outcome).first;
   }
-  bool report = false;
-  if (!command.no_plots && !experiment.plots.empty()) {
-    const std::string problem = draw_plots(folder, experiment.plots, true);
-    if (!problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
-    report = problem.empty();
-  }
-  fmt::print("{}: {}\n", report ? "report" : "results",
-             (folder / (report ? "report.html" : "results.json")).string());
-  if (outcome.stopped) fmt::print("stopped at the first wrong answer (--fail-fast)\n");
-  fmt::print("{}\n", why);
-  return status;
+  return conclude(folder, outcome, plan, command.no_plots ? std::vector<std::string>{} : experiment.plots);
 }
 
 }  // namespace
@@ -167,22 +154,26 @@ ExitStatus command_run(RunCommand command) {
   if (command.benchmark.repetitions && !command.overrides.repetitions)
     command.overrides.repetitions = command.benchmark.repetitions;
   if (command.benchmark.min_time) command.overrides.min_time = command.benchmark.min_time;
+  const Shard shard = command.shard ? parse_shard(*command.shard) : Shard{};
   const Registry registry = this_registry();
   const Experiment experiment = read_experiment(command.config, registry, command.overrides);
   Plan plan = make_plan(experiment, registry);
   apply_filter(plan, command.filter, command.skip);
   apply_filter(plan, command.benchmark.filter, "");
+  const std::map<std::string, unsigned> shards = split_plan(experiment, plan, shard.of);
+  PlanRecord record = record_of(plan, shards, shard);
+  record.filter = command.filter.empty() ? command.benchmark.filter : command.filter, record.skip = command.skip;
+  if (!shard.is_whole()) keep_shard(plan, shards, shard.index);
   if (command.list || command.benchmark.list) return print_list(plan);
   if (command.dry_run) return print_dry_run(experiment, plan);
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
     std::fflush(stdout);
-    fmt::print(stderr,
-               "arboretum: nothing to measure: {} combinations skipped, {} excluded, {} filtered out\n",
-               plan.skipped.size(), plan.excluded, plan.filtered);
+    fmt::print(stderr, "arboretum: nothing to measure: {} combinations skipped,{} {} excluded, {} filtered out\n", plan.skipped.size(),
+               plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded, plan.filtered);
     return ExitStatus::kNothingMeasured;
   }
-  return measure(experiment, plan, registry, command);
+  return measure(experiment, plan, std::move(record), registry, command);
 }
 
 }  // namespace arboretum

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "experiments/benchmark_flags.h"
 #include "experiments/config.h"
+#include "experiments/merge.h"
 
 namespace arboretum {
 
@@ -18,6 +19,7 @@ struct RunCommand {
   Overrides overrides;
   std::filesystem::path out;  ///< empty: results/<experiment>
   std::string filter, skip;
+  std::optional<std::string> shard;  ///< "2/8", as typed
   bool list = false, dry_run = false, resume = false, fail_fast = false, no_plots = false;
   BenchmarkFlags benchmark;
   std::string command_line;  ///< as typed, for the results
@@ -37,7 +39,16 @@ struct VerifyCommand {
   std::string filter, skip;
 };
 
+struct MergeCommand {
+  std::filesystem::path out;
+  std::vector<std::filesystem::path> parts;
+  MergeOptions options;
+  bool require_all = false, no_plots = false;
+  std::string command_line;  ///< as typed, for the results
+};
+
 ExitStatus command_run(RunCommand command);
+ExitStatus command_merge(const MergeCommand& command);
 ExitStatus command_verify(const VerifyCommand& command);
 /// `axis` empty: all of them.
 ExitStatus command_list(const std::string& axis, bool json);

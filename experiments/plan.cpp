@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <map>
-#include <regex>
 #include <set>
 
 #include "core/error.h"
+#include "experiments/name_filter.h"
 #include "rendering/workload.h"
 
 namespace arboretum {
@@ -35,10 +35,14 @@ class Planner {
   Plan run() {
     for (std::size_t scene = 0; scene < experiment_.scenes.size(); ++scene) {
       std::vector<Cell> traced;
+      elsewhere_.clear();
       product(scene, experiment_.axes, traced);
       for (std::size_t i = 0; i < experiment_.include.size(); ++i) add_include(i, scene, traced);
-      if (experiment_.metrics.build) add_builds(traced);
-      if (experiment_.metrics.trace) std::ranges::move(traced, std::back_inserter(plan_.cells));
+      if (experiment_.metrics.build) add_builds(traced), add_builds_elsewhere();
+      if (experiment_.metrics.trace) {
+        std::ranges::move(traced, std::back_inserter(plan_.cells));
+        std::ranges::move(elsewhere_, std::back_inserter(plan_.elsewhere));
+      }
     }
     refuse_ineffective();
     return std::move(plan_);
@@ -175,8 +179,14 @@ class Planner {
       return why.empty() ? "no such kernel in this build" : why;
     }
     if (std::string why = impossible_setting(cell); !why.empty()) return why;
-    if (!registry_.has(cell.isa)) return fmt::format("no {}", to_string(cell.isa));
     return {};
+  }
+
+  /// Why this machine lacks what the cell needs; empty where it has it.
+  std::string lacking(const Cell& cell) const {
+    const std::string& missing = experiment_.scenes[cell.scene_index].missing;
+    if (!missing.empty()) return missing;
+    return registry_.has(cell.isa) ? "" : fmt::format("no {}", to_string(cell.isa));
   }
 
   static bool names_scene(const CellChoice& choice, const SceneChoice& scene) {
@@ -219,13 +229,15 @@ class Planner {
     if (!names_.insert(name).second) return;
     ++added_;
     traversals_.insert(cell.traversal);
-    const std::string& missing = experiment_.scenes[cell.scene_index].missing;
-    const std::string reason = missing.empty() ? impossible(cell, entry) : missing;
+    const std::string never = impossible(cell, entry), here = lacking(cell);
     cell.metric = Cell::Metric::trace;
-    if (reason.empty())
+    if (never.empty() && here.empty()) {
       out.push_back(std::move(cell));
-    else
-      plan_.skipped.push_back({std::move(name), reason});
+      return;
+    }
+    const bool missing = !experiment_.scenes[cell.scene_index].missing.empty();  // said first, whatever else is the matter
+    plan_.skipped.push_back({std::move(name), never.empty() || missing ? here : never});
+    if (never.empty()) elsewhere_.push_back(std::move(cell));
   }
 
   /// Axes that an include does not name take the sweep's values where they apply: a builder, leaf or
@@ -257,17 +269,28 @@ class Planner {
     }
   }
 
-  /// One build cell for each structure that the trace cells need, ISA and thread count.
+  /// The build cell of the structure that a trace cell needs.
+  static Cell build_of(Cell cell) {
+    cell.metric = Cell::Metric::build;
+    cell.kernel = nullptr;
+    cell.intersector = cell.box = cell.traversal = cell.workload = kNone;
+    cell.start = {}, cell.start_label.clear();
+    cell.settings = {}, cell.setting_label.clear();
+    return cell;
+  }
+
+  /// One for each structure that the trace cells need, ISA and thread count.
   void add_builds(const std::vector<Cell>& traced) {
-    std::set<std::string> seen;
     for (const Cell& trace : traced) {
-      Cell cell = trace;
-      cell.metric = Cell::Metric::build;
-      cell.kernel = nullptr;
-      cell.intersector = cell.box = cell.traversal = cell.workload = kNone;
-      cell.start = {}, cell.start_label.clear();
-      cell.settings = {}, cell.setting_label.clear();
-      if (seen.insert(cell.name()).second) plan_.cells.push_back(std::move(cell));
+      Cell cell = build_of(trace);
+      if (builds_.insert(cell.name()).second) plan_.cells.push_back(std::move(cell));
+    }
+  }
+
+  void add_builds_elsewhere() {
+    for (const Cell& trace : elsewhere_) {
+      Cell cell = build_of(trace);
+      if (builds_.insert(cell.name()).second) plan_.elsewhere.push_back(std::move(cell));
     }
   }
 
@@ -296,20 +319,11 @@ class Planner {
   const Registry& registry_;
   std::vector<ParameterPoint> points_;
   Plan plan_;
-  std::set<std::string> names_, traversals_;
+  std::vector<Cell> elsewhere_;  ///< of the scene under way: possible, but for what this machine lacks
+  std::set<std::string> names_, traversals_, builds_;
   std::set<std::size_t> used_includes_, used_excludes_;
   std::size_t added_ = 0;
 };
-
-std::regex compile(const std::string& expression, std::string_view option) {
-  try {
-    return std::regex(expression);
-  } catch (const std::regex_error&) {
-    throw UserError(
-        fmt::format("{} '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes",
-                    option, expression));
-  }
-}
 
 }  // namespace
 
@@ -319,14 +333,9 @@ Plan make_plan(const Experiment& experiment, const Registry& registry) {
 
 void apply_filter(Plan& plan, const std::string& filter, const std::string& skip) {
   const std::size_t before = plan.cells.size();
-  if (!filter.empty()) {
-    const std::regex expression = compile(filter, "--filter");
-    std::erase_if(plan.cells, [&](const Cell& cell) { return !std::regex_search(cell.name(), expression); });
-  }
-  if (!skip.empty()) {
-    const std::regex expression = compile(skip, "--skip");
-    std::erase_if(plan.cells, [&](const Cell& cell) { return std::regex_search(cell.name(), expression); });
-  }
+  const NameFilter wanted(filter, skip);
+  for (std::vector<Cell>* cells : {&plan.cells, &plan.elsewhere})
+    std::erase_if(*cells, [&](const Cell& cell) { return !wanted(cell.name()); });
   plan.filtered += before - plan.cells.size();
 }
 

@@ -14,6 +14,9 @@ struct Plan {
   std::vector<SkippedCell> skipped;
   std::size_t excluded = 0;  ///< by the configuration's `exclude`
   std::size_t filtered = 0;  ///< by --filter and --skip
+  std::size_t in_other_shards = 0;  ///< by --shard
+  /// Cells that a machine with more instruction sets, or with the optional scenes, would measure. The trace cells of them are among `skipped`.
+  std::vector<Cell> elsewhere;
 };
 
 /// The product of the axes, with `include`, without `exclude`. A combination that has no kernel, or whose ISA
@@ -21,8 +24,7 @@ struct Plan {
 /// exclude that takes nothing away.
 [[nodiscard]] Plan make_plan(const Experiment& experiment, const Registry& registry);
 
-/// Keeps the cells whose name `filter` finds and `skip` does not (ECMAScript regular expressions; empty: all,
-/// none). Throws UserError for a broken expression.
+/// Keeps the cells (and those of `elsewhere`) that a NameFilter takes. Throws UserError for a broken expression.
 void apply_filter(Plan& plan, const std::string& filter, const std::string& skip);
 
 /// Skipped cells by reason, most first.

@@ -6,14 +6,6 @@
 namespace arboretum {
 namespace {
 
-std::string csv_field(const Json& value) {
-  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
-
 /// Nested objects become columns of their own: phase_seconds.collapse.
 Json flattened(const Json& entry) {
   Json flat = Json::object();
@@ -28,11 +20,20 @@ Json flattened(const Json& entry) {
 
 }  // namespace
 
+std::string csv_field(const Json& value) {
+  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
 std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context) {
   context["cells"] = outcome.results.size();
   context["excluded_cells"] = plan.excluded;
   context["filtered_cells"] = plan.filtered;
   context["skipped_cells"] = plan.skipped.size() + outcome.failed.size();
+  if (!outcome.missing.empty()) context["missing_cells"] = outcome.missing.size();
   if (!outcome.warnings.empty()) context["warnings"] = outcome.warnings;
   Json document = Json::object();
   document["context"] = std::move(context);
@@ -49,6 +50,7 @@ std::string results_json(const RunOutcome& outcome, const Plan& plan, Json conte
   Json& skipped = document["skipped"] = Json::array();
   for (const auto* list : {&plan.skipped, &outcome.failed})
     for (const SkippedCell& cell : *list) skipped.push_back({{"name", cell.name}, {"reason", cell.reason}});
+  if (!outcome.missing.empty()) document["missing"] = outcome.missing;
   return document.dump(1) + "\n";
 }
 

@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <thread>
 
 #include "experiments/sampling.h"
 #include "experiments/table_text.h"
@@ -158,7 +157,7 @@ std::string skipped_lines(const Plan& plan, const RunOutcome& outcome) {
   return text;
 }
 
-std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan& plan) {
+std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan& plan, unsigned cores) {
   constexpr double kWide = 0.05;
   std::vector<std::string> warnings;
   std::size_t noisy = 0;
@@ -174,7 +173,6 @@ std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan&
         "{}); raise min_time or repetitions, or free the machine",
         noisy, outcome.results.size(), kWide * 100, relative_spread(*worst) * 100, worst->cell.name()));
   }
-  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   for (const Cell& cell : plan.cells) {
     if (cell.threads <= cores) continue;
     warnings.push_back(fmt::format("some cells have more threads than the machine's {} cores", cores));

@@ -16,9 +16,10 @@ namespace arboretum::test {
 
 namespace fs = std::filesystem;
 
-/// A folder that goes away with the test.
+/// A folder of its own that goes away with the test.
 struct TemporaryFolder {
-  fs::path path = fs::temp_directory_path() / ("arboretum-test-" + std::to_string(::getpid()));
+  inline static int made = 0;
+  fs::path path = fs::temp_directory_path() / ("arboretum-test-" + std::to_string(::getpid()) + "-" + std::to_string(++made));
   TemporaryFolder() { fs::remove_all(path), fs::create_directories(path); }
   ~TemporaryFolder() { fs::remove_all(path); }
   fs::path write(const std::string& name, const std::string& text) const {

@@ -6,65 +6,17 @@ import os
 import resource
 import signal
 import subprocess
-import sys
-import tempfile
 import time
 import unittest
-from pathlib import Path
 
-ARBORETUM = sys.argv.pop(1)
+from command_line_case import ARBORETUM, CONFIG, CommandLineCase, read_jsonl
 
-CONFIG = """\
-experiment: small
-scenes: [{generate: sphere_flake, triangles: 2000}]
-axes:
-  structure: [bvh2, bvh4]
-  intersector: [moller_trumbore, watertight]
-  isa: [scalar, sse]
-  workload: [primary, diffuse]
-measure: {repetitions: 3, min_time: 0.001, resolution: [48, 48]}
-"""
 CUBE = """\
 v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
 f 1 2 3\nf 1 3 4\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 3 4 8\nf 3 8 7\n"""
 
 
-def read_jsonl(path):
-    return [json.loads(line) for line in path.read_text().splitlines()]
-
-
-class CommandLine(unittest.TestCase):
-    def setUp(self):
-        self.temporary = tempfile.TemporaryDirectory()
-        self.folder = Path(self.temporary.name)
-        self.config = self.write("small.yaml", CONFIG)
-
-    def tearDown(self):
-        self.temporary.cleanup()
-
-    def write(self, name, text):
-        path = self.folder / name
-        path.write_text(text)
-        return path
-
-    def call(self, *words, **options):
-        return subprocess.run([ARBORETUM, *map(str, words)], capture_output=True, text=True, cwd=self.folder, timeout=300, **options)
-
-    def run_small(self, *words, **options):
-        return self.call("run", self.config, "--no-plots", *words, **options)
-
-    def assert_error(self, result, *parts, status=2):
-        """One line on stderr beginning with `arboretum: ` and the status."""
-        self.assertEqual(result.returncode, status, result.stderr)
-        lines = [line for line in result.stderr.splitlines() if line.startswith("arboretum: ")]
-        self.assertEqual(len(lines), 1, result.stderr)
-        self.assertEqual(result.stderr.splitlines()[-1], lines[0])
-        for part in parts:
-            self.assertIn(part, lines[0])
-
-    def cells(self, *words):
-        return self.run_small("--list", *words).stdout.splitlines()
-
+class CommandLine(CommandLineCase):
     def test_usage_errors_name_the_nearest_word(self):
         cases = [
             ((), "no command"),

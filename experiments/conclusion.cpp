@@ -1,0 +1,37 @@
+#include "experiments/conclusion.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "experiments/plotting.h"
+#include "experiments/summary.h"
+
+namespace arboretum {
+
+void print_warnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+}
+
+ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan, const std::vector<std::string>& plots) {
+  print_warnings(outcome.warnings);
+  const auto [status, why] = verdict(outcome);
+  fmt::print("{}\n{}", result_tables(outcome), skipped_lines(plan, outcome));
+  std::fflush(stdout);
+  if (status == ExitStatus::kNothingMeasured) {
+    fmt::print(stderr, "arboretum: {}\n", why);
+    return status;
+  }
+  bool report = false;
+  if (!plots.empty()) {
+    const std::string problem = draw_plots(folder, plots, true);
+    if (!problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
+    report = problem.empty();
+  }
+  fmt::print("{}: {}\n", report ? "report" : "results", (folder / (report ? "report.html" : "results.json")).string());
+  if (outcome.stopped) fmt::print("stopped at the first wrong answer (--fail-fast)\n");
+  fmt::print("{}\n", why);
+  return status;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,19 @@
+// The end of a run or a merge: what is said on the terminal, the figures and the report.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "experiments/runner.h"
+
+namespace arboretum {
+
+void print_warnings(const std::vector<std::string>& warnings);
+
+/// Warnings, tables, skipped cells, where the report is, and what the exit status says. Draws `plots` and writes the report; none: neither.
+[[nodiscard]] ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan,
+                                  const std::vector<std::string>& plots);
+
+}  // namespace arboretum

@@ -1,0 +1,15 @@
+// How long cells are likely to take: for the time estimate of a run, and to cut a plan into shards of equal length. Rough, and
+// the same on every machine: it knows the configuration and the catalogue, and looks at no file.
+#pragma once
+
+#include <vector>
+
+#include "experiments/cell.h"
+#include "experiments/config.h"
+
+namespace arboretum {
+
+/// Seconds that each of the cells takes.
+[[nodiscard]] std::vector<double> estimate_seconds(const Experiment& experiment, const std::vector<Cell>& cells);
+
+}  // namespace arboretum

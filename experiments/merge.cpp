@@ -1,0 +1,203 @@
+#include "experiments/merge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "core/error.h"
+#include "experiments/summary.h"
+
+namespace arboretum {
+namespace {
+
+/// The first line by which two effective.yaml differ, comments apart; empty where they do not, or one is not there.
+std::string first_difference(const ResultFolder& a, const ResultFolder& b) {
+  std::ifstream of_a(a.path / "effective.yaml"), of_b(b.path / "effective.yaml");
+  const auto next = [](std::ifstream& stream, std::string& line) {
+    while (std::getline(stream, line))
+      if (!line.starts_with("#")) return true;
+    return false;
+  };
+  for (std::string line_a, line_b; next(of_a, line_a) && next(of_b, line_b);)
+    if (line_a != line_b) return fmt::format("; they differ in `{}` against `{}`", line_a.substr(line_a.find_first_not_of(' ')), line_b.substr(line_b.find_first_not_of(' ')));
+  return {};
+}
+
+void refuse_different_configurations(const ResultFolder& first, const ResultFolder& part) {
+  if (part.configuration_hash == first.configuration_hash) return;
+  const auto hash = [](const ResultFolder& f) { return f.configuration_hash.empty() ? "unknown" : f.configuration_hash; };
+  throw UserError(fmt::format("{} and {} are of different configurations (hashes {} and {}){}; merge parts of one configuration, or `compare` the two",
+                              first.path.string(), part.path.string(), hash(first), hash(part), first_difference(first, part)));
+}
+
+std::string revision(const ResultFolder& part) {
+  return part.context_text("git_revision").substr(0, 12) + (part.context.value("git_dirty", false) ? " with changes" : "");
+}
+
+/// What machine and build of the part differ by from the first part's, told and refused or allowed.
+void check_machine(const ResultFolder& first, const ResultFolder& part, const MergeOptions& options, std::vector<std::string>& warnings) {
+  const std::vector<std::string> machine = machine_differences(first.context, part.context);
+  if (!machine.empty()) {
+    const std::string what = fmt::format("{} and {} were measured on different machines or builds ({})", first.path.string(), part.path.string(), fmt::join(machine, "; "));
+    if (!options.allow_different_machines) throw UserError(what + "; their times do not compare; --allow-different-machines merges them all the same");
+    warnings.push_back(what + "; compare times only within the same `part`");
+  }
+  if (revision(first) != revision(part)) {
+    const std::string what = fmt::format("{} is of revision {} and {} of {}", first.path.string(), revision(first), part.path.string(), revision(part));
+    if (!options.allow_different_revisions) throw UserError(what + "; --allow-different-revisions merges them all the same");
+    warnings.push_back(what);
+  }
+}
+
+void refuse_doubled_cells(const std::vector<ResultFolder>& parts) {
+  std::map<std::string, const ResultFolder*> owners;
+  std::size_t doubled = 0;
+  std::string first;
+  for (const ResultFolder& part : parts) {
+    for (const CellResult& cell : part.cells) {
+      const auto [owner, fresh] = owners.try_emplace(cell.cell.name(), &part);
+      if (fresh) continue;
+      if (doubled++ == 0) first = fmt::format("{} is in both {} and {}", owner->first, owner->second->path.string(), part.path.string());
+    }
+  }
+  if (doubled > 0)
+    throw UserError(fmt::format("{}{}; each cell may be in one part alone: leave one of the folders out", first, doubled > 1 ? fmt::format(", as are {} more", doubled - 1) : ""));
+}
+
+/// The command without what made it a part of the whole.
+std::string whole_command(const std::string& command) {
+  std::istringstream stream(command);
+  std::vector<std::string> kept;
+  for (std::string word; stream >> word;) {
+    if (word == "--shard" || word == "--out") {
+      stream >> word;
+    } else if (word != "--resume" && !word.starts_with("--shard=") && !word.starts_with("--out=")) {
+      kept.push_back(word);
+    }
+  }
+  return fmt::format("{}", fmt::join(kept, " "));
+}
+
+Json merged_context(const std::vector<ResultFolder>& parts, const std::string& command) {
+  Json context = parts.front().context;
+  if (!context.is_object()) context = Json::object();
+  for (const char* key : {"shard", "warnings", "cells", "skipped_cells", "missing_cells"}) context.erase(key);
+  std::set<std::string> commands;
+  Json from = Json::array();
+  for (const ResultFolder& part : parts) {
+    commands.insert(whole_command(part.context_text("command")));
+    Json& entry = from.emplace_back(Json{{"part", from.size() + 1}, {"folder", part.path.string()}, {"cells", part.cells.size()}});
+    for (const char* key : {"shard", "date", "host_name", "cpu", "git_revision", "command"})
+      if (part.context.contains(key)) entry[key] = part.context[key];
+  }
+  context["command"] = commands.size() == 1 ? *commands.begin() : command;
+  // What differs is named with all its values, so that it equals no single machine's.
+  for (const char* key : {"host_name", "cpu", "cores", "governor", "isa", "compiler", "compiler_flags", "build_type", "version", "git_revision", "git_dirty"}) {
+    std::vector<std::string> values;
+    for (const ResultFolder& part : parts)
+      if (std::ranges::find(values, part.context_text(key)) == values.end()) values.push_back(part.context_text(key));
+    if (values.size() > 1) context[key] = fmt::format("{}", fmt::join(values, " | "));
+  }
+  context["merged_from"] = std::move(from);
+  return context;
+}
+
+/// The union of the parts' plans, and by it the order of the cells, the skipped ones and what is missing.
+void follow_plan(const std::vector<ResultFolder>& parts, Merged& merged) {
+  PlanRecord& record = merged.record;
+  std::set<std::string> planned, skippable;
+  std::size_t whole = 0;
+  for (const ResultFolder& part : parts) {
+    if (!part.plan) continue;
+    whole = std::max(whole, part.plan->cells.size() + part.plan->filtered);
+    record.excluded = part.plan->excluded;
+    if (record.cells.empty()) record.filter = part.plan->filter, record.skip = part.plan->skip;
+    merged.shards = std::max(merged.shards, part.plan->shard.of);
+    for (const PlanRecord::Entry& entry : part.plan->cells)
+      if (planned.insert(entry.name).second) record.cells.push_back(entry);
+    for (const PlanRecord::Entry& entry : part.plan->skipped)
+      if (skippable.insert(entry.name).second) record.skipped.push_back(entry);
+    if (part.plan->filter != record.filter || part.plan->skip != record.skip) record.filter.clear(), record.skip.clear();
+  }
+  std::map<std::string, std::pair<const ResultFolder*, std::size_t>> measured;
+  std::map<std::string, std::string> reasons;
+  for (const ResultFolder& part : parts) {
+    for (std::size_t i = 0; i < part.cells.size(); ++i) {
+      const std::string name = part.cells[i].cell.name();
+      measured.emplace(name, std::pair{&part, i});
+      if (planned.insert(name).second) record.cells.push_back({name, 1, ""});
+    }
+    for (const SkippedCell& cell : part.skipped) reasons.emplace(cell.name, cell.reason);
+  }
+  for (const PlanRecord::Entry& entry : record.cells) {
+    if (const auto found = measured.find(entry.name); found != measured.end()) {
+      const auto& [part, place] = found->second;
+      merged.outcome.results.push_back(part->cells[place]), merged.lines.push_back(part->lines[place]);
+    } else if (!reasons.contains(entry.name)) {
+      merged.missing.push_back(entry);
+    }
+  }
+  const auto skip = [&](const std::string& name, const std::string& reason) {
+    if (!measured.contains(name)) merged.plan.skipped.push_back({name, reason});
+  };
+  for (const PlanRecord::Entry& entry : record.skipped) {
+    const auto found = reasons.find(entry.name);
+    if (found != reasons.end() || !planned.contains(entry.name)) skip(entry.name, found != reasons.end() ? found->second : entry.reason);
+  }
+  for (const ResultFolder& part : parts)
+    for (const SkippedCell& cell : part.skipped)
+      if (!skippable.contains(cell.name)) skip(cell.name, cell.reason);
+  for (const PlanRecord::Entry& entry : merged.missing) merged.outcome.missing.push_back(entry.name);
+  merged.plan.excluded = record.excluded;
+  merged.plan.filtered = record.filtered = whole - std::min(whole, record.cells.size());
+}
+
+}  // namespace
+
+Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions& options, const std::string& command) {
+  Merged merged;
+  bool one_machine = true;
+  for (const ResultFolder& part : parts) {
+    if (part.lines.size() != part.cells.size())
+      throw UserError(fmt::format("{}: has no cells.jsonl, which holds what merge joins; give the folder that `run` wrote", part.path.string()));
+    if (&part == &parts.front()) continue;
+    refuse_different_configurations(parts.front(), part);
+    check_machine(parts.front(), part, options, merged.outcome.warnings);
+    one_machine = one_machine && merged.outcome.warnings.empty();
+  }
+  refuse_doubled_cells(parts);
+  follow_plan(parts, merged);
+  merged.context = merged_context(parts, command);
+  merged.record.context = merged.context;
+  if (!one_machine) {  // each row then knows whose it is
+    std::map<std::string, std::size_t> owners;
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      for (const CellResult& cell : parts[i].cells) owners.emplace(cell.cell.name(), i + 1);
+    for (std::size_t i = 0; i < merged.lines.size(); ++i) {
+      const std::size_t part = owners.at(merged.outcome.results[i].cell.name());
+      merged.outcome.results[i].facts["part"] = part, merged.lines[i]["part"] = part;
+    }
+  }
+  Plan measured{.cells = {}, .skipped = merged.plan.skipped, .excluded = 0, .filtered = 0, .in_other_shards = 0, .elsewhere = {}};
+  for (const CellResult& result : merged.outcome.results) measured.cells.push_back(result.cell);
+  const Json cores = parts.front().context.value("cores", Json());
+  const std::vector<std::string> usual = machine_warnings(merged.outcome, measured, cores.is_number() ? cores.get<unsigned>() : ~0u);
+  merged.outcome.warnings.insert(merged.outcome.warnings.end(), usual.begin(), usual.end());
+  return merged;
+}
+
+std::string missing_line(const Merged& merged) {
+  if (merged.missing.empty()) return {};
+  std::map<unsigned, std::size_t> counts;
+  for (const PlanRecord::Entry& entry : merged.missing) ++counts[entry.shard];
+  std::vector<std::string> shards;
+  for (const auto& [index, count] : counts) shards.push_back(fmt::format("{} of shard {}/{}", count, index, merged.shards));
+  const std::string where = merged.shards > 1 ? fmt::format(": {}", fmt::join(shards, ", ")) : "";
+  return fmt::format("{} of {} cells of the plan are in none of the parts{}", merged.missing.size(), merged.record.cells.size(), where);
+}
+
+}  // namespace arboretum

@@ -1,0 +1,67 @@
+#include "experiments/plan_record.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+
+#include "core/error.h"
+
+namespace arboretum {
+namespace {
+
+Json entries_json(const std::vector<PlanRecord::Entry>& entries) {
+  Json list = Json::array();
+  for (const PlanRecord::Entry& entry : entries) {
+    Json& item = list.emplace_back(Json{{"name", entry.name}, {"shard", entry.shard}});
+    if (!entry.reason.empty()) item["reason"] = entry.reason;
+  }
+  return list;
+}
+
+std::vector<PlanRecord::Entry> entries_of(const Json& list) {
+  std::vector<PlanRecord::Entry> entries;
+  for (const Json& item : list)
+    entries.push_back({item.at("name").get<std::string>(), item.value("shard", 1u), item.value("reason", "")});
+  return entries;
+}
+
+}  // namespace
+
+PlanRecord record_of(const Plan& plan, const std::map<std::string, unsigned>& shards, const Shard& shard) {
+  PlanRecord record;
+  record.shard = shard;
+  record.excluded = plan.excluded, record.filtered = plan.filtered;
+  const auto shard_of = [&](const std::string& name) { return shard.is_whole() ? 1u : shards.at(name); };
+  for (const Cell& cell : plan.cells) record.cells.push_back({cell.name(), shard_of(cell.name()), ""});
+  for (const SkippedCell& cell : plan.skipped) record.skipped.push_back({cell.name, shard_of(cell.name), cell.reason});
+  return record;
+}
+
+std::string to_text(const PlanRecord& record) {
+  Json json = Json::object();
+  json["context"] = record.context;
+  json["shard"] = record.shard.text();
+  json["filter"] = record.filter, json["skip"] = record.skip;
+  json["excluded"] = record.excluded, json["filtered"] = record.filtered;
+  json["cells"] = entries_json(record.cells), json["skipped"] = entries_json(record.skipped);
+  return json.dump(1) + "\n";
+}
+
+std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) {
+  std::ifstream stream(folder / kPlanFile);
+  if (!stream) return std::nullopt;
+  try {
+    const Json json = Json::parse(stream);
+    PlanRecord record;
+    record.context = json.at("context");
+    record.shard = parse_shard(json.at("shard").get<std::string>());
+    record.filter = json.value("filter", ""), record.skip = json.value("skip", "");
+    record.excluded = json.value("excluded", std::size_t{0}), record.filtered = json.value("filtered", std::size_t{0});
+    record.cells = entries_of(json.at("cells")), record.skipped = entries_of(json.at("skipped"));
+    return record;
+  } catch (const nlohmann::json::exception& e) {
+    throw UserError(fmt::format("{}: not the JSON that `run` writes ({}); copy the folder anew, or measure again", (folder / kPlanFile).string(), e.what()));
+  }
+}
+
+}  // namespace arboretum

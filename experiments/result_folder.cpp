@@ -1,0 +1,224 @@
+#include "experiments/result_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <system_error>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "experiments/append_file.h"
+
+namespace arboretum {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_result_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path / "cells.jsonl", ignored) || fs::exists(path / "results.json", ignored);
+}
+
+/// Result folders directly below a folder.
+std::vector<std::string> folders_in(const fs::path& path) {
+  std::vector<std::string> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
+    if (is_result_folder(entry->path())) found.push_back(entry->path().lexically_normal().string());
+  std::ranges::sort(found);
+  return found;
+}
+
+[[noreturn]] void refuse(const fs::path& path) {
+  std::error_code ignored;
+  const bool is_folder = fs::is_directory(path, ignored), is_there = fs::exists(path, ignored);
+  std::string what = is_folder ? "no result folder: neither cells.jsonl nor results.json in it" : is_there ? "a file; give the folder that `run` wrote" : "no such folder";
+  std::vector<std::string> near;
+  if (is_folder) near = folders_in(path);
+  if (near.empty() && is_result_folder(path.parent_path())) near = {path.parent_path().string()};
+  if (near.empty()) near = folders_in(path.has_parent_path() ? path.parent_path() : fs::path("."));
+  if (near.empty()) near = folders_in("results");
+  const std::string text = path.lexically_normal().string();
+  throw UserError(near.empty() ? fmt::format("{}: {}; `arboretum run` makes result folders", path.string(), what)
+                               : fmt::format("{}: {}; did you mean '{}'?", path.string(), what, nearest_name(text, near)));
+}
+
+Json read_json(const fs::path& path) {
+  std::ifstream stream(path);
+  if (!stream) throw UserError(fmt::format("{}: cannot be read; check its permissions", path.string()));
+  try {
+    Json document = Json::parse(stream);
+    if (document.is_object() && document.value("context", Json::object()).is_object()) return document;
+  } catch (const nlohmann::json::exception&) {
+  }
+  throw UserError(fmt::format("{}: not the JSON that `run` writes; copy the folder anew, or measure again", path.string()));
+}
+
+Repetition repetition_of(const Json& entry) {
+  Repetition r;
+  r.index = entry.at("repetition_index").get<unsigned>();
+  r.iterations = entry.at("iterations").get<std::uint64_t>();
+  const double scale = 1e-3 * static_cast<double>(r.iterations);
+  r.wall_seconds = entry.at("real_time").get<double>() * scale;
+  r.cpu_seconds = entry.at("cpu_time").get<double>() * scale;
+  return r;
+}
+
+/// From results.json alone. Its repetitions repeat the cell's facts.
+void read_entries(const Json& document, ResultFolder& folder) {
+  std::map<std::string, std::size_t> places;
+  for (const Json& entry : document.value("benchmarks", Json::array())) {
+    if (entry.at("run_type") != "iteration") continue;
+    const auto [place, fresh] = places.try_emplace(entry.at("run_name").get<std::string>(), folder.cells.size());
+    if (fresh) folder.cells.push_back({.cell = cell_of(entry), .repetitions = {}, .facts = entry});
+    folder.cells[place->second].repetitions.push_back(repetition_of(entry));
+  }
+}
+
+void read_lines_of_cells(const fs::path& file, ResultFolder& folder) {
+  if (!std::ifstream(file)) throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
+  std::map<std::string, std::size_t> places;
+  std::size_t number = 0;
+  for (const std::string& text : read_lines(file)) {
+    ++number;
+    Json line = Json::parse(text, nullptr, false);
+    std::optional<CellResult> result;
+    try {
+      const std::string hash = line.at("configuration_hash").get<std::string>();
+      if (folder.configuration_hash.empty()) folder.configuration_hash = hash;
+      result = parse_cell_line(line, cell_of(line), folder.configuration_hash);
+    } catch (const nlohmann::json::exception&) {
+    }
+    if (!result) {
+      throw UserError(fmt::format("{}:{}: not a cell as `run` writes it; take the line out (its cell is then missing), or copy the folder anew",
+                                  file.string(), number));
+    }
+    const auto [place, fresh] = places.try_emplace(result->cell.name(), folder.cells.size());
+    if (fresh) {
+      folder.cells.push_back(std::move(*result)), folder.lines.push_back(std::move(line));
+    } else {
+      folder.cells[place->second] = std::move(*result), folder.lines[place->second] = std::move(line);
+    }
+  }
+}
+
+/// Cells as the plan has them, not as they ended; without a plan as results.json has them. Others stay behind, in their order.
+void sort_as_planned(ResultFolder& folder, const Json& document) {
+  std::map<std::string, std::size_t> places;
+  if (folder.plan) {
+    for (const PlanRecord::Entry& entry : folder.plan->cells) places.try_emplace(entry.name, places.size());
+  } else {
+    for (const Json& entry : document.value("benchmarks", Json::array())) places.try_emplace(entry.at("run_name").get<std::string>(), places.size());
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> order;
+  for (std::size_t i = 0; i < folder.cells.size(); ++i) {
+    const auto place = places.find(folder.cells[i].cell.name());
+    order.emplace_back(place != places.end() ? place->second : places.size(), i);
+  }
+  std::ranges::sort(order);
+  std::vector<CellResult> cells;
+  std::vector<Json> lines;
+  for (const auto& [place, i] : order) {
+    cells.push_back(std::move(folder.cells[i]));
+    if (!folder.lines.empty()) lines.push_back(std::move(folder.lines[i]));
+  }
+  folder.cells = std::move(cells), folder.lines = std::move(lines);
+}
+
+/// The head of effective.yaml.
+std::string hash_of_configuration(const fs::path& folder) {
+  std::ifstream stream(folder / "effective.yaml");
+  std::string line;
+  constexpr std::string_view kHead = "# configuration hash: ";
+  return std::getline(stream, line) && line.starts_with(kHead) ? line.substr(kHead.size()) : "";
+}
+
+/// A value of a context as a line shows it.
+std::string text_of(const Json& context, const char* key) {
+  const auto found = context.find(key);
+  if (found == context.end()) return "unknown";
+  if (found->is_string()) return found->get<std::string>();
+  if (!found->is_array()) return found->dump();
+  std::vector<std::string> words;
+  for (const Json& word : *found) words.push_back(word.is_string() ? word.get<std::string>() : word.dump());
+  return fmt::format("{}", fmt::join(words, " "));
+}
+
+/// A key and what is swept of it: "binned_sah:bins=16" is "binned_sah" and ":bins=16".
+void part(const std::string& text, std::string& key, std::string& label) {
+  const std::size_t colon = text.find(':');
+  key = text.substr(0, colon);
+  label = colon == std::string::npos ? "" : text.substr(colon);
+}
+
+}  // namespace
+
+std::string ResultFolder::context_text(const char* key) const {
+  return text_of(context, key);
+}
+
+Cell cell_of(const Json& entry) {
+  const auto text = [&](const char* key) { return entry.at(key).get<std::string>(); };
+  Cell cell;
+  cell.metric = text("metric") == "build" ? Cell::Metric::build : Cell::Metric::trace;
+  cell.scene = text("scene"), cell.structure = text("structure"), cell.leaf = text("leaf");
+  cell.intersector = text("intersector"), cell.box = text("box");
+  part(text("builder"), cell.builder, cell.parameter_label);
+  part(text("traversal"), cell.traversal, cell.setting_label);
+  part(text("workload"), cell.workload, cell.start_label);
+  cell.isa = parse_isa(text("isa")).value_or(Isa::scalar);
+  cell.threads = entry.at("threads").get<unsigned>();
+  return cell;
+}
+
+ResultFolder read_result_folder(const fs::path& path) {
+  if (!is_result_folder(path)) refuse(path);
+  ResultFolder folder;
+  folder.path = path;
+  folder.configuration_hash = hash_of_configuration(path);
+  folder.plan = read_plan_record(path);
+  if (folder.plan) folder.context = folder.plan->context;
+  folder.complete = fs::exists(path / "results.json");
+  Json document = Json::object();
+  if (folder.complete) {
+    document = read_json(path / "results.json");
+    folder.context = document.value("context", Json::object());
+    if (folder.configuration_hash.empty()) folder.configuration_hash = folder.context.value("configuration_hash", "");
+  }
+  try {
+    if (fs::exists(path / "cells.jsonl"))
+      read_lines_of_cells(path / "cells.jsonl", folder);
+    else
+      read_entries(document, folder);
+    sort_as_planned(folder, document);
+    for (const Json& cell : document.value("skipped", Json::array()))
+      folder.skipped.push_back({cell.at("name").get<std::string>(), cell.at("reason").get<std::string>()});
+  } catch (const nlohmann::json::exception&) {
+    throw UserError(fmt::format("{}: not the results that `run` writes; copy the folder anew, or measure again", (path / "results.json").string()));
+  }
+  if (!folder.complete && folder.plan) {
+    for (const PlanRecord::Entry& cell : folder.plan->skipped)
+      if (cell.shard == folder.plan->shard.index) folder.skipped.push_back({cell.name, cell.reason});
+  }
+  return folder;
+}
+
+std::vector<std::string> machine_differences(const Json& a, const Json& b) {
+  constexpr std::pair<const char*, const char*> kKeys[] = {{"cpu", "CPU"},
+                                                           {"cores", "cores"},
+                                                           {"governor", "CPU governor"},
+                                                           {"isa", "instruction sets"},
+                                                           {"compiler", "compiler"},
+                                                           {"compiler_flags", "compiler flags"},
+                                                           {"build_type", "build type"}};
+  std::vector<std::string> differences;
+  for (const auto& [key, title] : kKeys) {
+    const std::string of_a = text_of(a, key), of_b = text_of(b, key);
+    if (of_a != of_b) differences.push_back(fmt::format("{}: {} against {}", title, of_a, of_b));
+  }
+  return differences;
+}
+
+}  // namespace arboretum

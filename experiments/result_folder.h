@@ -1,0 +1,39 @@
+// A result folder as it is read back: the cells that it holds, the machine that they were measured on, what was skipped. Also of a
+// run that was cut off, of a merged one, and of one of which results.json alone is left.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiments/plan_record.h"
+#include "experiments/result.h"
+
+namespace arboretum {
+
+struct ResultFolder {
+  std::filesystem::path path;
+  Json context = Json::object();
+  std::string configuration_hash;    ///< empty where nothing in the folder says it
+  std::vector<CellResult> cells;     ///< in the plan's order, each name once
+  std::vector<Json> lines;           ///< of cells.jsonl, one for each of `cells`; empty where there is no such file
+  std::vector<SkippedCell> skipped;  ///< with reasons, also those that turned out impossible while running
+  std::optional<PlanRecord> plan;    ///< std::nullopt: of an older revision
+  bool complete = false;             ///< the run went through: results.json is there
+
+  [[nodiscard]] std::string context_text(const char* key) const;
+};
+
+/// Throws UserError, naming the nearest folder that is one, when `path` is no result folder or cannot be read.
+[[nodiscard]] ResultFolder read_result_folder(const std::filesystem::path& path);
+
+/// The cell that an entry of a result file is of, as far as its fields tell; `kernel` and parameters are left out.
+/// Throws nlohmann::json::exception where a field is missing.
+[[nodiscard]] Cell cell_of(const Json& entry);
+
+/// "CPU: AMD EPYC against Intel Xeon" for each thing of machine and build by which two contexts differ, and which makes their times
+/// incomparable: CPU, cores, governor, instruction sets, compiler and its flags.
+[[nodiscard]] std::vector<std::string> machine_differences(const Json& a, const Json& b);
+
+}  // namespace arboretum

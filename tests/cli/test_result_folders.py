@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+"""Result folders from outside: test_result_folders.py ARBORETUM. Shards and merging, as a user types them."""
+
+import csv
+import json
+import os
+import unittest
+
+from command_line_case import CommandLineCase, read_jsonl
+
+FEW = ("--skip", "diffuse", "--repetitions", "7")
+
+
+class ResultFolders(CommandLineCase):
+    def shard(self, index, of, *words):
+        result = self.run_small("--shard", f"{index}/{of}", *FEW, *words)
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        return f"results/small-shard-{index}-of-{of}"
+
+    def context(self, folder):
+        return json.loads((self.folder / folder / "results.json").read_text())["context"]
+
+    def test_shards_list_the_plan_and_bad_ones_are_one_line(self):
+        every = self.cells(*FEW)
+        for of in (1, 2, 5, 40):
+            shards = [self.cells(*FEW, "--shard", f"{i + 1}/{of}") for i in range(of)]
+            self.assertEqual(sorted(sum(shards, [])), sorted(every))
+        lesser = {**os.environ, "ARBORETUM_ISA": "scalar"}
+        here = self.cells(*FEW, "--shard", "2/3")
+        there = self.run_small("--list", *FEW, "--shard", "2/3", env=lesser).stdout.splitlines()
+        self.assertEqual(there, [name for name in here if "/scalar/" in name])
+        dry = self.run_small("--dry-run", *FEW, "--shard", "2/3").stdout
+        self.assertIn(f"{len(here)} cells", dry)
+        self.assertIn(f"{len(every) - len(here)} in other shards", dry)
+        for bad in ("0/2", "3/2", "2", "1/2/3", "one/two", "-1/2", "1/0", ""):
+            self.assert_error(self.run_small(f"--shard={bad}", "--list"), "I/N")
+        self.assert_error(self.run_small("--shard", "40/40", "--filter", "trace/.*bvh2.*watertight.*/sse/"), "nothing to measure", status=4)
+
+    def test_merged_shards_are_the_whole_run(self):
+        parts = [self.shard(i, 3) for i in (1, 2, 3)]
+        self.assertEqual(self.context(parts[1])["shard"], "2/3")
+        self.assertIn("# shard: 2/3", (self.folder / parts[1] / "effective.yaml").read_text())
+        result = self.call("merge", "results/small", *parts)
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        out = self.folder / "results/small"
+        every = self.cells(*FEW)
+        self.assertEqual([cell["name"] for cell in read_jsonl(out / "cells.jsonl")], every)
+        document = json.loads((out / "results.json").read_text())
+        self.assertEqual(list(dict.fromkeys(b["run_name"] for b in document["benchmarks"])), every)
+        self.assertNotIn("missing", document)
+        self.assertTrue((out / "report.html").exists() or "no plots" in result.stderr)
+        rows = list(csv.DictReader((out / "results.csv").read_text().splitlines()))
+        self.assertEqual(len(rows), 7 * len(every))
+        measured = {(c["name"], r["repetition_index"]): r["wall_seconds"] for part in parts for c in read_jsonl(self.folder / part / "cells.jsonl") for r in c["repetitions"]}
+        self.assertEqual({(c["name"], r["repetition_index"]): r["wall_seconds"] for c in read_jsonl(out / "cells.jsonl") for r in c["repetitions"]}, measured)
+        wrong = any(cell.get("wrong_answers") for cell in read_jsonl(out / "cells.jsonl"))
+        self.assertEqual(result.returncode, 1 if wrong else 0)
+        again = self.run_small(*FEW, "--resume", "--out", "results/small")
+        self.assertIn(f"({len(every)} done before)", again.stderr)
+
+        self.assert_error(self.call("merge", "results/small", *parts), "already holds results")
+        self.assert_error(self.call("merge", "other", "results/small", parts[0]), "is in both")
+        self.assert_error(self.call("merge", "other", parts[0], parts[0]), "given twice")
+        self.assert_error(self.call("merge", "other", "results"), "did you mean")
+        self.assert_error(self.call("merge", "other", "results/smal"), "did you mean 'results/small")
+        self.assert_error(self.call("merge", "other"), "PART")
+        self.assert_error(self.run_small(*FEW, "--shard", "2/3", "--resume", "--out", parts[0]), "holds shard 1/3")
+        self.assertFalse((self.folder / "other").exists())
+
+    def test_a_missing_shard_is_told_and_can_be_measured_into_the_merged_folder(self):
+        first = self.shard(1, 2)
+        self.assert_error(self.call("merge", "out", first, "--require-all"), "shard 2/2")
+        self.assertFalse((self.folder / "out").exists())
+        result = self.call("merge", "out", first, "--no-plots")
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        missing = self.cells(*FEW, "--shard", "2/2")
+        self.assertIn(f"{len(missing)} of {len(self.cells(*FEW))} cells of the plan are in none of the parts", result.stderr)
+        self.assertEqual(json.loads((self.folder / "out/results.json").read_text())["missing"], missing)
+        mend = next(line for line in result.stdout.splitlines() if line.startswith("to measure them: ")).split(": ", 1)[1]
+        words = [word.strip("'") for word in mend.split()[1:]]
+        self.assertIn(self.call(*words, "--no-plots").returncode, (0, 1))
+        self.assertEqual(sorted(cell["name"] for cell in read_jsonl(self.folder / "out/cells.jsonl")), sorted(self.cells(*FEW)))
+
+    def test_other_machines_revisions_and_configurations_are_refused(self):
+        first, second = self.shard(1, 2), self.shard(2, 2)
+        for key, value, part in (("cpu", "another processor", "CPU"), ("compiler", "clang 99", "compiler"), ("git_revision", "f" * 40, "revision")):
+            with self.subTest(key=key):
+                document = json.loads((self.folder / second / "results.json").read_text())
+                document["context"][key] = value
+                copy = self.folder / f"{key}-copy"
+                copy.mkdir()
+                for name in ("cells.jsonl", "effective.yaml", "plan.json"):
+                    (copy / name).write_text((self.folder / second / name).read_text())
+                (copy / "results.json").write_text(json.dumps(document))
+                self.assert_error(self.call("merge", "out", first, copy), part, value[:12])
+                option = "--allow-different-revisions" if key == "git_revision" else "--allow-different-machines"
+                result = self.call("merge", f"{key}-out", first, copy, option, "--no-plots")
+                self.assertIn(result.returncode, (0, 1), result.stderr)
+                self.assertIn(value[:12], result.stderr)
+                self.assertTrue(self.context(f"{key}-out")["warnings"])
+        other = self.run_small("--repetitions", "2", "--shard", "2/2", "--skip", "diffuse", "--out", "other")
+        self.assertIn(other.returncode, (0, 1))
+        self.assert_error(self.call("merge", "out", first, "other"), "different configurations", "repetitions: 2")
+
+
+if __name__ == "__main__":
+    unittest.main()
