@@ -21,6 +21,7 @@ namespace {
 struct Arguments {
   RunCommand run;
   MergeCommand merge;
+  CompareCommand compare;
   VerifyCommand verify;
   std::string axis, scene;
   bool json = false;
@@ -62,6 +63,23 @@ void declare_merge(CLI::App& app, MergeCommand& merge) {
   c->add_flag("--no-plots", merge.no_plots, "Draw no plots and write no report");
 }
 
+void declare_compare(CLI::App& app, CompareCommand& compare) {
+  CLI::App* c = app.add_subcommand("compare", "Two result folders, cell by cell: what of B is faster, slower, or indistinguishable from A");
+  c->add_option("A", compare.a, "The result folder compared with (before)")->required();
+  c->add_option("B", compare.b, "The result folder compared (after)")->required();
+  c->add_option("--min-difference", compare.options.min_difference, "Smallest difference of speed that counts, in per cent (default 3)")->check(CLI::Range(0.0, 1000.0));
+  c->add_option("--significance", compare.options.significance, "Share of false findings among the findings at most (default 0.05)")->check(CLI::Range(1e-6, 0.5));
+  c->add_option("--control", compare.options.control, "Cells whose code did not change, by a regular expression (/embree/): speeds are taken relative to theirs");
+  c->add_option("--filter", compare.filter, "Only cells whose name this regular expression finds");
+  c->add_option("--skip", compare.skip, "No cells whose name this regular expression finds");
+  c->add_flag("--all", compare.all, "Also list indistinguishable cells where there are many");
+  c->add_flag("--allow-different-machines", compare.allow_different_machines, "Compare although CPU, compiler or flags differ");
+  c->add_option("--json", compare.json, "Write the comparison to this file as JSON (-: stdout)");
+  c->add_option("--csv", compare.csv, "Write the cells to this file as CSV (-: stdout)");
+  c->add_option("--plot", compare.plot, "Draw the ratios with their intervals to this file (.png, .svg, .pdf)");
+  c->footer("Exit status: 0 no regression, 2 usage error, 3 a cell is slower or has new wrong answers, 4 no cell is in both.");
+}
+
 void declare_verify(CLI::App& app, VerifyCommand& verify) {
   CLI::App* c = app.add_subcommand("verify", "Combinations against exact arithmetic, ray by ray, on hard rays");
   c->add_option("SUBJECT", verify.subject, "A scene as for `info`, a cases file (.json), or `random`: random small meshes")->required();
@@ -84,6 +102,7 @@ void declare(CLI::App& app, Arguments& a) {
   app.set_version_flag("--version", std::string(build_info::kVersion));
   declare_run(app, a.run);
   declare_merge(app, a.merge);
+  declare_compare(app, a.compare);
   declare_verify(app, a.verify);
   CLI::App* list = app.add_subcommand("list", "What can be swept");
   list->add_option(
@@ -154,6 +173,7 @@ ExitStatus dispatch(std::vector<std::string> words) {
   const std::string name = used.front()->get_name();
   if (name == "run") return command_run(std::move(a.run));
   if (name == "merge") return command_merge(a.merge);
+  if (name == "compare") return command_compare(a.compare);
   if (name == "verify") return command_verify(a.verify);
   if (name == "list") return command_list(a.axis, a.json);
   if (name == "info") return command_info(a.scene, a.json);

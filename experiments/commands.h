@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "experiments/benchmark_flags.h"
+#include "experiments/comparison.h"
 #include "experiments/config.h"
 #include "experiments/merge.h"
 
@@ -47,8 +48,18 @@ struct MergeCommand {
   std::string command_line;  ///< as typed, for the results
 };
 
+struct CompareCommand {
+  std::filesystem::path a, b;
+  CompareOptions options;
+  std::string filter, skip;
+  bool allow_different_machines = false, all = false;
+  std::string json, csv;  ///< files; "-": stdout; empty: none
+  std::filesystem::path plot;  ///< empty: none
+};
+
 ExitStatus command_run(RunCommand command);
 ExitStatus command_merge(const MergeCommand& command);
+ExitStatus command_compare(const CompareCommand& command);
 ExitStatus command_verify(const VerifyCommand& command);
 /// `axis` empty: all of them.
 ExitStatus command_list(const std::string& axis, bool json);

@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <system_error>
 
 #include "core/data_folder.h"
+#include "experiments/append_file.h"
 
 extern char** environ;
 
@@ -32,6 +34,18 @@ int run_program(std::vector<std::string> words, bool quiet_out, bool quiet_error
   return WEXITSTATUS(status);
 }
 
+/// Runs a script of plots/ with its arguments. One line that says why not, or empty.
+std::string run_script(const char* name, const std::vector<std::string>& arguments, bool quiet) {
+  const std::filesystem::path script = data_folder() / "plots" / name;
+  if (!std::filesystem::exists(script)) return fmt::format("no plots: {} is missing; install again", script.string());
+  const std::optional<std::string> python = find_plot_python();
+  if (!python) return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the results";
+  std::vector<std::string> words{*python, script.string()};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const int status = run_program(words, quiet, false);
+  return status == 0 ? "" : fmt::format("no plots: {} ended with status {}", name, status);
+}
+
 }  // namespace
 
 std::optional<std::string> find_plot_python() {
@@ -48,17 +62,19 @@ std::optional<std::string> find_plot_python() {
 
 std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures,
                        bool quiet) {
-  const std::filesystem::path script = data_folder() / "plots" / "plot.py";
-  if (!std::filesystem::exists(script)) return fmt::format("no plots: {} is missing; install again", script.string());
-  const std::optional<std::string> python = find_plot_python();
-  if (!python)
-    return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the "
-           "results";
-  std::vector<std::string> words{*python, script.string(), results.string()};
+  std::vector<std::string> words{results.string()};
   if (!figures.empty()) words.insert(words.end(), {"--only", fmt::format("{}", fmt::join(figures, ","))});
-  const int status = run_program(words, quiet, false);
-  return status == 0 ? ""
-                     : fmt::format("no plots: {} ended with status {}", script.filename().string(), status);
+  return run_script("plot.py", words, quiet);
+}
+
+std::string draw_ratios(const std::string& comparison_json, const std::filesystem::path& file) {
+  std::filesystem::path beside = file;
+  beside += ".json.part";
+  write_whole(beside, comparison_json);
+  const std::string problem = run_script("ratios.py", {beside.string(), file.string()}, false);
+  std::error_code ignored;
+  std::filesystem::remove(beside, ignored);
+  return problem;
 }
 
 }  // namespace arboretum

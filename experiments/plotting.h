@@ -1,4 +1,4 @@
-// Runs plots/plot.py with an interpreter that has matplotlib.
+// Runs plots/plot.py and plots/ratios.py with an interpreter that has matplotlib.
 #pragma once
 
 #include <filesystem>
@@ -15,5 +15,8 @@ namespace arboretum {
 /// empty.
 [[nodiscard]] std::string draw_plots(const std::filesystem::path& results,
                                      const std::vector<std::string>& figures, bool quiet);
+
+/// Draws the figure of a comparison, given as JSON, to `file`. Returns one line that says why not, or empty.
+[[nodiscard]] std::string draw_ratios(const std::string& comparison_json, const std::filesystem::path& file);
 
 }  // namespace arboretum

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Result folders from outside: test_result_folders.py ARBORETUM. Shards and merging, as a user types them."""
+"""Result folders from outside: test_result_folders.py ARBORETUM. Shards, merging and comparing, as a user types them."""
 
 import csv
 import json
@@ -16,6 +16,17 @@ class ResultFolders(CommandLineCase):
         result = self.run_small("--shard", f"{index}/{of}", *FEW, *words)
         self.assertIn(result.returncode, (0, 1), result.stderr)
         return f"results/small-shard-{index}-of-{of}"
+
+    def edit_cells(self, folder, change, to="edited"):
+        """A copy of a result folder's cells and machine, changed: `change` gets each cell, `context` the machine."""
+        target = self.folder / to
+        target.mkdir()
+        (target / "plan.json").write_text((self.folder / folder / "plan.json").read_text())
+        cells = read_jsonl(self.folder / folder / "cells.jsonl")
+        for cell in cells:
+            change(cell)
+        (target / "cells.jsonl").write_text("".join(json.dumps(cell) + "\n" for cell in cells))
+        return to
 
     def context(self, folder):
         return json.loads((self.folder / folder / "results.json").read_text())["context"]
@@ -98,9 +109,72 @@ class ResultFolders(CommandLineCase):
                 self.assertIn(result.returncode, (0, 1), result.stderr)
                 self.assertIn(value[:12], result.stderr)
                 self.assertTrue(self.context(f"{key}-out")["warnings"])
+                if key != "git_revision":
+                    self.assert_error(self.call("compare", second, copy), part, value)
+                    self.assertEqual(self.call("compare", second, copy, "--allow-different-machines").returncode, 0)
         other = self.run_small("--repetitions", "2", "--shard", "2/2", "--skip", "diffuse", "--out", "other")
         self.assertIn(other.returncode, (0, 1))
         self.assert_error(self.call("merge", "out", first, "other"), "different configurations", "repetitions: 2")
+
+    def test_compare_finds_what_changed_and_nothing_else(self):
+        before = self.shard(1, 1, "--out", "results/small-shard-1-of-1")
+        same = self.call("compare", before, before)
+        self.assertEqual(same.returncode, 0, same.stderr)
+        every = len(self.cells(*FEW))
+        self.assertIn(f"no regression: of {every} cells {every} indistinguishable", same.stdout)
+
+        def slow(cell):
+            if cell["structure"] == "bvh4" and cell["metric"] == "trace":
+                for repetition in cell["repetitions"]:
+                    repetition["cpu_seconds"] *= 3
+
+        after = self.edit_cells(before, slow)
+        result = self.call("compare", before, after, "--json", "out.json", "--csv", "out.csv")
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn("regression", result.stdout.splitlines()[-1])
+        cells = json.loads((self.folder / "out.json").read_text())["cells"]
+        slower = [cell for cell in cells if cell["verdict"] == "slower"]
+        self.assertEqual({cell["structure"] for cell in slower}, {"bvh4"})
+        self.assertEqual(len(slower), sum("trace" in name and "bvh4" in name for name in self.cells(*FEW)))
+        for cell in slower:
+            self.assertAlmostEqual(cell["ratio"], 1 / 3, places=6)
+        rows = list(csv.DictReader((self.folder / "out.csv").read_text().splitlines()))
+        self.assertEqual([row["name"] for row in rows], [cell["name"] for cell in cells])
+        self.assertEqual(self.call("compare", after, before).returncode, 0)
+        self.assertEqual(self.call("compare", before, after, "--skip", "bvh4").returncode, 0)
+        self.assertEqual(self.call("compare", before, after, "--min-difference", "500").returncode, 0)
+        self.assertEqual(json.loads(self.call("compare", before, after, "--json", "-").stdout)["exit_status"], 3)
+
+        drawn = self.call("compare", before, after, "--plot", "ratios.svg")
+        self.assertEqual(drawn.returncode, 3, drawn.stderr)
+        if "no python3 here has matplotlib" not in drawn.stderr:
+            self.assertIn("slower", (self.folder / "ratios.svg").read_text())
+            self.assertEqual(drawn.stderr, "")
+        self.assertEqual(list(self.folder.glob("*.part")), [])
+
+        def wrong(cell):
+            if "wrong_answers" in cell and cell["structure"] == "bvh2":
+                cell["wrong_answers"] += 1
+
+        result = self.call("compare", before, self.edit_cells(before, wrong, "wrong"))
+        self.assertEqual(result.returncode, 3, result.stdout)
+        self.assertIn("with more wrong answers", result.stdout)
+
+    def test_compare_needs_two_result_folders_with_something_in_common(self):
+        first, second = self.shard(1, 2), self.shard(2, 2)
+        self.assert_error(self.call("compare", first, second), "nothing to compare", status=4)
+        self.assert_error(self.call("compare", first), "B is required")
+        self.assert_error(self.call("compare", first, "results/small-shard-2-of-3"), f"did you mean '{second}'")
+        self.assert_error(self.call("compare", first, "results"), "no result folder")
+        self.assert_error(self.call("compare", first, f"{first}/results.json"), f"did you mean '{first}'")
+        self.assert_error(self.call("compare", first, first, "--min-diference", "3"), "did you mean '--min-difference'")
+        self.assert_error(self.call("compare", first, first, "--min-difference", "-3"), "--min-difference")
+        self.assert_error(self.call("compare", first, first, "--filter", "("), "regular expression")
+        self.assert_error(self.call("compare", first, first, "--control", "nothing-is-called-so"), "finds no cell")
+        self.assert_error(self.call("compare", first, first, "--plot", "ratios.doc"), ".png, .svg or .pdf")
+        self.assert_error(self.call("compare", first, first, "--csv", "/nowhere/out.csv"), "cannot be written")
+        self.write("results.json", "{")
+        self.assert_error(self.call("compare", first, "."), "results.json")
 
 
 if __name__ == "__main__":

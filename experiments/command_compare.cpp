@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "experiments/append_file.h"
+#include "experiments/commands.h"
+#include "experiments/comparison_files.h"
+#include "experiments/comparison_text.h"
+#include "experiments/name_filter.h"
+#include "experiments/plotting.h"
+#include "experiments/result_folder.h"
+
+namespace arboretum {
+namespace {
+
+void filter_cells(ResultFolder& folder, const std::string& filter, const std::string& skip) {
+  const NameFilter wanted(filter, skip);
+  std::erase_if(folder.cells, [&](const CellResult& r) { return !wanted(r.cell.name()); });
+}
+
+void refuse_different_machines(const ResultFolder& a, const ResultFolder& b) {
+  const std::vector<std::string> differences = machine_differences(a.context, b.context);
+  if (differences.empty()) return;
+  throw UserError(fmt::format("{} and {} were measured on different machines or builds ({}); measure both on one, or compare all the same with --allow-different-machines",
+                              a.path.string(), b.path.string(), fmt::join(differences, "; ")));
+}
+
+void refuse_unknown_format(const std::filesystem::path& plot) {
+  const std::string ending = plot.extension().string();
+  if (!plot.empty() && ending != ".png" && ending != ".svg" && ending != ".pdf")
+    throw UserError(fmt::format("--plot {}: must end in .png, .svg or .pdf", plot.string()));
+}
+
+void write(const std::string& path, const std::string& text) {
+  if (path == "-")
+    fmt::print("{}", text);
+  else if (!path.empty())
+    write_whole(path, text);
+}
+
+}  // namespace
+
+ExitStatus command_compare(const CompareCommand& command) {
+  if (command.json == "-" && command.csv == "-") throw UserError("compare: --json and --csv cannot both go to stdout; give one of them a file");
+  refuse_unknown_format(command.plot);
+  ResultFolder a = read_result_folder(command.a), b = read_result_folder(command.b);
+  if (!command.allow_different_machines) refuse_different_machines(a, b);
+  filter_cells(a, command.filter, command.skip), filter_cells(b, command.filter, command.skip);
+  const Comparison comparison = compare_results(a.cells, b.cells, command.options);
+  const auto [status, why] = verdict(comparison);
+  write(command.json, comparison_json(comparison, a, b));
+  write(command.csv, comparison_csv(comparison));
+  if (!command.plot.empty() && !comparison.cells.empty()) {
+    if (const std::string problem = draw_ratios(comparison_json(comparison, a, b), command.plot); !problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
+  }
+  if (command.json != "-" && command.csv != "-") {
+    fmt::print("{}{}", origins_text(a, b), comparison_text(comparison, command.all));
+    if (status != ExitStatus::kNothingMeasured) fmt::print("\n{}\n", why);
+  }
+  std::fflush(stdout);
+  if (status == ExitStatus::kNothingMeasured) fmt::print(stderr, "arboretum: {}\n", why);
+  return status;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,283 @@
+#include "experiments/comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "experiments/axes.h"
+#include "experiments/rank_test.h"
+
+namespace arboretum {
+namespace {
+
+constexpr std::size_t kResamples = 2000;
+using Replicates = std::vector<double>;  // logarithms of ratios
+
+/// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
+std::vector<double> rates(const CellResult& r) {
+  return r.rates(r.cell.threads == 1);
+}
+
+/// The same for a name whatever else is compared.
+std::uint64_t seed_of(const std::string& name) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (unsigned char c : name) hash = (hash ^ c) * 0x100000001b3u;
+  return hash;
+}
+
+double resampled_median(const std::vector<double>& values, std::uint64_t seed, std::size_t i, std::vector<double>& picked) {
+  picked.resize(values.size());
+  for (std::size_t j = 0; j < values.size(); ++j)
+    picked[j] = values[static_cast<std::size_t>(random_double(seed, i, j) * static_cast<double>(values.size()))];
+  return median(picked);
+}
+
+/// Logarithms of the ratio of the medians, of samples drawn anew from both.
+Replicates log_ratios(const std::string& name, const std::vector<double>& a, const std::vector<double>& b) {
+  const std::uint64_t seed = seed_of(name);
+  Replicates logs(kResamples);
+  std::vector<double> picked;
+  for (std::size_t i = 0; i < kResamples; ++i)
+    logs[i] = std::log(resampled_median(b, mix64(seed + 1), i, picked) / resampled_median(a, mix64(seed), i, picked));
+  return logs;
+}
+
+Interval interval(double log_centre, Replicates logs) {
+  std::ranges::sort(logs);
+  return {std::exp(log_centre), std::exp(logs[kResamples * 25 / 1000]), std::exp(logs[kResamples * 975 / 1000 - 1])};
+}
+
+class Comparer {
+ public:
+  Comparer(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options) { out_.options = options, match(a, b); }
+
+  Comparison run() {
+    for (const ComparedCell& cell : out_.cells) {
+      const std::vector<double> a = rates(cell.a), b = rates(cell.b);
+      logs_.push_back(log_ratios(cell.a.cell.name(), a, b));
+      centres_.push_back(std::log(median(b) / median(a)));
+    }
+    if (out_.options.control.empty())
+      out_.embree = mean_if("structure", "embree", [](const ComparedCell& c) { return c.is_trace() && c.a.cell.structure == "embree"; });
+    else
+      take_relative();
+    for (std::size_t i = 0; i < out_.cells.size(); ++i) estimate(i);
+    judge();
+    add_means();
+    add_structures();
+    return std::move(out_);
+  }
+
+ private:
+  void match(const std::vector<CellResult>& a, const std::vector<CellResult>& b) {
+    std::map<std::string, const CellResult*> of_b;
+    for (const CellResult& r : b) of_b.emplace(r.cell.name(), &r);
+    std::set<std::string> of_a;
+    for (const CellResult& r : a) {
+      const std::string name = r.cell.name();
+      of_a.insert(name);
+      const auto found = of_b.find(name);
+      if (found == of_b.end()) {
+        out_.only_a.push_back(name);
+      } else if (std::string why = other_work(r, *found->second); !why.empty()) {
+        out_.incomparable.emplace_back(name, std::move(why));
+      } else {
+        ComparedCell& cell = out_.cells.emplace_back();
+        cell.a = r, cell.b = *found->second;
+      }
+    }
+    for (const CellResult& r : b)
+      if (!of_a.contains(r.cell.name())) out_.only_b.push_back(r.cell.name());
+  }
+
+  /// Why the two do not compare although their names are equal; empty where they do.
+  static std::string other_work(const CellResult& a, const CellResult& b) {
+    for (const char* fact : {"triangles", "rays"}) {
+      if (a.fact(fact) != b.fact(fact)) return fmt::format("{:.0f} {} in A, {:.0f} in B", a.fact(fact), fact, b.fact(fact));
+    }
+    for (const CellResult* r : {&a, &b}) {
+      const std::vector<double> of = rates(*r);
+      if (of.empty() || std::ranges::min(of) <= 0.0) return fmt::format("no time was measured in {}", r == &a ? "A" : "B");
+    }
+    return {};
+  }
+
+  template <class Choose>
+  std::vector<std::size_t> places(const Choose& choose) const {
+    std::vector<std::size_t> found;
+    for (std::size_t i = 0; i < out_.cells.size(); ++i)
+      if (choose(out_.cells[i])) found.push_back(i);
+    return found;
+  }
+
+  /// Mean of the centres, and of each replicate.
+  std::pair<double, Replicates> mean_logs(const std::vector<std::size_t>& cells) const {
+    double centre = 0.0;
+    Replicates sum(kResamples, 0.0);
+    for (std::size_t i : cells) {
+      centre += centres_[i];
+      for (std::size_t k = 0; k < kResamples; ++k) sum[k] += logs_[i][k];
+    }
+    const double n = static_cast<double>(cells.size());
+    for (double& v : sum) v /= n;
+    return {centre / n, std::move(sum)};
+  }
+
+  template <class Choose>
+  std::optional<MeanRatio> mean_if(std::string axis, std::string value, const Choose& choose) const {
+    const std::vector<std::size_t> cells = places(choose);
+    if (cells.empty()) return std::nullopt;
+    return mean_of(std::move(axis), std::move(value), cells);
+  }
+
+  MeanRatio mean_of(std::string axis, std::string value, const std::vector<std::size_t>& cells) const {
+    auto [centre, logs] = mean_logs(cells);
+    MeanRatio mean{std::move(axis), std::move(value), interval(centre, std::move(logs)), cells.size()};
+    for (std::size_t i : cells) {
+      const Verdict v = out_.cells[i].verdict;
+      ++(v == Verdict::faster ? mean.faster : v == Verdict::slower ? mean.slower : v == Verdict::undecided ? mean.undecided : mean.indistinguishable);
+    }
+    return mean;
+  }
+
+  /// Divides all ratios by those of the control cells: trace by trace, builds by builds where the control has some.
+  void take_relative() {
+    std::regex expression;
+    try {
+      expression.assign(out_.options.control);
+    } catch (const std::regex_error&) {
+      throw UserError(fmt::format("--control '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes", out_.options.control));
+    }
+    bool any = false;
+    for (bool trace : {true, false}) {
+      const auto is_control = [&](const ComparedCell& c) { return c.is_trace() == trace && std::regex_search(c.a.cell.name(), expression); };
+      const std::vector<std::size_t> cells = places(is_control);
+      if (cells.empty()) continue;
+      any = true;
+      if (trace) out_.control = mean_if("control", out_.options.control, is_control);
+      const auto [centre, logs] = mean_logs(cells);
+      for (std::size_t i : places([&](const ComparedCell& c) { return c.is_trace() == trace; })) {
+        centres_[i] -= centre;
+        for (std::size_t k = 0; k < kResamples; ++k) logs_[i][k] -= logs[k];
+      }
+    }
+    if (!any) throw UserError(fmt::format("--control '{}' finds no cell that is in both; it is a regular expression on cell names, as in --control /embree/", out_.options.control));
+  }
+
+  void estimate(std::size_t i) {
+    ComparedCell& cell = out_.cells[i];
+    const std::vector<double> a = rates(cell.a);
+    std::vector<double> b = rates(cell.b);
+    cell.rate_a = bootstrap_median(a), cell.rate_b = bootstrap_median(b);
+    cell.ratio = interval(centres_[i], logs_[i]);
+    const double machine = cell.ratio.median / (cell.rate_b.median / cell.rate_a.median);  // 1 without a control
+    if (!out_.options.control.empty())
+      for (double& rate : b) rate *= machine;
+    cell.p = mann_whitney_p(a, b);
+  }
+
+  void judge() {
+    const CompareOptions& o = out_.options;
+    const double limit = 1.0 + 0.01 * o.min_difference;
+    const auto least = [](const ComparedCell& c) { return smallest_p(c.a.repetitions.size(), c.b.repetitions.size()); };
+    const std::vector<std::size_t> tested = places([&](const ComparedCell& c) { return least(c) <= o.significance; });
+    std::vector<double> p;
+    for (std::size_t i : tested) p.push_back(out_.cells[i].p);
+    p = benjamini_hochberg(p);
+    for (std::size_t k = 0; k < tested.size(); ++k) {
+      ComparedCell& cell = out_.cells[tested[k]];
+      cell.tested = true, cell.adjusted_p = p[k];
+      const bool up = cell.ratio.low > limit, down = cell.ratio.high < 1.0 / limit;
+      cell.equal = cell.ratio.low > 1.0 / limit && cell.ratio.high < limit;
+      if (up || down) {
+        // Even the clearest difference of so few repetitions would not stand out among so many cells.
+        const bool too_few = least(cell) * static_cast<double>(tested.size()) > o.significance;
+        cell.verdict = p[k] <= o.significance ? (up ? Verdict::faster : Verdict::slower) : too_few ? Verdict::undecided : Verdict::indistinguishable;
+      } else {
+        cell.verdict = Verdict::indistinguishable;
+      }
+    }
+    if (out_.count(Verdict::undecided) == 0) return;
+    out_.repetitions_needed = 1;
+    while (smallest_p(out_.repetitions_needed, out_.repetitions_needed) * static_cast<double>(out_.cells.size()) > o.significance) ++out_.repetitions_needed;
+  }
+
+  void add_means() {
+    const auto add = [&](std::optional<MeanRatio> mean) {
+      if (mean) out_.means.push_back(std::move(*mean));
+    };
+    add(mean_if("", "rays", [](const ComparedCell& c) { return c.is_trace(); }));
+    const std::vector<std::size_t> traced = places([](const ComparedCell& c) { return c.is_trace(); });
+    std::vector<Json> axes(traced.size(), Json::object());
+    for (std::size_t k = 0; k < traced.size(); ++k) add_axes(axes[k], out_.cells[traced[k]].a.cell);
+    for (const char* axis : {"scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads"}) {
+      std::vector<std::pair<std::string, std::vector<std::size_t>>> by_value;
+      for (std::size_t k = 0; k < traced.size(); ++k) {
+        const Json& value = axes[k][axis];
+        std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+        auto entry = std::ranges::find(by_value, text, &std::pair<std::string, std::vector<std::size_t>>::first);
+        if (entry == by_value.end()) entry = by_value.insert(entry, {std::move(text), {}});
+        entry->second.push_back(traced[k]);
+      }
+      if (by_value.size() < 2) continue;
+      for (const auto& [value, cells] : by_value) out_.means.push_back(mean_of(axis, value, cells));
+    }
+    add(mean_if("", "builds", [](const ComparedCell& c) { return !c.is_trace(); }));
+  }
+
+  /// Trees are the same from run to run, so any difference is a change. Each is told once.
+  void add_structures() {
+    std::set<std::string> seen;
+    for (const ComparedCell& c : out_.cells) {
+      const auto fact = [](const CellResult& r, const char* name) { return r.has_fact(name) ? std::optional(r.fact(name)) : std::nullopt; };
+      StructureChange change{fmt::format("{}/{}/{}/{}", c.a.cell.scene, c.a.cell.structure, c.a.cell.builder_name(), c.a.cell.leaf),
+                             fact(c.a, "sah_cost"), fact(c.b, "sah_cost"), fact(c.a, "bytes"), fact(c.b, "bytes")};
+      const auto changed = [](const std::optional<double>& a, const std::optional<double>& b) { return a && b && std::abs(*a - *b) > 1e-9 * std::abs(*a); };
+      if (!changed(change.sah_a, change.sah_b) && !changed(change.bytes_a, change.bytes_b)) continue;
+      const auto figure = [](const std::optional<double>& v) { return v.value_or(0.0); };
+      if (seen.insert(fmt::format("{} {} {} {} {}", change.structure, figure(change.sah_a), figure(change.sah_b), figure(change.bytes_a), figure(change.bytes_b))).second)
+        out_.structures.push_back(std::move(change));
+    }
+  }
+
+  Comparison out_;
+  std::vector<Replicates> logs_;  // of each cell
+  std::vector<double> centres_;
+};
+
+}  // namespace
+
+std::string_view to_string(Verdict verdict) noexcept {
+  switch (verdict) {
+    case Verdict::faster: return "faster";
+    case Verdict::slower: return "slower";
+    case Verdict::indistinguishable: return "indistinguishable";
+    case Verdict::undecided: return "undecided";
+  }
+  return "";
+}
+
+std::optional<double> ComparedCell::more_wrong_answers() const {
+  if (!a.has_fact("wrong_answers") || !b.has_fact("wrong_answers")) return std::nullopt;
+  return b.fact("wrong_answers") - a.fact("wrong_answers");
+}
+
+std::size_t Comparison::count(Verdict verdict) const {
+  return static_cast<std::size_t>(std::ranges::count(cells, verdict, &ComparedCell::verdict));
+}
+
+std::size_t Comparison::more_wrong() const {
+  return static_cast<std::size_t>(std::ranges::count_if(cells, [](const ComparedCell& c) { return c.more_wrong_answers().value_or(0.0) > 0.0; }));
+}
+
+Comparison compare_results(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options) {
+  return Comparer(a, b, options).run();
+}
+
+}  // namespace arboretum

@@ -1,0 +1,73 @@
+// Two runs cell by cell: how much faster B is than A, how sure that is, and what else changed.
+//
+// A cell is faster or slower where the whole bootstrap interval of the ratio of medians lies beyond the smallest difference that counts,
+// and the Mann-Whitney test, adjusted for the number of cells, finds it significant. Where the repetitions are too few for that test to
+// find anything the cell is undecided, never indistinguishable.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "experiments/result.h"
+#include "experiments/sampling.h"
+
+namespace arboretum {
+
+struct CompareOptions {
+  double min_difference = 3.0;  ///< per cent
+  double significance = 0.05;   ///< of the adjusted p-values
+  std::string control;          ///< regular expression: cells whose geometric mean all speeds are taken relative to; empty: none
+};
+
+enum class Verdict { faster, slower, indistinguishable, undecided };
+[[nodiscard]] std::string_view to_string(Verdict verdict) noexcept;
+
+struct ComparedCell {
+  CellResult a, b;
+  Interval rate_a, rate_b;  ///< rays (trace) or triangles (build) a second: thread CPU time with one thread, else wall time
+  Interval ratio;           ///< rate of B over rate of A, with the 95 % bootstrap interval of the ratio of the medians
+  double p = 1.0, adjusted_p = 1.0;
+  bool tested = false;      ///< there are repetitions enough for the test to find something
+  Verdict verdict = Verdict::undecided;
+  bool equal = false;  ///< the whole interval lies within the smallest difference that counts
+
+  [[nodiscard]] bool is_trace() const noexcept { return a.is_trace(); }
+  /// Wrong answers that B has more than A; std::nullopt where one of them was not checked.
+  [[nodiscard]] std::optional<double> more_wrong_answers() const;
+};
+
+/// Geometric mean of the ratios of some cells.
+struct MeanRatio {
+  std::string axis, value;  ///< "", "rays" and "", "builds": all of them
+  Interval ratio;           ///< of the repetitions' noise alone: another choice of cells is another mean
+  std::size_t cells = 0, faster = 0, slower = 0, indistinguishable = 0, undecided = 0;
+};
+
+/// A structure whose SAH cost or size changed.
+struct StructureChange {
+  std::string structure;  ///< scene/structure/builder/leaf
+  std::optional<double> sah_a, sah_b, bytes_a, bytes_b;
+};
+
+struct Comparison {
+  CompareOptions options;
+  std::vector<ComparedCell> cells;          ///< in A's order
+  std::vector<std::string> only_a, only_b;  ///< names
+  std::vector<std::pair<std::string, std::string>> incomparable;  ///< in both, but not the same work: name and reason
+  std::vector<MeanRatio> means;
+  std::vector<StructureChange> structures;
+  std::optional<MeanRatio> control, embree;  ///< trace cells: those of `control`; embree's where there is no control
+  std::size_t repetitions_needed = 0;        ///< of each cell, for the undecided ones
+
+  [[nodiscard]] std::size_t count(Verdict verdict) const;
+  /// Cells with more wrong answers in B.
+  [[nodiscard]] std::size_t more_wrong() const;
+  [[nodiscard]] bool is_regression() const { return count(Verdict::slower) > 0 || more_wrong() > 0; }
+};
+
+/// Throws UserError for a control that finds no cell of both.
+[[nodiscard]] Comparison compare_results(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options);
+
+}  // namespace arboretum

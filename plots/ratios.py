@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""The figure of a comparison: ratios.py COMPARISON.json OUT.png|OUT.svg. Each cell's B/A with its interval, above them the geometric means.
+
+Reads what `compare --json` writes. Exit status: 0 done, 2 a file cannot be read or written.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from plot import fail, need_matplotlib  # noqa: E402
+
+AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
+COLOURS = {"faster": "#117733", "slower": "#CC3355", "indistinguishable": "#777777", "undecided": "#BBBBBB", "mean": "#332288"}
+MOST_CELLS = 80
+
+
+def labels(cells):
+    """What tells the cells apart, and the rest once for all."""
+    varying = [axis for axis in AXES if len({cell[axis] for cell in cells}) > 1]
+    constant = [str(cells[0][axis]) for axis in AXES if axis not in varying and cells[0][axis] not in ("-", 1)]
+    return ["  ".join(str(cell[axis]) for axis in varying if cell[axis] != "-") or cell["structure"] for cell in cells], ", ".join(constant)
+
+
+def rows_of(comparison, metric):
+    """(label, ratio, low, high, kind) of one metric from the top down, and what all of its cells share."""
+    cells = [cell for cell in comparison["cells"] if cell["metric"] == metric]
+    if not cells:
+        return [], ""
+    total = {"trace": "rays", "build": "builds"}[metric]
+    rows = []
+    for mean in comparison["geometric_means"]:
+        if mean["axis"] == "all" and mean["value"] == total:
+            ratio = mean["ratio"]
+            rows.append((f"geometric mean of {mean['cells']}", ratio["median"], ratio["low"], ratio["high"], "mean"))
+    names, shared = labels(cells)
+    shown = list(zip(names, cells))
+    if len(cells) > MOST_CELLS:
+        decided = sorted((pair for pair in shown if pair[1]["verdict"] in ("faster", "slower")), key=lambda pair: pair[1]["ratio"])
+        half = MOST_CELLS // 2
+        shown = decided if len(decided) <= MOST_CELLS else decided[:half] + decided[-half:]
+        shared = f"{len(shown)} of {len(cells)} cells, those that differ most" + (f"; {shared}" if shared else "")
+    rows += [(name, cell["ratio"], cell["ratio_low"], cell["ratio_high"], cell["verdict"]) for name, cell in shown]
+    return rows, shared
+
+
+def draw(comparison):
+    import style
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+    parts = [(title, *rows_of(comparison, metric)) for metric, title in (("trace", "rays a second"), ("build", "build speed"))]
+    parts = [part for part in parts if part[1]]
+    heights = [len(rows) + 2.5 for _, rows, _ in parts]
+    figure, axes = style.plt.subplots(len(parts), 1, figsize=(8, 0.19 * sum(heights) + 0.8), squeeze=False, layout="constrained",
+                                      gridspec_kw={"height_ratios": heights})
+    limit = 1 + comparison["options"]["min_difference_percent"] / 100
+    for axis, (title, rows, shared) in zip(axes[:, 0], parts):
+        axis.axvspan(1 / limit, limit, color="#EEEEEE", zorder=0)
+        axis.axvline(1, color="#333333", linewidth=0.8, zorder=1)
+        for place, (_, ratio, low, high, kind) in enumerate(rows):
+            axis.errorbar(ratio, place, xerr=[[max(ratio - low, 0)], [max(high - ratio, 0)]], fmt="D" if kind == "mean" else "o", color=COLOURS[kind],
+                          markersize=6 if kind == "mean" else 4.5, linewidth=1.3, zorder=2)
+        axis.set_yticks(range(len(rows)), [row[0] for row in rows])
+        axis.set_ylim(len(rows) - 0.4, -0.6)
+        axis.grid(axis="y", visible=False)
+        low, high = min(row[2] for row in rows), max(row[3] for row in rows)
+        axis.set_xlim(min(low, 1 / limit) / 1.02, max(high, limit) * 1.02)
+        if high / low > 4:
+            axis.set_xscale("log")
+            axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.xaxis.set_minor_locator(NullLocator())
+        else:
+            axis.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_title(title + (f": {shared}" if shared else ""), loc="left")
+        axis.set_xlabel("B over A: right of 1, B is faster; grey: too little to count")
+    present = [kind for kind in COLOURS if any(row[4] == kind for _, rows, _ in parts for row in rows)]
+    style.legends_right(figure, [("B against A", [Line2D([], [], linestyle="", marker="D" if kind == "mean" else "o", color=COLOURS[kind], label=kind)
+                                                  for kind in present])])
+    return figure
+
+
+def main():
+    if len(sys.argv) != 3:
+        fail(f"usage: {sys.argv[0]} COMPARISON.json OUT.png")
+    need_matplotlib()
+    import style
+
+    source, target = Path(sys.argv[1]), Path(sys.argv[2])
+    try:
+        comparison = json.loads(source.read_text(encoding="utf-8"))
+        figure = draw(comparison)
+        metadata = {"Date": None, "Creator": None} if target.suffix == ".svg" else {"Software": None} if target.suffix == ".png" else None
+        figure.savefig(target, dpi=style.DPI, bbox_inches="tight", metadata=metadata)
+    except OSError as error:
+        fail(f"{error.filename or target}: {error.strerror}; the figure could not be written")
+    except (KeyError, ValueError) as error:
+        fail(f"{target}: {error}; give a file that ends in .png, .svg or .pdf")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,246 @@
+// The rank test against known values; two runs compared: nothing where nothing changed, a regression where there is one.
+#include "experiments/comparison.h"
+#include "experiments/comparison_files.h"
+#include "experiments/comparison_text.h"
+#include "experiments/rank_test.h"
+#include "core/random.h"
+#include "tests/catch.h"
+#include "tests/experiments_on_paper.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+TEST_CASE("Mann-Whitney: exact p-values, with ties, and the normal distribution beyond") {
+  // 2 / C(6, 3), 2 / C(14, 7): samples that do not overlap.
+  CHECK(mann_whitney_p(std::vector{1.0, 2.0, 3.0}, std::vector{4.0, 5.0, 6.0}) == Approx(0.1));
+  CHECK(mann_whitney_p(std::vector{1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0}, std::vector{8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0}) == Approx(2.0 / 3432.0));
+  CHECK(smallest_p(7, 7) == Approx(2.0 / 3432.0));
+  CHECK(smallest_p(1, 1) == 1.0);
+  // By hand: of the C(4, 2) = 6 pairs of ranks, sums 3 4 5 5 6 7; {1, 3} is 4, one from the mean 5, as are 3, 6 and 7.
+  CHECK(mann_whitney_p(std::vector{1.0, 3.0}, std::vector{2.0, 4.0}) == Approx(4.0 / 6.0));
+  // Ties: midranks 1.5 1.5 3.5 3.5; sums 3 5 5 5 5 7.
+  CHECK(mann_whitney_p(std::vector{1.0, 1.0}, std::vector{2.0, 2.0}) == Approx(2.0 / 6.0));
+  CHECK(mann_whitney_p(std::vector{1.0, 2.0}, std::vector{1.0, 2.0}) == Approx(1.0));
+  CHECK(mann_whitney_p(std::vector{5.0, 5.0, 5.0}, std::vector{5.0, 5.0, 5.0}) == 1.0);
+  CHECK(mann_whitney_p({}, std::vector{1.0}) == 1.0);
+  // 25 and 25 values are exact, 26 and 26 are not: the two must agree.
+  for (double shift : {0.0, 5.5, 10.5}) {
+    std::vector<double> a, b;
+    for (int i = 0; i < 25; ++i) a.push_back(i), b.push_back(i + shift);
+    const double exact = mann_whitney_p(a, b);
+    a.push_back(12.0), b.push_back(12.0 + shift);
+    CHECK(mann_whitney_p(a, b) == Approx(exact).margin(0.02));
+  }
+}
+
+TEST_CASE("Mann-Whitney finds a difference where there is none as often as it says") {
+  int found = 0;
+  constexpr int kTrials = 2000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<double> a, b;
+    for (std::uint64_t i = 0; i < 7; ++i) a.push_back(random_double(7, i, 2 * trial)), b.push_back(random_double(7, i, 2 * trial + 1));
+    found += mann_whitney_p(a, b) <= 0.05;
+  }
+  CHECK(found < 0.065 * kTrials);
+  CHECK(found > 0.025 * kTrials);
+}
+
+TEST_CASE("Benjamini-Hochberg") {
+  CHECK(benjamini_hochberg({}).empty());
+  const std::vector<double> adjusted = benjamini_hochberg(std::vector{0.04, 0.01, 0.03, 0.5});
+  CHECK(adjusted[1] == Approx(0.04));                  // 0.01 * 4
+  CHECK(adjusted[2] == Approx(0.04 * 4.0 / 3.0));      // 0.03 * 4 / 2 = 0.06, but no more than the next
+  CHECK(adjusted[0] == Approx(0.04 * 4.0 / 3.0));
+  CHECK(adjusted[3] == Approx(0.5));
+}
+
+namespace {
+
+Cell cell_named(const std::string& structure, Cell::Metric metric = Cell::Metric::trace) {
+  const bool build = metric == Cell::Metric::build;
+  Cell cell;
+  cell.metric = metric;
+  cell.scene = "bunny", cell.structure = structure, cell.builder = "binned_sah", cell.leaf = "triangle4", cell.isa = Isa::sse;
+  cell.intersector = build ? "-" : "watertight", cell.box = build ? "-" : "padded", cell.traversal = build ? "-" : "single", cell.workload = build ? "-" : "primary";
+  return cell;
+}
+
+/// A result of repetitions about `seconds`, each off by up to `noise`.
+CellResult measured(const Cell& cell, double seconds, double noise, std::uint64_t seed, unsigned repetitions = 9) {
+  CellResult result{.cell = cell, .repetitions = {}, .facts = {{"rays", 1000}, {"triangles", 500}, {"wrong_answers", 0}, {"sah_cost", 20.0}, {"bytes", 64000}}};
+  for (unsigned i = 0; i < repetitions; ++i) {
+    const double s = seconds * (1.0 + noise * (2.0 * random_double(seed, i, 0) - 1.0));
+    result.repetitions.push_back({.index = i, .iterations = 3, .wall_seconds = 6.0 * s, .cpu_seconds = 3.0 * s, .phases = {}});
+  }
+  return result;
+}
+
+std::vector<CellResult> run(std::uint64_t seed, double noise = 0.02, unsigned repetitions = 9) {
+  std::vector<CellResult> results;
+  for (const char* structure : {"bvh2", "bvh4", "bvh8", "kdtree"}) {
+    results.push_back(measured(cell_named(structure, Cell::Metric::build), 0.02, noise, ++seed * 31, repetitions));
+    results.push_back(measured(cell_named(structure), 0.1, noise, ++seed * 31, repetitions));
+  }
+  return results;
+}
+
+CellResult* find(std::vector<CellResult>& results, const std::string& structure, Cell::Metric metric = Cell::Metric::trace) {
+  for (CellResult& r : results)
+    if (r.cell.structure == structure && r.cell.metric == metric) return &r;
+  return nullptr;
+}
+
+const ComparedCell& find(const Comparison& comparison, const std::string& structure, bool trace = true) {
+  for (const ComparedCell& c : comparison.cells)
+    if (c.a.cell.structure == structure && c.is_trace() == trace) return c;
+  FAIL("no such cell");
+  return comparison.cells.front();
+}
+
+void slow_down(CellResult& result, double factor) {
+  for (Repetition& r : result.repetitions) r.wall_seconds *= factor, r.cpu_seconds *= factor;
+}
+
+}  // namespace
+
+TEST_CASE("a run compared with itself is indistinguishable, and of ratio 1") {
+  const std::vector<CellResult> a = run(1);
+  const Comparison c = compare_results(a, a, {});
+  REQUIRE(c.cells.size() == 8);
+  for (const ComparedCell& cell : c.cells) {
+    CHECK(cell.ratio.median == Approx(1.0));
+    CHECK((cell.ratio.low <= 1.0 && cell.ratio.high >= 1.0));
+    CHECK(cell.p == 1.0);
+    CHECK(cell.verdict == Verdict::indistinguishable);
+  }
+  CHECK(verdict(c).first == ExitStatus::kDone);
+  CHECK(c.structures.empty());
+  CHECK((c.only_a.empty() && c.only_b.empty()));
+}
+
+TEST_CASE("noise about equal medians is indistinguishable; however often it is tried, hardly ever a regression") {
+  int regressions = 0;
+  for (std::uint64_t trial = 0; trial < 50; ++trial) regressions += compare_results(run(1000 * trial + 1, 0.15), run(1000 * trial + 500, 0.15), {}).is_regression();
+  CHECK(regressions <= 3);  // 50 comparisons of 8 cells, of which one in twenty may be false
+}
+
+TEST_CASE("a slower structure is a regression, with the right ratio; the others are not blamed") {
+  const std::vector<CellResult> a = run(1);
+  std::vector<CellResult> b = run(900);
+  slow_down(*find(b, "bvh8"), 1.25);
+  const Comparison c = compare_results(a, b, {});
+  const ComparedCell& slow = find(c, "bvh8");
+  CHECK(slow.verdict == Verdict::slower);
+  CHECK(slow.ratio.median == Approx(0.8).epsilon(0.03));
+  CHECK((slow.ratio.low < 0.8 * 1.01 && slow.ratio.high > 0.8 * 0.99 && slow.ratio.high < 0.9));
+  CHECK(slow.adjusted_p < 0.01);
+  CHECK(c.count(Verdict::slower) == 1);
+  CHECK(verdict(c).first == ExitStatus::kRegression);
+  CHECK(comparison_text(c, false).find("slower") != std::string::npos);
+  // The other way round it is an improvement, and no regression.
+  const Comparison back = compare_results(b, a, {});
+  CHECK(find(back, "bvh8").verdict == Verdict::faster);
+  CHECK(verdict(back).first == ExitStatus::kDone);
+  // Of no concern where only more counts, nor where the interval reaches below what counts.
+  CHECK(find(compare_results(a, b, {.min_difference = 40.0, .control = {}}), "bvh8").verdict == Verdict::indistinguishable);
+  const double nearly = 100.0 * (1.0 / slow.ratio.high - 1.0) + 0.1;
+  CHECK(find(compare_results(a, b, {.min_difference = nearly, .control = {}}), "bvh8").verdict == Verdict::indistinguishable);
+
+  slow_down(*find(b, "kdtree", Cell::Metric::build), 2.0);
+  const Comparison builds = compare_results(a, b, {});
+  CHECK(find(builds, "kdtree", false).verdict == Verdict::slower);
+  CHECK(find(builds, "kdtree", false).ratio.median == Approx(0.5).epsilon(0.03));
+}
+
+TEST_CASE("significant but smaller than counts is no regression, and known to be so small") {
+  const std::vector<CellResult> a = run(1, 0.001);
+  std::vector<CellResult> b = a;
+  for (CellResult& r : b) slow_down(r, 1.01);
+  const Comparison c = compare_results(a, b, {});
+  CHECK(find(c, "bvh8").adjusted_p < 0.01);
+  CHECK(c.count(Verdict::indistinguishable) == c.cells.size());
+  CHECK(find(c, "bvh8").equal);
+  REQUIRE(!c.means.empty());
+  CHECK(c.means.front().ratio.median == Approx(1.0 / 1.01).epsilon(0.001));
+  CHECK(c.means.front().ratio.high < 1.0);
+  CHECK(compare_results(a, b, {.min_difference = 0.5, .control = {}}).count(Verdict::slower) == c.cells.size());
+}
+
+TEST_CASE("too few repetitions are undecided, never a verdict") {
+  std::vector<CellResult> a = run(1, 0.02, 3), b = run(900, 0.02, 3);
+  slow_down(*find(b, "bvh8"), 2.0);
+  const Comparison three = compare_results(a, b, {});
+  CHECK(three.count(Verdict::undecided) == three.cells.size());
+  CHECK(verdict(three).first == ExitStatus::kDone);
+  CHECK(comparison_text(three, false).find("too few repetitions") != std::string::npos);
+  CHECK(three.repetitions_needed == 6);  // 2 / C(12, 6) * 8 cells is 0.017, with five each 0.06
+  // Four can tell one cell apart, but not one of eight.
+  a = run(1, 0.02, 4), b = run(900, 0.02, 4);
+  slow_down(*find(b, "bvh8"), 2.0);
+  const Comparison four = compare_results(a, b, {});
+  CHECK(find(four, "bvh8").verdict == Verdict::undecided);
+  CHECK(find(four, "bvh2").verdict == Verdict::indistinguishable);
+  CHECK(compare_results({*find(a, "bvh8")}, {*find(b, "bvh8")}, {}).count(Verdict::slower) == 1);
+}
+
+TEST_CASE("new wrong answers are a regression, fewer are not; changed trees are told") {
+  const std::vector<CellResult> a = run(1);
+  std::vector<CellResult> b = a;
+  find(b, "bvh4")->facts["wrong_answers"] = 2;
+  find(b, "bvh2")->facts["sah_cost"] = 21.0, find(b, "bvh2")->facts["bytes"] = 32000;
+  const Comparison c = compare_results(a, b, {});
+  CHECK(c.more_wrong() == 1);
+  CHECK(verdict(c).first == ExitStatus::kRegression);
+  CHECK(verdict(compare_results(b, a, {})).first == ExitStatus::kDone);
+  REQUIRE(c.structures.size() == 1);
+  CHECK(c.structures[0].structure == "bunny/bvh2/binned_sah/triangle4");
+  CHECK(*c.structures[0].sah_b == 21.0);
+  CHECK(*c.structures[0].bytes_b == 32000);
+  find(b, "bvh4")->facts.erase("wrong_answers");
+  CHECK(compare_results(a, b, {}).more_wrong() == 0);
+  CHECK(comparison_text(compare_results(a, b, {}), false).find("checked in only one") != std::string::npos);
+}
+
+TEST_CASE("cells are matched by name; other work is not compared; nothing in common is said") {
+  std::vector<CellResult> a = run(1), b = run(1);
+  a.pop_back(), b.erase(b.begin());
+  find(b, "bvh4")->facts["rays"] = 4000;
+  const Comparison c = compare_results(a, b, {});
+  CHECK(c.cells.size() == 5);
+  CHECK(c.only_a == std::vector<std::string>{a.front().cell.name()});
+  CHECK(c.only_b == std::vector<std::string>{b.back().cell.name()});
+  REQUIRE(c.incomparable.size() == 1);
+  CHECK(c.incomparable[0].second == "1000 rays in A, 4000 in B");
+  CHECK(verdict(compare_results({a.front()}, {b.back()}, {})).first == ExitStatus::kNothingMeasured);
+}
+
+TEST_CASE("a machine that was slower as a whole: a control takes it out, and embree's cells tell it") {
+  std::vector<CellResult> a = run(1), b = run(900);
+  a.push_back(measured(cell_named("embree"), 0.1, 0.02, 77)), b.push_back(measured(cell_named("embree"), 0.1, 0.02, 78));
+  for (CellResult& r : b) slow_down(r, 1.2);
+  slow_down(*find(b, "bvh8"), 1.2);
+  const Comparison plain = compare_results(a, b, {});
+  CHECK(plain.count(Verdict::slower) == plain.cells.size());
+  CHECK(comparison_text(plain, false).find("the machine did") != std::string::npos);
+  const Comparison relative = compare_results(a, b, {.control = "^trace/.*/embree/"});
+  REQUIRE(relative.control.has_value());
+  CHECK(relative.control->ratio.median == Approx(1.0 / 1.2).epsilon(0.03));
+  CHECK(find(relative, "bvh2").verdict == Verdict::indistinguishable);
+  CHECK(find(relative, "bvh8").verdict == Verdict::slower);
+  CHECK(find(relative, "bvh8").ratio.median == Approx(1.0 / 1.2).epsilon(0.04));
+  CHECK(error_of([&] { (void)compare_results(a, b, {.control = "nothing"}); }).find("finds no cell") != std::string::npos);
+  CHECK(error_of([&] { (void)compare_results(a, b, {.control = "("}); }).find("regular expression") != std::string::npos);
+}
+
+TEST_CASE("the comparison as JSON and CSV") {
+  const std::vector<CellResult> a = run(1);
+  const Comparison c = compare_results(a, run(900), {});
+  const Json json = Json::parse(comparison_json(c, {}, {}));
+  REQUIRE(json["cells"].size() == 8);
+  CHECK(json["cells"][0]["name"] == a.front().cell.name());
+  CHECK(json["cells"][0]["ratio"].get<double>() == c.cells[0].ratio.median);
+  CHECK(json["exit_status"] == 0);
+  const std::string csv = comparison_csv(c);
+  CHECK(csv.starts_with("name,metric,scene,structure"));
+  CHECK(std::ranges::count(csv, '\n') == 9);
+}
