@@ -39,13 +39,21 @@ struct KdRay {
   /// the lanes whose axis counts: where constants may have overflown it is left out, with a reciprocal of 1 and constants by which every plane is met at all t.
   template <class F>
   static ARBORETUM_INLINE auto constants(F o, F d, F largest, float max_coordinate, float pad, F& r, F& enter, F& leave) {
+    r = F(1.0f) / d;
+    F share(pad), least(pad * 0x1p-79f);
+    // Branches, rarely taken: no division waits for `largest`.
     const auto parallel = ~(abs(d) > largest * F(0x1p-60f));
-    const F reciprocal = select(parallel, xor_sign(F(0x1p60f) / largest, sign_bits(d)), F(1.0f) / d);
-    const F e = select(parallel, F(kPad), F(pad)) * (F(max_coordinate) + abs(o)) * abs(reciprocal) + select(parallel, F(0x1p-100f), F(pad * 0x1p-79f));
-    const F at = o * reciprocal, in = at + e, out = at - e, all(kAllOfT);
-    const auto fits = abs(in) + abs(out) < F(kTooLarge);
-    r = select(fits, reciprocal, xor_sign(F(1.0f), sign_bits(reciprocal)));
-    enter = select(fits, in, all), leave = select(fits, out, -all);
+    if (__builtin_expect(any(parallel), 0)) {
+      r = select(parallel, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
+      share = select(parallel, F(kPad), share), least = select(parallel, F(0x1p-100f), least);
+    }
+    const F at = o * r, e = share * (F(max_coordinate) + abs(o)) * abs(r) + least;
+    enter = at + e, leave = at - e;
+    const auto fits = abs(enter) + abs(leave) < F(kTooLarge);
+    if (__builtin_expect(any(~fits), 0)) {
+      r = select(fits, r, xor_sign(F(1.0f), sign_bits(r)));
+      enter = select(fits, enter, F(kAllOfT)), leave = select(fits, leave, F(-kAllOfT));
+    }
     return fits;
   }
 
