@@ -9,6 +9,7 @@
 #include "core/names.h"
 #include "scenes/generators/generators.h"
 #include "scenes/readers.h"
+#include "scenes/rescale.h"
 #include "scenes/sanitise.h"
 #include "scenes/yaml_node.h"
 
@@ -95,6 +96,7 @@ Scene load_catalogue_scene(const CatalogueEntry& entry) {
                                 entry.name, entry.file.string(), entry.name));
   }
   Scene scene = read_model(entry.file);
+  rescale(scene, entry.file.string());
   sanitise(scene, entry.file.string());
   scene.name = entry.name;
   if (entry.camera) scene.camera = entry.camera;

@@ -11,6 +11,7 @@
 #include "scenes/generators/generators.h"
 #include "scenes/preflight.h"
 #include "scenes/readers.h"
+#include "scenes/rescale.h"
 #include "scenes/sanitise.h"
 #include "scenes/scene.h"
 
@@ -87,6 +88,7 @@ Scene load_scene(const SceneSpec& spec) {
     throw UserError(path.string() +
                     ": is no scene file (.yaml); name a model with 'file:' instead of 'scene:'");
   Scene scene = spec.file.empty() ? read_scene_yaml(path) : read_model(path);
+  rescale(scene, path.string());
   sanitise(scene, path.string());
   scene.name = spec.name();
   return scene;

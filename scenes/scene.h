@@ -52,6 +52,7 @@ struct LoadReport {
   std::size_t non_finite = 0;         ///< dropped: a vertex is NaN or infinite
   std::size_t out_of_range = 0;       ///< dropped: a coordinate beyond kMaxCoordinate
   std::size_t degenerate = 0;         ///< dropped: exactly zero area
+  int scaled_by = 0;                  ///< the exponent of the power of two that rescale() multiplied by; 0: it did not
   std::size_t polygons_split = 0;     ///< faces of more than three corners, triangulated
   std::vector<std::string> warnings;  ///< one line each
 };

@@ -1,8 +1,15 @@
 // Readers of every format, bad files, sanitising, polygons. Every file is written by the test.
 #include <unistd.h>
 
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "core/instances.h"
 #include "core/random.h"
 #include "scenes/polygon.h"
+#include "scenes/rescale.h"
 #include "scenes/sanitise.h"
 #include "tests/scene_files.h"
 
@@ -293,6 +300,84 @@ TEST_CASE("sanitising drops and counts, and keeps the order of the rest") {
   CHECK(scene.report.out_of_range == 1);
   CHECK(scene.report.degenerate == 2);
   for (const Vec3f& v : scene.mesh.vertices) CHECK(is_finite(v));
+}
+
+namespace {
+
+/// A triangle of `size` and one of about a thousandth of it, with camera, light, a second key frame and an instance.
+Scene scene_of_size(float size) {
+  Scene scene;
+  scene.mesh.vertices = {{0, 0, 0}, {size, 0, 0}, {0, 0.75f * size, 0}, {0, 0, 1e-3f * size}, {1e-3f * size, 0, 0}};
+  scene.mesh.triangles = {{0, 1, 2}, {0, 3, 4}};
+  scene.mesh.later_frames = {scene.mesh.vertices};
+  auto instancing = std::make_shared<Instancing>();
+  instancing->instances.resize(1);
+  instancing->instances[0].to_world.m[0][3] = size;
+  scene.mesh.instancing = instancing;
+  scene.camera = Camera{.position = {0, 0, 2 * size}, .aperture_radius = 0.5f * size, .focus_distance = size};
+  scene.lights = {Light{.position = {size, 0, 0}, .intensity = {size, size, size}}};
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("a scene out of range is multiplied by a power of two, exactly") {
+  for (const int exponent : {-120, -100, -41, 41, 70, 100}) {
+    INFO(exponent);
+    const float size = std::ldexp(1.0f, exponent);
+    Scene scene = scene_of_size(size);
+    const Scene before = scene;
+    rescale(scene, "test");
+    const int by = scene.report.scaled_by;
+    CHECK(by == -1 - exponent);
+    REQUIRE(scene.report.warnings.size() == 1);
+    CHECK(scene.report.warnings[0].find(fmt::format("multiplied by 2^{}", by)) != std::string::npos);
+    for (std::size_t i = 0; i < scene.mesh.vertices.size(); ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        CHECK(double(scene.mesh.vertices[i][axis]) == std::ldexp(double(before.mesh.vertices[i][axis]), by));
+        CHECK(scene.mesh.later_frames[0][i][axis] == scene.mesh.vertices[i][axis]);
+      }
+    CHECK(scene.camera->position.z == 1.0f);
+    CHECK(scene.camera->aperture_radius == 0.25f);
+    CHECK(scene.camera->focus_distance == 0.5f);
+    CHECK(scene.lights[0].position.x == 0.5f);
+    CHECK(double(scene.lights[0].intensity.x) == std::ldexp(double(before.lights[0].intensity.x), 2 * by));
+    CHECK(scene.mesh.instancing->instances[0].to_world.m[0][0] == std::ldexp(1.0, by));
+    CHECK(scene.mesh.instancing->instances[0].to_world.m[0][3] == 0.5);
+    sanitise(scene, "test");
+    CHECK(scene.mesh.size() == 2);
+  }
+}
+
+TEST_CASE("a scene stays as it is where a power of two would not save it") {
+  const auto unchanged = [](Scene scene) {
+    const TriangleMesh before = scene.mesh;
+    rescale(scene, "test");
+    CHECK(scene.report.scaled_by == 0);
+    CHECK(scene.report.warnings.empty());
+    return scene.mesh.vertices == before.vertices;
+  };
+  for (const int exponent : {-40, 0, 40}) CHECK(unchanged(scene_of_size(std::ldexp(1.0f, exponent))));
+  // A few triangles far out are dropped instead.
+  Scene stray = scene_of_size(1.0f);
+  stray.mesh.vertices.push_back({0, 0x1p80f, 0});
+  stray.mesh.later_frames.clear();
+  stray.mesh.triangles.resize(99, Triangle{0, 1, 2});
+  stray.mesh.triangles.push_back({0, 1, 5});
+  CHECK(unchanged(stray));
+  // From 2^-120 to 2^100: the small coordinates would lose bits.
+  Scene wide = scene_of_size(0x1p100f);
+  wide.mesh.later_frames.clear(), wide.mesh.instancing = nullptr;
+  wide.mesh.vertices[4].x = 0x1p-120f;
+  CHECK(unchanged(wide));
+  Scene lost = wide;
+  CHECK_THROWS_AS(sanitise(lost, "test"), UserError);
+  // From 2^-64 to 2^100 there is room above 1.
+  wide.mesh.vertices[4].x = 0x1p-64f;
+  rescale(wide, "test");
+  CHECK(wide.report.scaled_by == -62);
+  // Nothing to go by.
+  CHECK(unchanged(Scene{}));
 }
 
 TEST_CASE("zero area is decided exactly") {

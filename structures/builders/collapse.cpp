@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -182,32 +183,56 @@ class Collapse::Writer {
  public:
   Writer(const Collapse& collapse, ReservedArray<WideNode>& out) : collapse_(collapse), tree_(collapse.tree_), out_(out) { out.hand_out(1); }
 
-  void write(std::uint32_t index, std::uint32_t place) {
+  /// Returns the SAH cost of the subtree for a ray that enters it.
+  float write(std::uint32_t index, std::uint32_t place) {
     const BinaryNode& node = tree_.nodes[index];
+    const CollapseSettings& settings = collapse_.settings_;
     WideNode& out = out_[place];
     out.box = {node.lower, node.upper}, out.count = node.count;
     if (collapse_.is_leaf(index)) {
       const unsigned blocks = collapse_.blocks(index);
       out.first = tree_.begin_of(index);
       out.children = 0, out.blocks = blocks, out.repeats = tree_.duplicates && !node.is_leaf();
-      out.bytes = round_up(blocks * collapse_.settings_.block_bytes);
-      return;
+      out.bytes = round_up(blocks * settings.block_bytes);
+      return (kLeafVisit + float(blocks)) * settings.intersection_cost;
     }
     const Slots slots = collapse_.children(index);
     const std::uint32_t first = out.first = next_.fetch_add(slots.size, std::memory_order_relaxed);
     out_.hand_out(slots.size);
     out.children = slots.size, out.blocks = 0, out.repeats = false;
+    float costs[kMaxBranching];
+    const auto child = [&](unsigned i) { costs[i] = write(slots.node[i], first + i); };
     if (node.count > kParallel) {
-      tbb::parallel_for(0u, slots.size, [&](unsigned i) { write(slots.node[i], first + i); });
+      tbb::parallel_for(0u, slots.size, child);
     } else {
-      for (unsigned i = 0; i < slots.size; ++i) write(slots.node[i], first + i);
+      for (unsigned i = 0; i < slots.size; ++i) child(i);
     }
-    std::uint64_t bytes = round_up(collapse_.settings_.node_bytes);
-    for (unsigned i = 0; i < slots.size; ++i) bytes += out_[first + i].bytes;
+    std::uint64_t bytes = round_up(settings.node_bytes);
+    float cost = settings.traversal_cost;
+    const float area = node.half_area();
+    for (unsigned i = 0; i < slots.size; ++i) {
+      bytes += out_[first + i].bytes;
+      cost += costs[i] * (area > 0.0f ? tree_.nodes[slots.node[i]].half_area() / area : 1.0f);
+    }
     out.bytes = bytes;
+    order(&out_[first], costs, slots.size);
+    return cost;
   }
 
  private:
+  /// Puts children that cost little, such as leaves, last, where any hit looks first; others of much the same cost, within a factor of eight, stay as the builder has them,
+  /// next to each other in space.
+  static void order(WideNode* children, const float* costs, unsigned size) noexcept {
+    int cost[kMaxBranching];
+    for (unsigned i = 0; i < size; ++i) cost[i] = std::ilogb(costs[i] * 0x1.6a09e6p1f) / 3;  // round(log8(cost)): of at least 1, but for settings of one's own
+    for (unsigned i = 1; i < size; ++i) {
+      const WideNode moved = children[i];
+      const int its = cost[i];
+      unsigned to = i;
+      for (; to > 0 && cost[to - 1] < its; --to) children[to] = children[to - 1], cost[to] = cost[to - 1];
+      children[to] = moved, cost[to] = its;
+    }
+  }
   [[nodiscard]] std::uint64_t round_up(std::uint64_t bytes) const noexcept {
     const std::uint64_t granule = collapse_.settings_.granule;
     return (bytes + granule - 1) / granule * granule;
@@ -220,7 +245,7 @@ class Collapse::Writer {
 
 void Collapse::write(ReservedArray<WideNode>& out) const {
   out.reserve(tree_.node_count);
-  if (!tree_.primitives.empty()) Writer(*this, out).write(0, 0);
+  if (!tree_.primitives.empty()) (void)Writer(*this, out).write(0, 0);
 }
 
 WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings) {

@@ -49,7 +49,8 @@ struct WideNode {
 };
 static_assert(sizeof(WideNode) == 40);
 
-/// What of a binary tree becomes of a wide one: all that has to be known to write it. Node 0 is the root, children stand next to each other.
+/// What of a binary tree becomes of a wide one: all that has to be known to write it. Node 0 is the root, children stand next to each other, the ones of which the SAH expects
+/// the least work last: there any hit looks first.
 struct WideTree {
   ReservedArray<WideNode> nodes;
   MeteredVector<std::uint32_t> primitives;
