@@ -23,6 +23,7 @@ struct Arguments {
   MergeCommand merge;
   CompareCommand compare;
   VerifyCommand verify;
+  RenderCommand render;
   std::string axis, scene;
   bool json = false;
   std::filesystem::path results;
@@ -97,6 +98,27 @@ void declare_verify(CLI::App& app, VerifyCommand& verify) {
   c->add_option("--skip", verify.skip, "No combinations whose name this regular expression finds");
 }
 
+void declare_render(CLI::App& app, RenderCommand& render) {
+  CLI::App* c = app.add_subcommand("render", "A picture of a scene, with the effects that it calls for");
+  c->add_option("SCENE", render.scene, "A catalogue name, a file, or generator:triangles[:seed]")->required();
+  c->add_option("--out", render.out, "The picture: .png, or .pfm for radiance in float32 (default image.png)");
+  c->add_option("--effects", render.effects, "auto (what the scene calls for), all, or some of `list effects`: a,b,c");
+  c->add_option("--integrator", render.integrator, "path, whitted, ambient_occlusion, normals (default: path; ambient_occlusion where nothing emits light)");
+  c->add_option("--spp", render.settings.samples, "Samples a pixel (default 16)")->check(CLI::Range(1, 65536));
+  c->add_option("--resolution", render.resolution, "WIDTHxHEIGHT (default: the camera's, up to 640 a side; else 512x512)");
+  c->add_option("--depth", render.settings.depth, "Scatterings of a path at most (default 32; 1: direct light)")->check(CLI::Range(0, 4096));
+  c->add_option("--exposure", render.exposure, "auto, or stops: radiance 1 is white at 0");
+  c->add_option("--seed", render.settings.seed, "Seed of the random numbers (default 1)");
+  c->add_option("--threads", render.settings.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
+  c->add_option("--structure", render.kernel.structure, "Structure to trace with (default bvh8, bvh4_motion for what moves)");
+  c->add_option("--builder", render.kernel.builder, "Its builder");
+  c->add_option("--leaf", render.kernel.leaf, "Its leaf block");
+  c->add_option("--intersector", render.kernel.intersector, "Ray/triangle test (default watertight)");
+  c->add_option("--box", render.kernel.box, "Box test (default: what suits the intersector)");
+  c->add_option("--traversal", render.kernel.traversal, "Way of traversal (default auto, or single where the structure has none)");
+  c->add_option("--isa", render.kernel.isa, "Instruction set (default: the best)");
+}
+
 void declare(CLI::App& app, Arguments& a) {
   app.require_subcommand(0, 1);
   app.set_version_flag("--version", std::string(build_info::kVersion));
@@ -104,6 +126,7 @@ void declare(CLI::App& app, Arguments& a) {
   declare_merge(app, a.merge);
   declare_compare(app, a.compare);
   declare_verify(app, a.verify);
+  declare_render(app, a.render);
   CLI::App* list = app.add_subcommand("list", "What can be swept");
   list->add_option(
       "AXIS", a.axis,
@@ -143,6 +166,7 @@ void refuse_extras(const CLI::App& command) {
 
 ExitStatus dispatch(std::vector<std::string> words) {
   Arguments a;
+  a.render.settings.threads = 0;
   a.run.command_line = a.merge.command_line = fmt::format("arboretum {}", fmt::join(words, " "));
   CLI::App app("Arboretum: a research testbed of ray-tracing acceleration structures", "arboretum");
   declare(app, a);
@@ -175,6 +199,7 @@ ExitStatus dispatch(std::vector<std::string> words) {
   if (name == "merge") return command_merge(a.merge);
   if (name == "compare") return command_compare(a.compare);
   if (name == "verify") return command_verify(a.verify);
+  if (name == "render") return command_render(a.render);
   if (name == "list") return command_list(a.axis, a.json);
   if (name == "info") return command_info(a.scene, a.json);
   if (name == "plot") return command_plot(a.results, a.figures);

@@ -12,6 +12,8 @@
 #include "experiments/comparison.h"
 #include "experiments/config.h"
 #include "experiments/merge.h"
+#include "experiments/kernel_choice.h"
+#include "rendering/render.h"
 
 namespace arboretum {
 
@@ -57,6 +59,15 @@ struct CompareCommand {
   std::filesystem::path plot;  ///< empty: none
 };
 
+struct RenderCommand {
+  std::string scene;
+  std::filesystem::path out;     ///< empty: image.png
+  std::string effects = "auto", integrator = "auto", exposure = "auto";
+  std::string resolution;        ///< WIDTHxHEIGHT; empty: the camera's
+  RenderSettings settings;       ///< but what the words above say
+  KernelChoice kernel;
+};
+
 ExitStatus command_run(RunCommand command);
 ExitStatus command_merge(const MergeCommand& command);
 ExitStatus command_compare(const CompareCommand& command);
@@ -64,6 +75,7 @@ ExitStatus command_verify(const VerifyCommand& command);
 /// `axis` empty: all of them.
 ExitStatus command_list(const std::string& axis, bool json);
 ExitStatus command_info(const std::string& scene, bool json);
+ExitStatus command_render(const RenderCommand& command);
 ExitStatus command_plot(const std::filesystem::path& results, const std::vector<std::string>& figures);
 ExitStatus command_fetch(const std::vector<std::string>& scenes);
 

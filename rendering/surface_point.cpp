@@ -24,7 +24,8 @@ SurfacePoint::SurfacePoint(const TriangleMesh& mesh, const Ray& ray, float time,
   a_ = a;
   point_ = a + ab * u + ac * v;
   normal_ = normalize(cross(ab, ac));
-  if (dot(normal_, Vec3d(ray.direction)) > 0.0) normal_ = normal_ * -1.0;
+  front_ = !(dot(normal_, Vec3d(ray.direction)) > 0.0);
+  if (!front_) normal_ = normal_ * -1.0;
   // Bound of the rounding error of a point computed from barycentrics in float32: gamma_7 times the sum of
   // the terms' magnitudes.
   constexpr double kUnit = 0x1p-24, kGamma7 = 7.0 * kUnit / (1.0 - 7.0 * kUnit);

@@ -21,6 +21,8 @@ class SurfacePoint {
   [[nodiscard]] std::array<double, 3> exact_point() const noexcept;
   /// Of unit length, on the side that the incoming ray came from.
   [[nodiscard]] Vec3d normal() const noexcept { return normal_; }
+  /// Whether the incoming ray came from the side that sees the corners turn counter-clockwise.
+  [[nodiscard]] bool is_front() const noexcept { return front_; }
   /// Where a ray starts that leaves on the side of `side` (the normal, or its opposite).
   [[nodiscard]] Vec3f origin(Vec3d side, SelfIntersection method) const noexcept;
 
@@ -28,6 +30,7 @@ class SurfacePoint {
   [[nodiscard]] Vec3f beyond_error_bound(Vec3d side) const noexcept;
 
   Vec3d a_, point_, normal_, error_;
+  bool front_ = true;
 };
 
 /// A float32 point moved along a unit vector by 256 steps of its own number format, or by 2^-16 where it is within 2^-5 of 0.

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "core/random.h"
+#include "rendering/directions.h"
 #include "rendering/surface_point.h"
 #include "scenes/camera.h"
 
@@ -19,10 +20,6 @@ constexpr std::array<std::string_view, 6> kNames{"primary",    "shadow",  "ambie
 
 /// Random dimensions: each workload draws its own, so that two of them never share a number.
 enum Dimension : std::uint64_t { kTimeDimension = 8, kOcclusionDimension = 16, kDiffuseDimension = 32, kRandomDimension = 48 };
-
-/// A secondary ray leaves its surface at least this steeply (sine to the surface): a direction rounded to
-/// float32 must not point back into it.
-constexpr double kLeastSine = 0x1p-20;
 
 void check_known(std::string_view name) {
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return;
@@ -52,22 +49,6 @@ void visit_morton(unsigned x, unsigned y, unsigned size, const View& view, const
   visit_morton(x + half, y, half, view, visit);
   visit_morton(x, y + half, half, view, visit);
   visit_morton(x + half, y + half, half, view, visit);
-}
-
-/// The unit direction, turned away from the surface where it is too grazing to leave it for sure.
-Vec3f leaving(Vec3d direction, Vec3d side) {
-  direction = normalize(direction);
-  const double sine = dot(direction, side);
-  if (sine < kLeastSine) direction = normalize(direction + side * (kLeastSine - sine));
-  return to_float(direction);
-}
-
-/// Cosine-distributed about `normal`; by Malley's method, from the unit disc.
-Vec3d cosine_direction(Vec3d normal, std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) {
-  const double r2 = random_double(seed, index, dimension);
-  const double r = std::sqrt(r2);
-  const UnitCircle circle(random_double(seed, index, dimension + 1));
-  return Frame(normal).to_world({r * circle.cosine, r * circle.sine, std::sqrt(1.0 - r2)});
 }
 
 Vec3d point_on_sphere(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) {
@@ -211,6 +192,10 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
     if (scene.mesh.moves()) workload.times.push_back(time);
     const SurfacePoint surface(scene.mesh, primary_rays[i], time, primary_hits[i]);
     const Vec3d normal = surface.normal();
+    const auto cosine_about = [&](std::uint64_t dimension) {
+      const double u = random_double(view.seed, i, dimension), v = random_double(view.seed, i, dimension + 1);
+      return Frame(normal).to_world(cosine_direction(u, v));
+    };
     workload.sources.push_back(primary_hits[i].primitive);
     workload.starts.push_back(surface.exact_point());
     if (name == "shadow") {
@@ -223,9 +208,9 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
       const Vec3d in = normalize(Vec3d(primary_rays[i].direction));
       ray.direction = leaving(in - normal * (2.0 * dot(in, normal)), normal);
     } else if (name == "diffuse") {
-      ray.direction = leaving(cosine_direction(normal, view.seed, i, kDiffuseDimension), normal);
+      ray.direction = leaving(cosine_about(kDiffuseDimension), normal);
     } else {
-      ray.direction = leaving(cosine_direction(normal, view.seed, i, kOcclusionDimension), normal);
+      ray.direction = leaving(cosine_about(kOcclusionDimension), normal);
       ray.tfar = float(0.2 * diagonal);
     }
     Ray reference = ray;

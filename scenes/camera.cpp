@@ -32,10 +32,20 @@ RayGenerator::RayGenerator(const Camera& camera, unsigned width, unsigned height
   step_x_ = right * pixel;
   step_y_ = up * -pixel;
   corner_ = forward - step_x_ * (0.5 * double(width)) - step_y_ * (0.5 * double(height));
+  if (camera.aperture_radius > 0.0f && camera.focus_distance > 0.0f) {
+    lens_x_ = right * double(camera.aperture_radius), lens_y_ = up * double(camera.aperture_radius);
+    inverse_focus_ = 1.0 / double(camera.focus_distance);
+  }
 }
 
 Ray RayGenerator::ray(double x, double y) const noexcept {
   return Ray{.origin = origin_, .direction = to_float(normalize(corner_ + step_x_ * x + step_y_ * y))};
+}
+
+Ray RayGenerator::ray(double x, double y, double lens_x, double lens_y) const noexcept {
+  const Vec3d lens = lens_x_ * lens_x + lens_y_ * lens_y;
+  return Ray{.origin = inverse_focus_ == 0.0 ? origin_ : to_float(Vec3d(origin_) + lens),
+             .direction = to_float(normalize(corner_ + step_x_ * x + step_y_ * y - lens * inverse_focus_))};
 }
 
 std::array<float, 2> RayGenerator::pixel(Vec3d point) const noexcept {

@@ -5,25 +5,10 @@
 #include <fmt/format.h>
 
 #include "scenes/images.h"
+#include "scenes/material_kind.h"
 
 namespace arboretum {
 namespace {
-
-bool is_bright(Vec3f c) {
-  return std::max({c.x, c.y, c.z}) > 0.0f;
-}
-
-bool is_dielectric(const Material& m) {
-  const bool transparent_model = m.illum == 4 || m.illum == 5 || m.illum == 6 || m.illum == 7 || m.illum == 9;
-  return transparent_model && m.ior != 1.0f && is_bright(m.transmission);
-}
-bool is_mirror(const Material& m) {
-  return !is_dielectric(m) && (m.illum == 3 || m.illum == 5 || m.illum == 8) && is_bright(m.specular) &&
-         m.roughness == 0.0f;
-}
-bool is_glossy(const Material& m) {
-  return !is_dielectric(m) && !is_mirror(m) && is_bright(m.specular) && m.illum >= 2;
-}
 
 /// The materials that a triangle uses, and how many triangles each has.
 struct Usage {
@@ -103,12 +88,12 @@ class Effects {
   void surfaces() {
     by_material("mirror", is_mirror, "perfect reflection (illum 3, Ks > 0, Pr 0)");
     by_material("glossy", is_glossy, "rough specular lobe (Ks > 0)");
-    by_material("dielectric", is_dielectric, "refraction (illum 4 to 7 or 9, Ni other than 1, Tf > 0)");
+    by_material("dielectric", is_dielectric, "glass (illum 4 to 7 or 9, Tf > 0; Ni other than 1 or a coloured Tf)");
     if (emitters_ == 0)
       set("diffuse_gi", false, "nothing emits light");
     else
       by_material(
-          "diffuse_gi", [](const Material& m) { return is_bright(m.diffuse) || !m.diffuse_map.empty(); },
+          "diffuse_gi", is_diffuse,
           "diffuse surface (Kd > 0) in a lit scene");
   }
 
@@ -133,7 +118,7 @@ class Effects {
 
   void maps() {
     const auto cut_out = [](const Material& m) {
-      if (is_dielectric(m)) return false;
+      if (is_dielectric(m) || is_invisible(m)) return false;
       if (m.opacity < 1.0f) return true;
       const auto range = m.opacity_map.empty() ? std::nullopt : value_range(m.opacity_map);
       return range && range->least < 1.0f;

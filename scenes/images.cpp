@@ -43,20 +43,28 @@ Vec3f mean_radiance(const std::filesystem::path& image) {
   return mean;
 }
 
-std::optional<ValueRange> value_range(const std::filesystem::path& image) {
+std::optional<Image> read_image(const std::filesystem::path& image) {
   int width = 0, height = 0, channels = 0;
   const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
       stbi_load(image.c_str(), &width, &height, &channels, 0), stbi_image_free);
   if (!pixels) return std::nullopt;
+  Image read{unsigned(width), unsigned(height), unsigned(channels), {}};
+  read.pixels.assign(pixels.get(), pixels.get() + std::size_t(width) * std::size_t(height) * std::size_t(channels));
+  return read;
+}
+
+std::optional<ValueRange> value_range(const std::filesystem::path& path) {
+  const std::optional<Image> image = read_image(path);
+  if (!image) return std::nullopt;
   ValueRange range;
-  const std::size_t count = std::size_t(width) * std::size_t(height), stride = std::size_t(channels);
-  for (std::size_t i = 0; i < count; ++i) {
-    const stbi_uc* p = pixels.get() + i * stride;
+  const std::size_t stride = image->channels;
+  for (std::size_t i = 0; i < image->pixels.size(); i += stride) {
+    const std::uint8_t* p = image->pixels.data() + i;
     for (std::size_t c = 0; c < stride; ++c) {
       range.least = std::min(range.least, float(p[c]) / 255.0f);
       range.greatest = std::max(range.greatest, float(p[c]) / 255.0f);
     }
-    range.constant = range.constant && std::memcmp(p, pixels.get(), stride) == 0;
+    range.constant = range.constant && std::memcmp(p, image->pixels.data(), stride) == 0;
   }
   return range;
 }

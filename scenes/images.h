@@ -1,9 +1,10 @@
-// Images that scenes refer to, as far as they are looked at: mean radiance, and whether they hold anything
-// but one value.
+// Images that scenes refer to: their pixels, their mean radiance, and whether they hold anything but one value.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "core/vec3.h"
 
@@ -18,5 +19,13 @@ struct ValueRange {
   bool constant = true;  ///< every pixel has the first one's colour
 };
 [[nodiscard]] std::optional<ValueRange> value_range(const std::filesystem::path& image);
+
+/// Eight bits a channel, rows downwards; 1 to 4 channels: grey, grey and alpha, RGB, RGBA.
+struct Image {
+  unsigned width = 0, height = 0, channels = 0;
+  std::vector<std::uint8_t> pixels;
+};
+/// Nothing where it cannot be read.
+[[nodiscard]] std::optional<Image> read_image(const std::filesystem::path& image);
 
 }  // namespace arboretum

@@ -55,7 +55,8 @@ Vec3f color(const aiColor4D& c) {
   return {c.r, c.g, c.b};
 }
 
-Material convert(const aiMaterial& in) {
+/// `folder`: of the file, which the paths of images are relative to.
+Material convert(const aiMaterial& in, const std::filesystem::path& folder) {
   Material out;
   if (aiString name; in.Get(AI_MATKEY_NAME, name) == AI_SUCCESS) out.name = name.C_Str();
   aiColor4D c;
@@ -66,9 +67,9 @@ Material convert(const aiMaterial& in) {
   in.Get(AI_MATKEY_OPACITY, out.opacity);
   in.Get(AI_MATKEY_REFRACTI, out.ior);
   if (aiString map; in.GetTexture(aiTextureType_DIFFUSE, 0, &map) == AI_SUCCESS)
-    out.diffuse_map = map.C_Str();
+    out.diffuse_map = (folder / map.C_Str()).string();
   if (aiString map; in.GetTexture(aiTextureType_OPACITY, 0, &map) == AI_SUCCESS)
-    out.opacity_map = map.C_Str();
+    out.opacity_map = (folder / map.C_Str()).string();
 
   // The metallic-roughness model of glTF.
   float metallic = 0.0f, transmission = 0.0f;
@@ -92,12 +93,13 @@ class AssimpReader {
   AssimpReader(const std::filesystem::path& path, const aiScene& in) : name_(path.string()), in_(in) {}
 
   Scene read() {
-    for (unsigned i = 0; i < in_.mNumMaterials; ++i) scene_.materials.push_back(convert(*in_.mMaterials[i]));
+    for (unsigned i = 0; i < in_.mNumMaterials; ++i) scene_.materials.push_back(convert(*in_.mMaterials[i], std::filesystem::path(name_).parent_path()));
     if (scene_.materials.size() > 65534) throw UserError(name_ + ": more than 65534 materials");
     add_node(*in_.mRootNode, aiMatrix4x4t<double>());
     if (short_faces_ > 0)
       scene_.report.warnings.push_back(fmt::format("{}: {} points and lines left out", name_, short_faces_));
     if (scene_.mesh.triangles.empty()) throw UserError(name_ + ": no triangle in it");
+    if (!scene_.texture_coordinates.empty()) scene_.texture_coordinates.resize(scene_.mesh.size());
     return std::move(scene_);
   }
 
@@ -139,8 +141,23 @@ class AssimpReader {
       scene_.report.polygons_split += corners_.size() > 3;
       triangulate(corners_, out.vertices, out.triangles);
     }
+    if (mesh.HasTextureCoords(0)) add_texture_coordinates(mesh, first);
     if (mesh.mMaterialIndex < scene_.materials.size())
       out.materials.resize(out.triangles.size(), std::uint16_t(mesh.mMaterialIndex));
+  }
+
+  /// Of the triangles since those that have some; meshes before this one without any have (0, 0).
+  void add_texture_coordinates(const aiMesh& mesh, std::size_t first) {
+    std::vector<TextureTriangle>& all = scene_.texture_coordinates;
+    for (std::size_t i = all.size(); i < scene_.mesh.size(); ++i) {
+      const Triangle& t = scene_.mesh.triangles[i];
+      TextureTriangle coordinates{};
+      for (std::size_t k = 0; t.a >= first && k < 3; ++k) {
+        const aiVector3D& at = mesh.mTextureCoords[0][(k == 0 ? t.a : k == 1 ? t.b : t.c) - first];
+        coordinates[k] = {float(at.x), float(at.y)};
+      }
+      all.push_back(coordinates);
+    }
   }
 
   std::string name_;

@@ -51,6 +51,7 @@ struct ObjReader {
   bool material_library_seen = false;
   std::optional<std::uint16_t> material, default_material;
   std::vector<std::uint32_t> corners;
+  std::vector<std::array<float, 2>> texture_vertices, texture_corners;
   std::size_t short_faces = 0;
 
   ObjReader(const std::filesystem::path& p, std::string_view text) : path(p), buffer(text) {}
@@ -104,9 +105,35 @@ struct ObjReader {
     }
     scene.report.polygons_split += corners.size() > 3;
     triangulate(corners, scene.mesh.vertices, scene.mesh.triangles);
+    if (!texture_vertices.empty()) add_texture_coordinates(indices);
     if (scene.mesh.triangles.size() >= kNoTriangle) fail("more than 2^32 - 2 triangles");
     if (!material) use_default_material();
     scene.mesh.materials.resize(scene.mesh.triangles.size(), *material);
+  }
+
+  /// Of the triangles that the face has just become; a corner without any has (0, 0).
+  void add_texture_coordinates(const tinyobj::index_t* indices) {
+    texture_corners.assign(corners.size(), {0.0f, 0.0f});
+    const auto known = std::int64_t(texture_vertices.size());
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const std::int64_t index = indices[i].texcoord_index;
+      const std::int64_t vertex = index > 0 ? index - 1 : known + index;
+      if (index == 0) continue;
+      if (vertex < 0 || vertex >= known)
+        fail(fmt::format("texture index {} is out of range: {} 'vt' lines precede it", index, known));
+      texture_corners[i] = texture_vertices[std::size_t(vertex)];
+    }
+    std::vector<TextureTriangle>& all = scene.texture_coordinates;
+    for (std::size_t i = all.size(); i < scene.mesh.triangles.size(); ++i) {
+      TextureTriangle coordinates{};
+      const Triangle& t = scene.mesh.triangles[i];
+      const bool of_this_face = i + corners.size() - 2 >= scene.mesh.triangles.size();
+      for (std::size_t k = 0; of_this_face && k < 3; ++k) {
+        const std::uint32_t vertex = k == 0 ? t.a : k == 1 ? t.b : t.c;
+        coordinates[k] = texture_corners[std::size_t(std::ranges::find(corners, vertex) - corners.begin())];
+      }
+      all.push_back(coordinates);
+    }
   }
 
   void use_default_material() {
@@ -183,6 +210,9 @@ Scene read_obj(const std::filesystem::path& path) {
   ObjReader reader(path, bytes.text());
   tinyobj::callback_t callback;
   callback.vertex_cb = [](void* self, auto...) { static_cast<ObjReader*>(self)->add_vertex(); };
+  callback.texcoord_cb = [](void* self, tinyobj::real_t u, tinyobj::real_t v, tinyobj::real_t) {
+    static_cast<ObjReader*>(self)->texture_vertices.push_back({float(u), float(v)});
+  };
   callback.index_cb = [](void* self, tinyobj::index_t* indices, int count) {
     static_cast<ObjReader*>(self)->add_face(indices, count);
   };
@@ -197,6 +227,7 @@ Scene read_obj(const std::filesystem::path& path) {
     throw UserError(path.string() + ": " + one_line(error));
   }
   Scene& scene = reader.scene;
+  if (!scene.texture_coordinates.empty()) scene.texture_coordinates.resize(scene.mesh.size());
   if (reader.short_faces > 0) {
     scene.report.warnings.push_back(
         fmt::format("{}: {} faces of fewer than three corners left out", path.string(), reader.short_faces));

@@ -261,15 +261,19 @@ class Cursor {
   std::uint64_t index_ = 0;
 };
 
-void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh, const Failure& fail) {
+/// `texture`: becomes one pair a vertex where the file has any.
+void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh, std::vector<std::array<float, 2>>& texture, const Failure& fail) {
   const int axes[] = {element.find({"x"}), element.find({"y"}), element.find({"z"})};
   for (const int axis : axes)
     if (axis < 0 || element.properties[std::size_t(axis)].is_list)
       fail("the vertices have no properties x, y and z");
+  const int u = element.find({"u", "s", "texture_u", "texture_s"}), v_axis = element.find({"v", "t", "texture_v", "texture_t"});
+  const bool textured = u >= 0 && v_axis >= 0 && !element.properties[std::size_t(u)].is_list && !element.properties[std::size_t(v_axis)].is_list;
   mesh.vertices.reserve(element.count);
   for (std::uint64_t i = 0; i < element.count; ++i) {
     cursor.set_place(element, i);
     Vec3f v;
+    std::array<float, 2> at{};
     for (int k = 0; k < int(element.properties.size()); ++k) {
       const Property& property = element.properties[std::size_t(k)];
       if (k == axes[0])
@@ -278,10 +282,15 @@ void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh, c
         v.y = cursor.read_float(property.type);
       else if (k == axes[2])
         v.z = cursor.read_float(property.type);
+      else if (textured && k == u)
+        at[0] = cursor.read_float(property.type);
+      else if (textured && k == v_axis)
+        at[1] = cursor.read_float(property.type);
       else
         cursor.skip(property);
     }
     mesh.vertices.push_back(v);
+    if (textured) texture.push_back(at);
   }
 }
 
@@ -355,6 +364,7 @@ Scene read_ply(const std::filesystem::path& path) {
   const Header header = parse_header(bytes.text(), fail);
   Cursor cursor(bytes.text().substr(header.bytes), header.format, fail);
   Scene scene;
+  std::vector<std::array<float, 2>> texture;
   std::uint64_t vertices = 0;
   for (const Element& e : header.elements)
     if (e.name == "vertex") vertices = e.count;
@@ -369,7 +379,7 @@ Scene read_ply(const std::filesystem::path& path) {
                        element.count, one_line(element.name)));
     }
     if (element.name == "vertex" && !has_vertices) {
-      read_vertices(element, cursor, scene.mesh, fail);
+      read_vertices(element, cursor, scene.mesh, texture, fail);
       has_vertices = true;
     } else if (element.name == "face" && !has_faces) {
       if (!has_vertices) fail("the faces come before the vertices; that order is not read");
@@ -387,6 +397,8 @@ Scene read_ply(const std::filesystem::path& path) {
   if (scene.mesh.triangles.empty())
     fail(has_faces ? "no face in it" : "no element 'face' in it; a point cloud cannot be traced");
   if (scene.mesh.triangles.size() >= 0xffffffffu) fail("more than 2^32 - 2 triangles");
+  if (!texture.empty())
+    for (const Triangle& t : scene.mesh.triangles) scene.texture_coordinates.push_back({texture[t.a], texture[t.b], texture[t.c]});
   read_materials(path, scene, fail);
   return scene;
 }

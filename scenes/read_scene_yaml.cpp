@@ -193,10 +193,26 @@ class SceneFile {
     }
     for (std::size_t i = 0; i < parts_.size(); ++i)
       if (!parts_[i].instanced) placed.emplace_back(i, Transform::Identity());
+    lay_out_texture_coordinates(placed);
     Layout layout;
     for (Part& part : parts_) layout.add_part(std::move(part.model.mesh));
     for (const auto& [part, t] : placed) layout.place(std::uint32_t(part), as_map(t), parts_[part].first_material);
     scene_.mesh = layout.take(scene_.instances > 0);
+  }
+
+  /// In the order of the triangles; a mesh without any has (0, 0) where others have some.
+  void lay_out_texture_coordinates(const std::vector<std::pair<std::size_t, Transform>>& placed) {
+    std::vector<TextureTriangle>& all = scene_.texture_coordinates;
+    std::size_t triangles = 0;
+    for (const auto& [part, transform] : placed) {
+      const Scene& model = parts_[part].model;
+      if (!model.texture_coordinates.empty()) {
+        all.resize(triangles);
+        all.insert(all.end(), model.texture_coordinates.begin(), model.texture_coordinates.end());
+      }
+      triangles += model.mesh.size();
+    }
+    if (!all.empty()) all.resize(triangles);
   }
 
   std::size_t find_part(const YAML::Node& node) {

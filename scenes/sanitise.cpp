@@ -47,6 +47,8 @@ void sanitise(Scene& scene, const std::string& source) {
   report.triangles_read += mesh.triangles.size();
   const bool has_materials = mesh.materials.size() == mesh.triangles.size();
   if (!has_materials) mesh.materials.clear();
+  const bool has_texture_coordinates = scene.texture_coordinates.size() == mesh.triangles.size();
+  if (!has_texture_coordinates) scene.texture_coordinates.clear();
   std::vector<bool> stays(mesh.size());
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const Faults faults = faults_of(mesh, i);
@@ -65,10 +67,12 @@ void sanitise(Scene& scene, const std::string& source) {
     if (!stays[i]) continue;
     mesh.triangles[kept] = mesh.triangles[i];
     if (has_materials) mesh.materials[kept] = mesh.materials[i];
+    if (has_texture_coordinates) scene.texture_coordinates[kept] = scene.texture_coordinates[i];
     ++kept;
   }
   mesh.triangles.resize(kept);
   if (has_materials) mesh.materials.resize(kept);
+  if (has_texture_coordinates) scene.texture_coordinates.resize(kept);
   const auto mend = [](std::vector<Vec3f>& vertices) {
     for (Vec3f& v : vertices)
       if (!is_finite(v) || !is_in_range(v)) v = Vec3f{};

@@ -2,6 +2,7 @@
 // wrong.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -57,6 +58,9 @@ struct LoadReport {
   std::vector<std::string> warnings;  ///< one line each
 };
 
+/// Texture coordinates of a triangle's corners, v upwards; [0, 1] is one image.
+using TextureTriangle = std::array<std::array<float, 2>, 3>;
+
 /// When the shutter is open, in the time of the key frames ([0, 1]); equal times: no motion blur.
 struct Shutter {
   float open = 0.0f, close = 0.0f;
@@ -65,6 +69,7 @@ struct Shutter {
 struct Scene {
   std::string name;
   TriangleMesh mesh;
+  std::vector<TextureTriangle> texture_coordinates;  ///< one a triangle of `mesh`, or empty: the scene has none
   std::vector<Material> materials;
   std::vector<Light> lights;
   Vec3f environment{0, 0, 0};

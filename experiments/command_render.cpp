@@ -1,0 +1,162 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "core/names.h"
+#include "core/timer.h"
+#include "experiments/commands.h"
+#include "experiments/progress.h"
+#include "rendering/render.h"
+#include "scenes/camera.h"
+
+namespace arboretum {
+namespace {
+
+/// `512x384`; empty: what the scene's camera prefers, made smaller to at most kLongestSide.
+void set_resolution(const std::string& word, const Camera& camera, RenderSettings& settings) {
+  constexpr unsigned kLongestSide = 640;
+  if (word.empty()) {
+    if (camera.width == 0 || camera.height == 0) return;
+    const double shrink = std::min(1.0, double(kLongestSide) / std::max(camera.width, camera.height));
+    settings.width = std::max(1u, unsigned(std::lround(camera.width * shrink)));
+    settings.height = std::max(1u, unsigned(std::lround(camera.height * shrink)));
+    return;
+  }
+  const std::size_t cross = word.find('x');
+  const auto read = [](std::string_view text, unsigned& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size();
+  };
+  if (cross == std::string::npos || !read(std::string_view(word).substr(0, cross), settings.width) ||
+      !read(std::string_view(word).substr(cross + 1), settings.height))
+    throw UserError(fmt::format("--resolution '{}' is no WIDTHxHEIGHT, as in 640x480", word));
+}
+
+std::optional<double> parse_exposure(const std::string& word) {
+  if (word == "auto") return std::nullopt;
+  try {
+    std::size_t used = 0;
+    if (const double stops = std::stod(word, &used); used == word.size() && std::isfinite(stops)) return stops;
+  } catch (const std::exception&) {  // std::stod's way to say that it is no number
+  }
+  throw UserError(fmt::format("--exposure '{}' is neither 'auto' nor a number of stops", word));
+}
+
+/// What knows no light simulates no effect of light.
+bool takes_part(EffectKind kind, Integrator integrator) {
+  if (integrator == Integrator::path) return true;
+  if (integrator == Integrator::whitted) return kind != EffectKind::diffuse_gi;
+  return kind == EffectKind::dof || kind == EffectKind::motion_blur || kind == EffectKind::alpha_cutout || kind == EffectKind::instancing;
+}
+
+/// Without a light in it a scene is black; its shape can be seen all the same.
+Integrator chosen_integrator(const std::string& word, const std::vector<Effect>& effects) {
+  if (!word.empty() && word != "auto") return parse_integrator(word);
+  const EffectSet set = called_for(effects);
+  const bool lit = set.has(EffectKind::shadow_hard) || set.has(EffectKind::shadow_soft) || set.has(EffectKind::env_light);
+  return lit ? Integrator::path : Integrator::ambient_occlusion;
+}
+
+EffectSet simulated(EffectSet chosen, Integrator integrator) {
+  for (std::size_t i = 0; i < kEffectNames.size(); ++i)
+    if (!takes_part(EffectKind(i), integrator)) chosen = chosen.without(EffectKind(i));
+  return chosen;
+}
+
+void print_effects(const std::vector<Effect>& effects, EffectSet simulated, Integrator integrator) {
+  fmt::print("effects\n");
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    const Effect& e = effects[i];
+    const bool on = simulated.has(EffectKind(i));
+    if (on && e.called_for)
+      fmt::print("  + {:<13} {}\n", e.name, e.reason);
+    else if (on)
+      fmt::print("  + {:<13} as asked, though the scene does not call for it: {}\n", e.name, e.reason);
+    else if (e.called_for && !takes_part(EffectKind(i), integrator))
+      fmt::print("  - {:<13} no part of {}; the scene has {}\n", e.name, to_string(integrator), e.reason);
+    else if (e.called_for)
+      fmt::print("  - {:<13} LEFT OUT as asked, though the scene calls for it: {}\n", e.name, e.reason);
+    else
+      fmt::print("  - {:<13} {}\n", e.name, e.reason);
+  }
+}
+
+void print_rays(const RenderStatistics& statistics) {
+  fmt::print("rays                     rays   CPU ms   Mray/s\n");
+  const auto line = [](std::string_view name, const RenderStatistics::Rays& r) {
+    fmt::print("  {:<17} {:>9} {:>8.1f} {:>8.2f}\n", name, r.rays, 1e3 * r.seconds, r.seconds > 0.0 ? 1e-6 * double(r.rays) / r.seconds : 0.0);
+  };
+  for (std::size_t i = 0; i < kRayKindNames.size(); ++i)
+    if (statistics.of[i].rays > 0) line(kRayKindNames[i], statistics.of[i]);
+  const RenderStatistics::Rays total = statistics.total();
+  line("all", total);
+  fmt::print("  {:<17} {:>9} {:>8.1f}\n", "shading", "", 1e3 * std::max(0.0, statistics.seconds - total.seconds));
+}
+
+/// A line that is written over, on a terminal; nothing elsewhere.
+class Bar {
+ public:
+  Bar() : terminal_(::isatty(STDERR_FILENO) == 1), begin_(wall_seconds()) {}
+  Bar(const Bar&) = delete;
+  Bar& operator=(const Bar&) = delete;
+  ~Bar() {
+    if (terminal_) fmt::print(stderr, "\r\033[K");
+  }
+  void operator()(double done) {
+    const double now = wall_seconds();
+    if (!terminal_ || (now - drawn_ < 0.1 && done < 1.0)) return;
+    drawn_ = now;
+    fmt::print(stderr, "\r\033[K{:>4.0f} %  {} left", 100.0 * done, format_duration((now - begin_) * (1.0 - done) / std::max(done, 1e-3)));
+    std::fflush(stderr);
+  }
+
+ private:
+  bool terminal_;
+  double begin_, drawn_ = 0.0;
+};
+
+}  // namespace
+
+ExitStatus command_render(const RenderCommand& command) {
+  const std::filesystem::path out = command.out.empty() ? "image.png" : command.out;
+  check_picture_path(out);
+  const std::optional<double> exposure = parse_exposure(command.exposure);
+  const Scene scene = load_scene(parse_scene_word(command.scene));
+  const std::vector<Effect> effects = effects_of(scene);
+  RenderSettings settings = command.settings;
+  settings.integrator = chosen_integrator(command.integrator, effects);
+  set_resolution(command.resolution, view_of(scene), settings);
+  const EffectSet set = simulated(parse_effects(command.effects, called_for(effects)), settings.integrator);
+  const RenderScene ready(scene, set);
+  const Registry registry = this_registry();
+  const BuiltKernel built = build_kernel(command.kernel, ready.mesh(), registry);
+
+  fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
+  fmt::print("integrator    {}, {} x {}, {} sample{} a pixel, seed {}\n", to_string(settings.integrator), settings.width, settings.height,
+             settings.samples, settings.samples == 1 ? "" : "s", settings.seed);
+  fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
+  for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
+  for (const std::string& warning : ready.warnings()) fmt::print("warning       {}\n", warning);
+  print_effects(effects, set, settings.integrator);
+  std::fflush(stdout);
+
+  const BatchTracer tracer(ready, *built.accel, *built.kernel);
+  RenderStatistics statistics;
+  const double begin = wall_seconds();
+  Bar bar;
+  const Picture picture = render(tracer, settings, statistics, [&](double done) { bar(done); });
+  const double seconds = wall_seconds() - begin;
+  const double stops = exposure.value_or(auto_exposure(picture));
+  write_picture(out, picture, stops);
+  print_rays(statistics);
+  if (statistics.not_finite > 0) fmt::print("warning       {} samples were no finite number and are left out\n", statistics.not_finite);
+  fmt::print("picture       {} ({}exposure {:+.2f} stops; {:.2f} s)\n", out.string(), exposure ? "" : "automatic ", stops, seconds);
+  return ExitStatus::kDone;
+}
+
+}  // namespace arboretum

@@ -1,0 +1,35 @@
+// Picture: radiance by pixel, and what becomes of it in a file: exposure, transfer, eight bits.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "core/vec3.h"
+
+namespace arboretum {
+
+/// Linear radiance, rows downwards.
+struct Picture {
+  unsigned width = 0, height = 0;
+  std::vector<Vec3f> pixels;
+  friend bool operator==(const Picture&, const Picture&) = default;
+};
+
+/// Stops by which the picture is to be made brighter for its middle to be a middle grey: the geometric mean of the luminance of pixels
+/// that are not black, those above its 16-fold taken as that, comes to 0.18. 0 for a black picture. Rounded to quarters of a stop.
+[[nodiscard]] double auto_exposure(const Picture& picture);
+
+/// Eight bits a channel, RGB: radiance times 2^stops, clipped to [0, 1] in each channel, by the sRGB transfer function. No other
+/// tone mapping: equal radiance has equal colours in every picture of the same exposure.
+[[nodiscard]] std::vector<std::uint8_t> develop(const Picture& picture, double stops);
+
+/// Writes .png (developed) or .pfm (the radiance itself, float32, exposure not applied). Throws UserError for another extension
+/// or where it cannot be written.
+void write_picture(const std::filesystem::path& path, const Picture& picture, double stops);
+/// As a .png, of bytes that are colours already, rows downwards. Throws UserError.
+void write_png(const std::filesystem::path& path, unsigned width, unsigned height, const std::vector<std::uint8_t>& rgb);
+/// Throws UserError for an extension that write_picture does not know, or a folder that is not there: before any work.
+void check_picture_path(const std::filesystem::path& path);
+
+}  // namespace arboretum
