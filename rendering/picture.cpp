@@ -19,22 +19,26 @@
 #endif
 
 #include "core/error.h"
+#include "rendering/luminance.h"
 #include "rendering/transfer.h"
 
 namespace arboretum {
 namespace {
 
-/// Of linear Rec. 709 colours.
-double luminance(Vec3f c) { return 0.2126 * double(c.x) + 0.7152 * double(c.y) + 0.0722 * double(c.z); }
-
-double mean_log_luminance(const Picture& picture, double most) {
-  double sum = 0.0;
-  std::size_t count = 0;
-  for (const Vec3f& pixel : picture.pixels) {
-    const double y = std::min(luminance(pixel), most);
-    if (y > 0.0) sum += std::log2(y), ++count;
+/// Of squares of kBlock pixels a side, so that noise does not count as darkness; black ones left out.
+std::vector<double> block_luminances(const Picture& picture) {
+  constexpr unsigned kBlock = 8;
+  std::vector<double> blocks;
+  for (unsigned y = 0; y < picture.height; y += kBlock) {
+    for (unsigned x = 0; x < picture.width; x += kBlock) {
+      double sum = 0.0;
+      const unsigned below = std::min(y + kBlock, picture.height), right = std::min(x + kBlock, picture.width);
+      for (unsigned v = y; v < below; ++v)
+        for (unsigned u = x; u < right; ++u) sum += luminance(picture.pixels[std::size_t(v) * picture.width + u]);
+      if (sum > 0.0) blocks.push_back(sum / double((below - y) * (right - x)));
+    }
   }
-  return count > 0 ? sum / double(count) : std::log2(0.18);
+  return blocks;
 }
 
 void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
@@ -55,9 +59,11 @@ std::string pfm(const Picture& picture) {
 }  // namespace
 
 double auto_exposure(const Picture& picture) {
-  const double first = mean_log_luminance(picture, 1e300);
-  const double mean = mean_log_luminance(picture, std::exp2(first + 4.0));
-  return std::round(4.0 * std::clamp(std::log2(0.18) - mean, -60.0, 60.0)) / 4.0;
+  std::vector<double> blocks = block_luminances(picture);
+  if (blocks.empty()) return 0.0;
+  const auto quarter_from_top = blocks.begin() + std::ptrdiff_t(3 * (blocks.size() - 1) / 4);
+  std::ranges::nth_element(blocks, quarter_from_top);
+  return std::round(4.0 * std::clamp(std::log2(0.5 / *quarter_from_top), -60.0, 60.0)) / 4.0;
 }
 
 std::vector<std::uint8_t> develop(const Picture& picture, double stops) {

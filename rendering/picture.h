@@ -16,8 +16,8 @@ struct Picture {
   friend bool operator==(const Picture&, const Picture&) = default;
 };
 
-/// Stops by which the picture is to be made brighter for its middle to be a middle grey: the geometric mean of the luminance of pixels
-/// that are not black, those above its 16-fold taken as that, comes to 0.18. 0 for a black picture. Rounded to quarters of a stop.
+/// Stops that suit the picture: three quarters of it, black parts left out, come to be below half of white. Rounded to quarters
+/// of a stop; 0 for a black picture.
 [[nodiscard]] double auto_exposure(const Picture& picture);
 
 /// Eight bits a channel, RGB: radiance times 2^stops, clipped to [0, 1] in each channel, by the sRGB transfer function. No other

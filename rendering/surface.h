@@ -7,6 +7,7 @@
 
 #include "core/vec3.h"
 #include "rendering/effect_set.h"
+#include "rendering/luminance.h"
 #include "scenes/material_kind.h"
 
 namespace arboretum {
@@ -30,9 +31,5 @@ struct Surface {
 
 /// alpha is not below this: a narrower lobe cannot be told from a mirror, and its density overflows.
 inline constexpr double kLeastAlpha = 0x1p-9;
-
-[[nodiscard]] inline double luminance(Vec3f c) noexcept {
-  return 0.2126 * double(c.x) + 0.7152 * double(c.y) + 0.0722 * double(c.z);
-}
 
 }  // namespace arboretum
