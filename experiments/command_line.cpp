@@ -103,6 +103,7 @@ void declare_render(CLI::App& app, RenderCommand& render) {
   c->add_option("SCENE", render.scene, "A catalogue name, a file, or generator:triangles[:seed]")->required();
   c->add_option("--out", render.out, "The picture: .png, or .pfm for radiance in float32 (default image.png)");
   c->add_option("--effects", render.effects, "auto (what the scene calls for), all, or some of `list effects`: a,b,c");
+  c->add_option("--heatmap", render.heat_map, "In place of light: nodes or triangles that the ray through each pixel visits");
   c->add_option("--integrator", render.integrator, "path, whitted, ambient_occlusion, normals (default: path; ambient_occlusion where nothing emits light)");
   c->add_option("--spp", render.settings.samples, "Samples a pixel (default 16)")->check(CLI::Range(1, 65536));
   c->add_option("--resolution", render.resolution, "WIDTHxHEIGHT (default: the camera's, up to 640 a side; else 512x512)");
@@ -113,7 +114,7 @@ void declare_render(CLI::App& app, RenderCommand& render) {
   c->add_option("--structure", render.kernel.structure, "Structure to trace with (default bvh8, bvh4_motion for what moves)");
   c->add_option("--builder", render.kernel.builder, "Its builder");
   c->add_option("--leaf", render.kernel.leaf, "Its leaf block");
-  c->add_option("--intersector", render.kernel.intersector, "Ray/triangle test (default watertight)");
+  c->add_option("--intersector", render.kernel.intersector, "Ray/triangle test (default watertight; of embree pluecker)");
   c->add_option("--box", render.kernel.box, "Box test (default: what suits the intersector)");
   c->add_option("--traversal", render.kernel.traversal, "Way of traversal (default auto, or single where the structure has none)");
   c->add_option("--isa", render.kernel.isa, "Instruction set (default: the best)");

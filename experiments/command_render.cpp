@@ -11,6 +11,7 @@
 #include "core/timer.h"
 #include "experiments/commands.h"
 #include "experiments/progress.h"
+#include "rendering/heat_map.h"
 #include "rendering/render.h"
 #include "scenes/camera.h"
 
@@ -120,6 +121,24 @@ class Bar {
   double begin_, drawn_ = 0.0;
 };
 
+/// The work of the camera's rays in place of light.
+void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSettings settings, const std::filesystem::path& out) {
+  const HeatCount what = parse_heat_count(command.heat_map);
+  if (out.extension() != ".png") throw UserError(fmt::format("{}: heat maps are written as .png", out.string()));
+  const RenderScene ready(scene, called_for(effects_of(scene)).without(EffectKind::dof));
+  KernelChoice choice = command.kernel;
+  if (choice.traversal == "auto") choice.traversal = "single";
+  const BuiltKernel built = build_kernel(choice, ready.mesh(), this_registry());
+  const HeatMap map = count_work(BatchTracer(ready, *built.accel, *built.kernel), settings, what);
+  const DrawnPicture picture = draw(map, command.heat_map + " a ray");
+  write_png(out, picture.width, picture.height, picture.rgb);
+  fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
+  fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
+  fmt::print("heat map      {} a camera ray: mean {:.2f}, median {}, most {}; the brightest colour is {}\n", command.heat_map, map.mean, map.median,
+             map.most, map.top);
+  fmt::print("picture       {} ({} x {} rays)\n", out.string(), map.width, map.height);
+}
+
 }  // namespace
 
 ExitStatus command_render(const RenderCommand& command) {
@@ -131,11 +150,14 @@ ExitStatus command_render(const RenderCommand& command) {
   RenderSettings settings = command.settings;
   settings.integrator = chosen_integrator(command.integrator, effects);
   set_resolution(command.resolution, view_of(scene), settings);
+  check(settings);
+  if (!command.heat_map.empty()) {
+    render_heat_map(command, scene, settings, out);
+    return ExitStatus::kDone;
+  }
   const EffectSet set = simulated(parse_effects(command.effects, called_for(effects)), settings.integrator);
   const RenderScene ready(scene, set);
-  const Registry registry = this_registry();
-  const BuiltKernel built = build_kernel(command.kernel, ready.mesh(), registry);
-
+  const BuiltKernel built = build_kernel(command.kernel, ready.mesh(), this_registry());
   fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
   fmt::print("integrator    {}, {} x {}, {} sample{} a pixel, seed {}\n", to_string(settings.integrator), settings.width, settings.height,
              settings.samples, settings.samples == 1 ? "" : "s", settings.seed);

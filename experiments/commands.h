@@ -63,6 +63,7 @@ struct RenderCommand {
   std::string scene;
   std::filesystem::path out;     ///< empty: image.png
   std::string effects = "auto", integrator = "auto", exposure = "auto";
+  std::string heat_map;          ///< empty, nodes or triangles
   std::string resolution;        ///< WIDTHxHEIGHT; empty: the camera's
   RenderSettings settings;       ///< but what the words above say
   KernelChoice kernel;

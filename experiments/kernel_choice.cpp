@@ -52,12 +52,16 @@ BuiltKernel build_kernel(const KernelChoice& choice, const TriangleMesh& mesh, c
   const Isa isa = chosen_isa(choice.isa, registry);
   const StructureInfo& info = chosen_structure(choice.structure, mesh, registry).info;
   const StructureEntry* below = info.takes_below ? registry.structure(BuilderParameters{}.below) : nullptr;
-  const std::string intersector = choice.intersector == kAuto ? "watertight" : choice.intersector;
+  std::string intersector = choice.intersector;
+  if (intersector == kAuto) {
+    const bool has_watertight = std::ranges::any_of(
+        registry.kernels, [&](const KernelRow& row) { return row.structure == info.name && row.intersector == "watertight"; });
+    intersector = has_watertight ? "watertight" : "pluecker";
+  }
   const std::string box = choice.box == kAuto ? std::string(default_box(intersector)) : choice.box;
   std::string leaf = choice.leaf;
   if (leaf == kAuto) leaf = registry.default_leaf(below ? below->info.name : info.name, intersector, isa);
   std::string traversal = resolve_traversal(choice.traversal, isa);
-
   BuiltKernel built;
   built.kernel = registry.kernel(info.name, leaf, intersector, box, traversal, isa);
   if (!built.kernel && choice.traversal == kAuto)

@@ -12,7 +12,8 @@ namespace arboretum {
 struct KernelChoice {
   std::string structure = "auto";  ///< bvh8, or bvh4_motion for a mesh that moves
   std::string builder = "auto", leaf = "auto";
-  std::string intersector = "watertight", box = "auto";
+  std::string intersector = "auto";  ///< watertight, or pluecker where the structure has no kernels of it (embree)
+  std::string box = "auto";
   std::string traversal = "auto";  ///< the structure's way called so, else single rays
   std::string isa = "auto";        ///< the best of this machine
   unsigned threads = 0;            ///< of the build; 0: one a core

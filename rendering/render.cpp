@@ -19,14 +19,6 @@ namespace {
 constexpr unsigned kTile = 32;              // pixels a side
 constexpr unsigned kSamplesTogether = 16;   // of a pixel: 16 384 paths a wave
 
-void check(const RenderSettings& s) {
-  constexpr unsigned kMost = 65536;
-  const auto within = [](unsigned x) { return x >= 1 && x <= kMost; };
-  if (!within(s.width) || !within(s.height))
-    throw UserError("resolution " + std::to_string(s.width) + "x" + std::to_string(s.height) + " is not possible; each must be within 1 to 65536");
-  if (!within(s.samples)) throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
-}
-
 /// Radiance of the camera rays of some samples.
 void trace_wave(const BatchTracer& tracer, const RenderSettings& settings, PathWave& paths, TracedRays& rays, std::span<Vec3d> radiance,
                 RenderStatistics& statistics) {
@@ -67,6 +59,14 @@ void render_tile(const BatchTracer& tracer, const RenderSettings& settings, unsi
 }
 
 }  // namespace
+
+void check(const RenderSettings& s) {
+  constexpr unsigned kMost = 65536;
+  const auto within = [](unsigned x) { return x >= 1 && x <= kMost; };
+  if (!within(s.width) || !within(s.height))
+    throw UserError("resolution " + std::to_string(s.width) + "x" + std::to_string(s.height) + " is not possible; each must be within 1 to 65536");
+  if (!within(s.samples)) throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
+}
 
 Integrator parse_integrator(const std::string& word) {
   const auto found = std::ranges::find(kIntegratorNames, word);

@@ -38,7 +38,9 @@ struct RenderSettings {
 /// Told how much is done, within [0, 1]; may be called from several threads, one at a time.
 using RenderProgress = std::function<void(double)>;
 
-/// What `tracer` holds must be ready for rays. Throws UserError for a size or count of 0, or beyond 65 536.
+/// Throws UserError for a size or count of 0, or beyond 65 536.
+void check(const RenderSettings& settings);
+/// What `tracer` holds must be ready for rays. Throws UserError as check() does.
 [[nodiscard]] Picture render(const BatchTracer& tracer, const RenderSettings& settings, RenderStatistics& statistics,
                              const RenderProgress& progress = {});
 

@@ -1,12 +1,15 @@
 // The parts of rendering: effect sets, random numbers, textures, surfaces and their lobes, lights, pictures in files.
 #include <numbers>
+#include <numeric>
 
 #include "rendering/bsdf.h"
+#include "rendering/heat_map.h"
 #include "rendering/lights.h"
 #include "rendering/picture.h"
 #include "rendering/sampler.h"
 #include "rendering/texture.h"
 #include "rendering/transfer.h"
+#include "scenes/camera.h"
 #include "tests/render_scenes.h"
 #include "tests/scene_files.h"
 #include "tests/small_meshes.h"
@@ -105,6 +108,14 @@ TEST_CASE("texture coordinates come from files, for triangles and polygons, and 
 }
 
 namespace {
+
+Scene lone_box() {
+  Scene scene;
+  add_box(scene, {-1, -1, -1}, {1, 1, 1});
+  scene.materials.emplace_back();
+  scene.camera = Camera{.position = {3, 2, 5}, .look_at = {0, 0, 0}, .vertical_fov = 50};
+  return scene;
+}
 
 const Material kPlastic{.diffuse = {0.3f, 0.6f, 0.9f}, .specular = {0.04f, 0.04f, 0.04f}, .roughness = 0.5f};
 const Material kSatin{.diffuse = {0.5f, 0.5f, 0.5f}, .specular = {0.4f, 0.6f, 0.5f}, .roughness = 0.7f};
@@ -281,6 +292,55 @@ TEST_CASE("pictures: developed by exposure and sRGB, and the same again from the
   CHECK(std::memcmp(bytes.data() + header.size() + 36, picture.pixels.data(), 36) == 0);  // the first row comes last
   CHECK(error_of([&] { write_picture(folder.path() / "a.jpg", picture, 0); }).find(".png") != std::string::npos);
   CHECK(error_of([&] { write_picture(folder.path() / "no" / "a.png", picture, 0); }).find("no such folder") != std::string::npos);
+}
+
+TEST_CASE("heat colours: lightness rises evenly") {
+  const auto lightness = [](std::array<std::uint8_t, 3> c) {
+    const double y = luminance({srgb_to_linear(float(c[0]) / 255), srgb_to_linear(float(c[1]) / 255), srgb_to_linear(float(c[2]) / 255)});
+    return y > 0.008856 ? 116.0 * std::cbrt(y) - 16.0 : 903.3 * y;
+  };
+  CHECK(lightness(heat_color(0)) < 8.0);
+  CHECK(lightness(heat_color(1)) > 94.0);
+  CHECK(heat_color(-1) == heat_color(0));
+  CHECK(heat_color(2) == heat_color(1));
+  for (int i = 0; i <= 32; ++i) CHECK(lightness(heat_color(i / 32.0)) == Approx(6.0 + 90.0 * i / 32.0).margin(0.5));
+}
+
+TEST_CASE("heat maps: what the counting kernel counts for each pixel's ray, with a bar") {
+  Scene scene = lone_box();
+  const RenderScene ready(scene, {});
+  const std::string_view leaf = default_leaf("bvh4", "watertight", best_isa());
+  const KernelRow* row = find_kernel("bvh4", leaf, "watertight", "padded", "single", best_isa());
+  REQUIRE(row);
+  BuildSettings build;
+  build.leaf = leaf, build.isa = best_isa();
+  BuildReport report;
+  const auto accel = build_structure("bvh4", ready.mesh(), build, report);
+  const BatchTracer tracer(ready, *accel, *row);
+  const RenderSettings settings{.width = 20, .height = 10};
+  const RayGenerator camera(*scene.camera, 20, 10);
+  Counters all;
+  for (unsigned y = 0; y < 10; ++y) {
+    for (unsigned x = 0; x < 20; ++x) {
+      const Ray ray = camera.ray(x + 0.5, y + 0.5);
+      Hit hit;
+      row->closest_hit(*accel, RayBatch({&ray, 1}, {}), {&hit, 1}, &all);
+    }
+  }
+  const HeatMap nodes = count_work(tracer, settings, HeatCount::nodes), triangles = count_work(tracer, settings, HeatCount::triangles);
+  CHECK(std::accumulate(nodes.counts.begin(), nodes.counts.end(), std::uint64_t{0}) == all.nodes);
+  CHECK(std::accumulate(triangles.counts.begin(), triangles.counts.end(), std::uint64_t{0}) == all.triangles);
+  CHECK(triangles.mean == Approx(double(all.triangles) / 200));
+  CHECK(triangles.most == *std::ranges::max_element(triangles.counts));
+  const DrawnPicture drawn = draw(triangles, "triangles a ray");
+  CHECK(drawn.width > 20);
+  CHECK(drawn.rgb.size() == std::size_t(3) * drawn.width * drawn.height);
+  const auto pixel = [&](unsigned x, unsigned y) {
+    const std::uint8_t* p = drawn.rgb.data() + 3 * (std::size_t(y) * drawn.width + x);
+    return std::array<std::uint8_t, 3>{p[0], p[1], p[2]};
+  };
+  for (const unsigned x : {0u, 9u, 19u}) CHECK(pixel(x, 4) == heat_color(double(triangles.counts[4 * 20 + x]) / double(triangles.top)));
+  CHECK(error_of([] { static_cast<void>(parse_heat_count("node")); }).find("did you mean 'nodes'") != std::string::npos);
 }
 
 TEST_CASE("automatic exposure brings three quarters of what is not black below half of white") {

@@ -1,0 +1,129 @@
+#include "rendering/heat_map.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wsign-compare"
+#endif
+#include <stb/stb_easy_font.h>
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+#include "core/error.h"
+#include "core/names.h"
+#include "scenes/camera.h"
+
+namespace arboretum {
+namespace {
+
+/// What is drawn on, with the few shapes that a colour bar needs.
+class Sheet {
+ public:
+  Sheet(unsigned width, unsigned height) : picture_{width, height, std::vector<std::uint8_t>(std::size_t(3) * width * height, 255)} {}
+  void set(unsigned x, unsigned y, std::array<std::uint8_t, 3> color) {
+    if (x < picture_.width && y < picture_.height) std::ranges::copy(color, picture_.rgb.begin() + std::ptrdiff_t(3 * (std::size_t(y) * picture_.width + x)));
+  }
+  void fill(unsigned x, unsigned y, unsigned width, unsigned height, std::array<std::uint8_t, 3> color) {
+    for (unsigned v = y; v < y + height; ++v)
+      for (unsigned u = x; u < x + width; ++u) set(u, v, color);
+  }
+  /// Letters 7 pixels high, times `scale`.
+  void write(unsigned x, unsigned y, unsigned scale, std::string text) {
+    struct Corner {
+      float x, y, z;
+      unsigned char color[4];
+    };
+    std::vector<Corner> corners(4 * 64 * (text.size() + 1));
+    const int letters = stb_easy_font_print(0, 0, text.data(), nullptr, corners.data(), int(corners.size() * sizeof(Corner)));
+    for (std::size_t i = 0; i < std::size_t(letters); ++i) {
+      const Corner &low = corners[4 * i], &high = corners[4 * i + 2];
+      fill(x + unsigned(low.x) * scale, y + unsigned(low.y) * scale, unsigned(high.x - low.x) * scale, unsigned(high.y - low.y) * scale, {0, 0, 0});
+    }
+  }
+  [[nodiscard]] static unsigned width_of(std::string text, unsigned scale) { return unsigned(stb_easy_font_width(text.data())) * scale; }
+  [[nodiscard]] DrawnPicture take() { return std::move(picture_); }
+
+ private:
+  DrawnPicture picture_;
+};
+
+/// 1, 2 or 5 times a power of ten, so that the scale has four to ten of them.
+std::uint64_t tick_step(std::uint64_t top) {
+  std::uint64_t step = 1;
+  for (std::uint64_t power = 1;; power *= 10) {
+    for (const std::uint64_t times : {1u, 2u, 5u}) {
+      step = times * power;
+      if (top / step <= 8) return step;
+    }
+  }
+}
+
+void summarise(HeatMap& map) {
+  std::vector<std::uint64_t> sorted = map.counts;
+  std::ranges::sort(sorted);
+  map.mean = std::accumulate(sorted.begin(), sorted.end(), 0.0) / double(sorted.size());
+  map.median = sorted[sorted.size() / 2], map.most = sorted.back();
+  map.top = std::max<std::uint64_t>(1, sorted[(sorted.size() - 1) - (sorted.size() - 1) / 500]);
+}
+
+}  // namespace
+
+HeatCount parse_heat_count(const std::string& word) {
+  const auto found = std::ranges::find(kHeatCountNames, word);
+  if (found == kHeatCountNames.end())
+    throw UserError(unknown_name_message("heat map", word, std::vector<std::string>(kHeatCountNames.begin(), kHeatCountNames.end())));
+  return HeatCount(found - kHeatCountNames.begin());
+}
+
+HeatMap count_work(const BatchTracer& tracer, const RenderSettings& settings, HeatCount what) {
+  if (!tracer.kernel().counts()) throw UserError(std::string(tracer.kernel().structure) + " does not count its work: no heat map of it");
+  HeatMap map{.width = settings.width, .height = settings.height, .counts = std::vector<std::uint64_t>(std::size_t(settings.width) * settings.height)};
+  const RayGenerator camera(tracer.scene().camera(), settings.width, settings.height);
+  const Shutter shutter = tracer.scene().shutter();
+  const float time = tracer.scene().mesh().moves() ? 0.5f * (shutter.open + shutter.close) : 0.0f;
+  tbb::task_arena arena(settings.threads == 0 ? tbb::task_arena::automatic : int(settings.threads));
+  arena.execute([&] {
+    tbb::parallel_for(0u, settings.height, [&](unsigned y) {
+      for (unsigned x = 0; x < settings.width; ++x) {
+        const Ray ray = camera.ray(x + 0.5, y + 0.5);
+        Hit hit;
+        Counters counters;
+        tracer.kernel().closest_hit(tracer.accel(), RayBatch({&ray, 1}, {&time, 1}), {&hit, 1}, &counters);
+        map.counts[std::size_t(y) * settings.width + x] = what == HeatCount::nodes ? counters.nodes : counters.triangles;
+      }
+    });
+  });
+  summarise(map);
+  return map;
+}
+
+DrawnPicture draw(const HeatMap& map, const std::string& unit) {
+  const unsigned scale = map.height >= 360 ? 2 : 1, margin = 8 * scale, bar = 14 * scale, letter = 8 * scale;
+  const std::string top = std::to_string(map.top) + (map.most > map.top ? "+" : "");
+  const unsigned labels = std::max(bar + 5 * scale + Sheet::width_of(top, scale), Sheet::width_of(unit, scale));
+  Sheet sheet(map.width + 2 * margin + labels, std::max(map.height, 12 * letter));
+  for (unsigned y = 0; y < map.height; ++y)
+    for (unsigned x = 0; x < map.width; ++x) sheet.set(x, y, heat_color(double(map.counts[std::size_t(y) * map.width + x]) / double(map.top)));
+  const unsigned left = map.width + margin, high = 3 * letter, low = std::max(map.height, 12 * letter) - 2 * letter;
+  sheet.write(left, letter / 2, scale, unit);
+  for (unsigned y = high; y <= low; ++y) sheet.fill(left, y, bar, 1, heat_color(double(low - y) / double(low - high)));
+  const std::uint64_t step = tick_step(map.top);
+  const auto tick = [&](std::uint64_t count, const std::string& text) {
+    const auto y = unsigned(std::lround(double(low) - double(low - high) * double(count) / double(map.top)));
+    sheet.fill(left + bar, y, 3 * scale, scale, {0, 0, 0});
+    sheet.write(left + bar + 5 * scale, y - 3 * scale, scale, text);
+  };
+  for (std::uint64_t count = 0; count + step / 2 < map.top; count += step) tick(count, std::to_string(count));
+  tick(map.top, top);
+  return sheet.take();
+}
+
+}  // namespace arboretum

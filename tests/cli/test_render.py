@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""`render` and the renderers as workloads, from outside: test_render.py ARBORETUM."""
+
+import json
+import unittest
+
+from command_line_case import CommandLineCase
+
+CUBE = """\
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 1 2 3\nf 1 3 4\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 3 4 8\nf 3 8 7\n"""
+
+
+class Render(CommandLineCase):
+    def render(self, *words):
+        result = self.call("render", "cornell_box:600", "--resolution", "16x12", "--spp", "2", *words)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def test_render_writes_a_picture_and_says_what_it_simulates(self):
+        text = self.render()
+        self.assertEqual((self.folder / "image.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        for line in ("  + mirror ", "  + shadow_soft ", "  - dof ", "  camera                  384 ", "picture       image.png"):
+            self.assertIn(line, text)
+        self.assertNotIn("env_light  ", text.split("rays  ")[1])
+        self.assertIn("  - mirror        LEFT OUT as asked", self.render("--effects", "shadow_soft,diffuse_gi", "--out", "less.png"))
+        self.assertIn("  + dof           as asked, though the scene does not call for it", self.render("--effects", "all"))
+
+    def test_render_is_the_same_for_all_effects_structures_and_threads(self):
+        pictures = set()
+        for i, words in enumerate(((), ("--effects", "all"), ("--structure", "kdtree"), ("--structure", "bvh16", "--traversal", "queued"), ("--threads", "2"))):
+            self.render("--out", f"{i}.pfm", *words)
+            pictures.add((self.folder / f"{i}.pfm").read_bytes())
+        self.assertEqual(len(pictures), 1)
+        self.render("--seed", "2", "--out", "other.pfm")
+        self.assertNotIn((self.folder / "other.pfm").read_bytes(), pictures)
+
+    def test_render_other_integrators_and_heat_maps(self):
+        for integrator in ("whitted", "ambient_occlusion", "normals"):
+            self.assertIn(f"integrator    {integrator}", self.render("--integrator", integrator))
+        self.assertIn("no part of normals", self.render("--integrator", "normals"))
+        for what in ("nodes", "triangles"):
+            self.assertIn(f"heat map      {what} a camera ray: mean", self.render("--heatmap", what))
+        (self.folder / "cube.obj").write_text(CUBE)
+        dark = self.call("render", "cube.obj", "--resolution", "8x8")
+        self.assertIn("ambient_occlusion", dark.stdout)  # nothing emits light
+
+    def test_render_errors(self):
+        cases = [
+            (("--effects", "mirrors"), "did you mean 'mirror'"),
+            (("--integrator", "paht"), "did you mean 'path'"),
+            (("--heatmap", "nods"), "did you mean 'nodes'"),
+            (("--structure", "bvh9"), "did you mean 'bvh"),
+            (("--builder", "sah"), "builder"),
+            (("--structure", "kdtree", "--builder", "ploc"), "ploc"),
+            (("--resolution", "16"), "WIDTHxHEIGHT"),
+            (("--resolution", "0x5"), "resolution 0x5"),
+            (("--spp", "0"), "--spp"),
+            (("--exposure", "bright"), "--exposure"),
+            (("--out", "a.jpg"), ".png"),
+            (("--out", "nowhere/a.png"), "no such folder"),
+            (("--heatmap", "nodes", "--out", "a.pfm"), ".png"),
+            (("--isa", "ssse"), "did you mean 'sse'"),
+            (("--sppp", "4"), "did you mean '--spp'"),
+        ]
+        for words, part in cases:
+            with self.subTest(words=words):
+                self.assert_error(self.call("render", "cornell_box:600", *words), part)
+        self.assert_error(self.call("render", "waving_cloth:200", "--structure", "bvh8"), "bvh4_motion")
+
+
+if __name__ == "__main__":
+    unittest.main()
