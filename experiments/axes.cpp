@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "intersectors/promises.h"
+#include "experiments/rendered_rays.h"
 #include "rendering/hard_workload.h"
 
 namespace arboretum {
@@ -77,6 +78,8 @@ constexpr Summary kWorkloads[] = {
     {"reflection", "closest hit, from the primary hits along the mirror direction"},
     {"diffuse", "closest hit, from the primary hits, cosine-distributed"},
     {"random", "closest hit, between two uniform points of the bounding sphere"},
+    {"whitted", "a picture by Whitted's method, shading included: direct light, mirrors, glass"},
+    {"path", "a picture by path tracing, shading included"},
     {"hard", "closest hit, all kinds of hard rays but `far` in turn: what accuracy is measured by"},
     {"hard_vertex", "closest hit, aimed at vertices, every fourth exactly"},
     {"hard_edge", "closest hit, aimed at edges that two triangles share"},
@@ -202,6 +205,7 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
       break;
     case Axis::workload:
       for (std::string_view name : workload_names()) append_new(list, name);
+      for (std::string_view name : rendered_workload_names()) append_new(list, name);
       for (std::string_view name : hard_workload_names()) append_new(list, name);
       break;
     case Axis::threads:

@@ -17,6 +17,7 @@
 #include "experiments/sampling.h"
 #include "experiments/scene_data.h"
 #include "experiments/structure_pool.h"
+#include "experiments/render_job.h"
 #include "experiments/trace_job.h"
 
 namespace arboretum {
@@ -138,19 +139,27 @@ class Runner {
   }
 
   void trace_workload(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {
-    const Workload& workload = data.workload(cells.front()->workload, cells.front()->start);
+    const std::string& name = cells.front()->workload;
+    if (is_rendered(name)) return measure<RenderJob>(cells, data.rendered(name), data, pool);
+    const Workload& workload = data.workload(name, cells.front()->start);
     if (workload.rays.empty()) {
       for (const Cell* cell : cells)
         fail(*cell, fmt::format("no {} rays: no primary ray hits the scene", workload.name));
       return;
     }
     if (experiment_.metrics.accuracy && !workload.pixels.empty()) keep_seen_points(data, workload);
+    measure<TraceJob>(cells, workload, data, pool);
+  }
+
+  /// Job: TraceJob or RenderJob, of the rays that it takes.
+  template <class Job, class Rays>
+  void measure(const std::vector<const Cell*>& cells, const Rays& rays, SceneData& data, StructurePool& pool) {
     AnswerBuffers buffers;
-    std::deque<TraceJob> jobs;
+    std::deque<Job> jobs;
     std::vector<InterleavedJob> interleaved;
     for (const Cell* cell : cells) {
       const Accel& accel = pool.get(*cell);
-      TraceJob& job = jobs.emplace_back(*cell, accel, workload, buffers);
+      Job& job = jobs.emplace_back(*cell, accel, rays, buffers);
       Running& running = begin(*cell);
       running.result.facts.update(pool.facts(*cell, accel));
       running.result.facts.update(data.facts());

@@ -80,12 +80,27 @@ const Workload& SceneData::workload(const std::string& name, SurfaceStart start)
   if (is_hard(name)) return keep(name, start.method, make_hard_workload(name, scene_, view_));
   if (name == "primary") return keep(name, start.method, make_primary(scene_, view_));
   const Workload& primary = workload("primary");
-  if (starts_on_surfaces(name) && primary_hits_.empty()) {
-    for (const ExactHit& exact : closest_truth(primary)) primary_hits_.push_back(exact.hit);
-  }
+  if (starts_on_surfaces(name)) static_cast<void>(primary_hits());
   View view = view_;
   view.start = start;
   return keep(name, start.method, make_workload(name, scene_, view, primary.batch(), primary_hits_));
+}
+
+const std::vector<Hit>& SceneData::primary_hits() {
+  if (primary_hits_.empty())
+    for (const ExactHit& exact : closest_truth(workload("primary"))) primary_hits_.push_back(exact.hit);
+  return primary_hits_;
+}
+
+const RenderedRays& SceneData::rendered(const std::string& name) {
+  if (const auto known = rendered_.find(name); known != rendered_.end()) return known->second;
+  const Vec3d light = light_position(scene_, workload("primary").batch(), primary_hits());
+  const Oracle& exact = oracle();
+  const double begin = wall_seconds();
+  const RenderedRays& rays = rendered_.try_emplace(name, name, scene_, view_, light, exact).first->second;
+  note_(fmt::format("{}/{}: {} rays of the renderer and their exact answers in {:.2f} s", name_, name, rays.closest().rays.size() + rays.any().rays.size(),
+                    wall_seconds() - begin));
+  return rays;
 }
 
 template <class Answers, class Compute>
@@ -158,6 +173,14 @@ double SceneData::start_distance(const Workload& workload) const {
     sum += length(Vec3d(workload.rays[i].origin) - Vec3d(p[0], p[1], p[2])) + double(workload.rays[i].tnear);
   }
   return sum / (diagonal * double(std::max<std::size_t>(workload.starts.size(), 1)));
+}
+
+AnswerCheck SceneData::check(const RenderedRays& rays, std::span<const Hit> answers) {
+  return oracle().check_closest_hit(rays.closest().batch(), rays.closest_truth(), answers);
+}
+
+AnswerCheck SceneData::check(const RenderedRays& rays, std::span<const std::uint8_t> answers) {
+  return oracle().check_any_hit(rays.any().batch(), rays.any_truth(), answers);
 }
 
 AnswerCheck SceneData::check(const Workload& workload, std::span<const Hit> answers) {

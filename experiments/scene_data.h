@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "experiments/config.h"
+#include "experiments/rendered_rays.h"
 #include "experiments/result.h"
 #include "oracle/start_check.h"
 #include "rendering/workload.h"
@@ -33,9 +34,13 @@ class SceneData {
   [[nodiscard]] const Json& facts() const noexcept { return facts_; }
   /// `start`: of workloads whose rays start on surfaces. The reference stays.
   [[nodiscard]] const Workload& workload(const std::string& name, SurfaceStart start = {});
+  /// `whitted` or `path`, with the exact answers to its recorded rays.
+  [[nodiscard]] const RenderedRays& rendered(const std::string& name);
   /// Against the oracle; the truth is computed at the first call for a workload, which is one of workload().
   [[nodiscard]] AnswerCheck check(const Workload& workload, std::span<const Hit> answers);
   [[nodiscard]] AnswerCheck check(const Workload& workload, std::span<const std::uint8_t> answers);
+  [[nodiscard]] AnswerCheck check(const RenderedRays& rays, std::span<const Hit> answers);
+  [[nodiscard]] AnswerCheck check(const RenderedRays& rays, std::span<const std::uint8_t> answers);
   /// Of `camera_edges`: where in the picture rays are aimed at an edge or vertex that the camera sees.
   [[nodiscard]] std::vector<std::array<float, 2>> seen_pixels(const Workload& workload);
   /// Of `camera_edges`: where in the picture answers are cracks.
@@ -53,6 +58,7 @@ class SceneData {
   /// Computes, and notes how long it took; `of` says more of the rays.
   template <class Answers, class Compute>
   const Answers& truth(Answers& entry, const Workload& workload, std::string_view of, const Compute& compute);
+  const std::vector<Hit>& primary_hits();
   const std::vector<ExactHit>& closest_truth(const Workload& workload);
   const std::vector<std::uint8_t>& any_truth(const Workload& workload);
   const std::vector<ExactHit>& start_truth(const Workload& workload);
@@ -65,6 +71,7 @@ class SceneData {
   Json facts_ = Json::object();
   std::vector<Hit> primary_hits_;  ///< the oracle's
   std::map<std::pair<std::string, SelfIntersection>, Workload> workloads_;
+  std::map<std::string, RenderedRays> rendered_;
   std::map<const Workload*, std::vector<ExactHit>> closest_truth_;
   std::map<const Workload*, std::vector<std::uint8_t>> any_truth_;
   std::map<std::string, std::vector<ExactHit>> start_truth_;  ///< the same for all ways of leaving the surface

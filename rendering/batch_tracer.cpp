@@ -7,18 +7,15 @@
 #include "core/timer.h"
 
 namespace arboretum {
-namespace {
 
-RayBatch batch_of(const TracedRays& rays, std::size_t begin, std::size_t count, RayKind kind) {
+RayBatch BatchTracer::batch_of(const TracedRays& rays, std::size_t begin, std::size_t count, RayKind kind) const {
   RayBatch all(rays.rays, rays.times);
   all.coherent = kind == RayKind::camera || kind == RayKind::shadow_hard;
+  all.settings = settings_;
   return all.part(begin, count);
 }
 
-}  // namespace
-
 void BatchTracer::trace(const RayBatch& rays, std::span<Hit> hits, RayKind kind, RenderStatistics& statistics) const {
-  if (observer_) observer_(rays, false);
   const double begin = thread_cpu_seconds();
   kernel_.closest_hit(accel_, rays, hits);
   statistics[kind].seconds += thread_cpu_seconds() - begin;
@@ -35,7 +32,6 @@ void BatchTracer::any_hit(const TracedRays& rays, std::size_t begin, std::span<s
                           RenderStatistics& statistics) const {
   if (occluded.empty()) return;
   const RayBatch batch = batch_of(rays, begin, occluded.size(), kind);
-  if (observer_) observer_(batch, true);
   const double start = thread_cpu_seconds();
   kernel_.any_hit(accel_, batch, occluded);
   statistics[kind].seconds += thread_cpu_seconds() - start;

@@ -4,7 +4,6 @@
 // finds occluded, for its closest hits. Where no surface has holes nothing is asked.
 #pragma once
 
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -33,14 +32,11 @@ struct TracedRays {
   [[nodiscard]] float time(std::size_t i) const noexcept { return times.empty() ? 0.0f : times[i]; }
 };
 
-/// Sees all that is traced: batches of closest-hit rays (`any` false) or any-hit rays.
-using RayObserver = std::function<void(const RayBatch& rays, bool any)>;
-
 class BatchTracer {
  public:
   /// All must outlive the tracer; the structure is built from scene.mesh().
-  BatchTracer(const RenderScene& scene, const Accel& accel, const KernelRow& kernel, RayObserver observer = {})
-      : scene_(scene), accel_(accel), kernel_(kernel), observer_(std::move(observer)) {}
+  BatchTracer(const RenderScene& scene, const Accel& accel, const KernelRow& kernel, TraversalSettings settings = {})
+      : scene_(scene), accel_(accel), kernel_(kernel), settings_(settings) {}
 
   [[nodiscard]] const RenderScene& scene() const noexcept { return scene_; }
   [[nodiscard]] const Accel& accel() const noexcept { return accel_; }
@@ -51,6 +47,7 @@ class BatchTracer {
   void any_hit(const TracedRays& rays, std::size_t begin, std::span<std::uint8_t> occluded, RayKind kind, RenderStatistics& statistics) const;
 
  private:
+  [[nodiscard]] RayBatch batch_of(const TracedRays& rays, std::size_t begin, std::size_t count, RayKind kind) const;
   void trace(const RayBatch& rays, std::span<Hit> hits, RayKind kind, RenderStatistics& statistics) const;
   void pass_holes(const TracedRays& rays, std::size_t begin, std::span<Hit> hits, PassDimension dimension, RenderStatistics& statistics) const;
   [[nodiscard]] bool lets_through(const Hit& hit, const RayOwner& owner, PassDimension dimension, std::uint64_t crossing) const;
@@ -58,7 +55,7 @@ class BatchTracer {
   const RenderScene& scene_;
   const Accel& accel_;
   const KernelRow& kernel_;
-  RayObserver observer_;
+  TraversalSettings settings_;
 };
 
 }  // namespace arboretum

@@ -54,12 +54,16 @@ struct PathWave::Shading {
 };
 
 PathWave::PathWave(const BatchTracer& tracer, const RenderSettings& settings)
-    : tracer_(tracer), scene_(tracer.scene()), branching_(settings.integrator == Integrator::whitted), depth_(settings.depth) {
+    : tracer_(tracer), scene_(tracer.scene()), branching_(settings.integrator == Integrator::whitted), depth_(settings.depth), clamp_(settings.clamp) {
   if (branching_) depth_ = std::min(depth_, kMostBranching);
   bounced_ = branching_ ? Lobes{false, false, true} : Lobes{scene_.effects().has(EffectKind::diffuse_gi), true, true};
 }
 
-void PathWave::add(std::uint32_t slot, Vec3f radiance) { radiance_[slot] = radiance_[slot] + Vec3d(radiance); }
+void PathWave::add(std::uint32_t slot, std::uint32_t bounce, Vec3f radiance) {
+  const float most = std::max({radiance.x, radiance.y, radiance.z});
+  if (bounce > 0 && most > clamp_) radiance = radiance * (clamp_ / most);
+  radiance_[slot] = radiance_[slot] + Vec3d(radiance);
+}
 
 void PathWave::trace(TracedRays& camera_rays, std::span<Vec3d> radiance, RenderStatistics& statistics) {
   radiance_ = radiance;
@@ -86,14 +90,14 @@ void PathWave::trace_shadows(RenderStatistics& statistics) {
     occluded_.resize(queue.rays.size());
     tracer_.any_hit(queue.rays, 0, occluded_, kShadowKinds[k], statistics);
     for (std::size_t i = 0; i < occluded_.size(); ++i)
-      if (occluded_[i] == 0) add(queue.slots[i], queue.light[i]);
-    queue.rays.clear(), queue.slots.clear(), queue.light.clear();
+      if (occluded_[i] == 0) add(queue.slots[i], queue.bounces[i], queue.light[i]);
+    queue.rays.clear(), queue.slots.clear(), queue.bounces.clear(), queue.light.clear();
   }
 }
 
 void PathWave::shade(const Ray& ray, float time, const RayOwner& owner, const Path& path, const Hit& hit) {
   if (!hit.is_hit()) {
-    if (scene_.effects().has(EffectKind::env_light)) add(path.slot, path.throughput * scene_.environment());
+    if (scene_.effects().has(EffectKind::env_light)) add(path.slot, path.bounce, path.throughput * scene_.environment());
     return;
   }
   const Shading at(scene_, ray, time, owner, path, hit);
@@ -113,7 +117,7 @@ void PathWave::add_emission(const Shading& at) {
     const double light_pdf = scene_.lights().pdf(at.hit.primitive, Vec3d(at.ray.origin), at.point.point(), at.time);
     emission = emission * power_weight(at.path.pdf, light_pdf);
   }
-  add(at.path.slot, at.path.throughput * emission);
+  add(at.path.slot, at.path.bounce, at.path.throughput * emission);
 }
 
 void PathWave::add_direct_light(const Shading& at) {
@@ -180,7 +184,7 @@ void PathWave::push_shadow(RayKind kind, const Shading& at, const Ray& ray, Vec3
   queue.rays.rays.push_back(ray);
   queue.rays.owners.push_back({at.owner.sampler, at.node});
   if (scene_.effects().has(EffectKind::motion_blur)) queue.rays.times.push_back(at.time);
-  queue.slots.push_back(at.path.slot), queue.light.push_back(light);
+  queue.slots.push_back(at.path.slot), queue.bounces.push_back(at.path.bounce), queue.light.push_back(light);
 }
 
 void PathWave::scatter(const Shading& at) {

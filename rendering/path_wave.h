@@ -33,7 +33,7 @@ class PathWave {
   };
   struct ShadowQueue {
     TracedRays rays;
-    std::vector<std::uint32_t> slots;
+    std::vector<std::uint32_t> slots, bounces;
     std::vector<Vec3f> light;  ///< what arrives where nothing is in between
   };
   /// One hit while it is shaded.
@@ -48,7 +48,7 @@ class PathWave {
   void scatter(const Shading& at);
   void push_shadow(RayKind kind, const Shading& at, const Ray& ray, Vec3f light);
   void trace_shadows(RenderStatistics& statistics);
-  void add(std::uint32_t slot, Vec3f radiance);
+  void add(std::uint32_t slot, std::uint32_t bounce, Vec3f radiance);
 
   static constexpr std::array kPathKinds{RayKind::camera, RayKind::mirror, RayKind::glossy, RayKind::dielectric, RayKind::diffuse_gi};
   static constexpr std::array kShadowKinds{RayKind::shadow_hard, RayKind::shadow_soft, RayKind::env_light};
@@ -62,6 +62,7 @@ class PathWave {
   Lobes bounced_;  ///< that paths go on by; light from the others' directions comes by shadow rays alone
   bool branching_;
   std::uint32_t depth_;
+  float clamp_;
   std::array<Queue, kPathKinds.size()> now_, next_;
   std::array<ShadowQueue, kShadowKinds.size()> shadows_;
   std::vector<Hit> hits_;

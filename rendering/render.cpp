@@ -1,10 +1,12 @@
 #include "rendering/render.h"
 
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <mutex>
+#include <thread>
 
 #include "core/error.h"
 #include "core/names.h"
@@ -81,6 +83,8 @@ Picture render(const BatchTracer& tracer, const RenderSettings& settings, Render
   const unsigned across = (settings.width + kTile - 1) / kTile, tiles = across * ((settings.height + kTile - 1) / kTile);
   std::mutex mutex;
   unsigned done = 0;
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, std::max(cores, settings.threads));
   tbb::task_arena arena(settings.threads == 0 ? tbb::task_arena::automatic : int(settings.threads));
   arena.execute([&] {
     tbb::parallel_for(0u, tiles, [&](unsigned tile) {

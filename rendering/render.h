@@ -6,6 +6,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -31,6 +32,7 @@ struct RenderSettings {
   unsigned width = 512, height = 512;
   unsigned samples = 16;     ///< a pixel
   unsigned depth = 32;       ///< scatterings of a path at most; 1: direct light. Paths end by chance from the fourth on.
+  float clamp = std::numeric_limits<float>::infinity();  ///< most light that one sample's path brings at once from beyond its first hit
   std::uint64_t seed = 1;
   unsigned threads = 1;      ///< 0: one a core
 };

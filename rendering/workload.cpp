@@ -58,22 +58,6 @@ Vec3d point_on_sphere(std::uint64_t seed, std::uint64_t index, std::uint64_t dim
   return {r * circle.cosine, r * circle.sine, z};
 }
 
-/// The scene's first point light, else a point above the camera by a quarter of the median distance to what
-/// it sees: a measure that suits rooms and landscapes alike.
-Vec3d light_position(const Scene& scene, RayBatch primary_rays, std::span<const Hit> primary_hits) {
-  for (const Light& light : scene.lights)
-    if (light.type == Light::Type::point) return Vec3d(light.position);
-  std::vector<double> distances;
-  for (std::size_t i = 0; i < primary_hits.size(); ++i)
-    if (primary_hits[i].is_hit())
-      distances.push_back(double(primary_hits[i].t) * length(Vec3d(primary_rays[i].direction)));
-  const Camera camera = view_of(scene);
-  if (distances.empty()) return Vec3d(camera.position);
-  const auto median = distances.begin() + std::ptrdiff_t(distances.size() / 2);
-  std::nth_element(distances.begin(), median, distances.end());
-  return Vec3d(camera.position) + normalize(Vec3d(camera.up)) * (0.25 * *median);
-}
-
 /// The ray as traced, and as it would be if it started at the hit point itself (but for its origin, which is rounded).
 struct SecondaryRay {
   Ray ray, reference;
@@ -146,6 +130,21 @@ RayBatch Workload::batch() const noexcept {
 Query query_of(std::string_view workload) {
   check_known(workload);
   return workload == "shadow" || workload == "ambient_occlusion" ? Query::any_hit : Query::closest_hit;
+}
+
+// A measure that suits rooms and landscapes alike.
+Vec3d light_position(const Scene& scene, RayBatch primary_rays, std::span<const Hit> primary_hits) {
+  for (const Light& light : scene.lights)
+    if (light.type == Light::Type::point) return Vec3d(light.position);
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < primary_hits.size(); ++i)
+    if (primary_hits[i].is_hit())
+      distances.push_back(double(primary_hits[i].t) * length(Vec3d(primary_rays[i].direction)));
+  const Camera camera = view_of(scene);
+  if (distances.empty()) return Vec3d(camera.position);
+  const auto median = distances.begin() + std::ptrdiff_t(distances.size() / 2);
+  std::nth_element(distances.begin(), median, distances.end());
+  return Vec3d(camera.position) + normalize(Vec3d(camera.up)) * (0.25 * *median);
 }
 
 Workload make_primary(const Scene& scene, const View& view) {

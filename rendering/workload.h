@@ -11,6 +11,7 @@
 #include "core/ray.h"
 #include "rendering/self_intersection.h"
 #include "scenes/scene.h"
+#include "scenes/vec3d.h"
 
 namespace arboretum {
 
@@ -48,6 +49,9 @@ struct View {
 
 /// One primary ray a pixel, Morton order. A scene without a camera is framed whole from a fixed three-quarter view.
 [[nodiscard]] Workload make_primary(const Scene& scene, const View& view);
+/// Where `shadow` rays go to: the scene's first point light, else a point above the camera by a quarter of the median distance to
+/// what it sees.
+[[nodiscard]] Vec3d light_position(const Scene& scene, RayBatch primary_rays, std::span<const Hit> primary_hits);
 /// Any workload. `primary_hits` are the reference hits (the oracle's) of make_primary's rays; secondary workloads have one
 /// ray for each of them that hit, starting as view.start says (by default offset so that it does not meet its own surface):
 /// for every way as many, in the same order, in the same directions. `primary` and `random` ignore them.

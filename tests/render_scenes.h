@@ -43,8 +43,7 @@ struct Trace {
 };
 
 /// Renders with a structure of the default builder; fails the test where there is no such row.
-inline Picture picture_of(const Scene& scene, EffectSet effects, RenderSettings settings, Trace trace = {}, RenderStatistics* statistics = nullptr,
-                          const RayObserver& observer = {}) {
+inline Picture picture_of(const Scene& scene, EffectSet effects, RenderSettings settings, Trace trace = {}, RenderStatistics* statistics = nullptr) {
   const RenderScene ready(scene, effects);
   if (ready.mesh().moves()) trace.structure = "bvh4_motion";
   const std::string_view below = trace.structure == "two_level" ? "bvh8" : trace.structure;
@@ -56,7 +55,7 @@ inline Picture picture_of(const Scene& scene, EffectSet effects, RenderSettings 
   build.builder = find_structure(below)->info.builders.front(), build.leaf = leaf, build.isa = trace.isa;
   BuildReport report;
   const std::unique_ptr<Accel> accel = build_structure(trace.structure, ready.mesh(), build, report);
-  const BatchTracer tracer(ready, *accel, *row, observer);
+  const BatchTracer tracer(ready, *accel, *row);
   RenderStatistics own;
   const Picture picture = render(tracer, settings, own);
   CHECK(own.not_finite == 0);

@@ -71,6 +71,18 @@ TEST_CASE("furnace: inside a closed room of albedo a that glows with e, radiance
   check_near(seen(scene, 20000, detected(scene).without(EffectKind::diffuse_gi)), {1.5f, 1.8f, 1}, 0.01);
 }
 
+TEST_CASE("clamped paths bring no more than that from beyond the first hit") {
+  Scene scene = convex({.diffuse = {1.0f, 0.5f, 0.25f}});
+  scene.environment = {8, 8, 8};
+  const auto clamped = [&](float most) {
+    return picture_of(scene, detected(scene), {.width = 1, .height = 1, .samples = 2, .clamp = most}).pixels[0];
+  };
+  check_near(clamped(100), {8, 4, 2}, 1e-6);
+  check_near(clamped(2), {2, 1, 0.5f}, 1e-6);
+  scene.camera->look_at = {-3, 20, 2};  // the sky itself
+  check_near(clamped(2), {8, 8, 8}, 1e-6);
+}
+
 TEST_CASE("furnace: mirrors and clear glass lose nothing but what Ks and Tf say") {
   Scene scene = convex({.diffuse = {0, 0, 0}, .specular = {0.8f, 0.5f, 0.2f}, .illum = 3});
   scene.environment = {1, 1, 1};

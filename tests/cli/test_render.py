@@ -68,6 +68,15 @@ class Render(CommandLineCase):
                 self.assert_error(self.call("render", "cornell_box:600", *words), part)
         self.assert_error(self.call("render", "waving_cloth:200", "--structure", "bvh8"), "bvh4_motion")
 
+    def test_renderers_are_workloads(self):
+        cells = [c for c in self.cells("workload=whitted,path") if c.startswith("trace/")]
+        self.assertEqual({c.split("/")[-2] for c in cells}, {"whitted", "path"})
+        result = self.run_small("workload=whitted,path", "isa=sse", "--repetitions", "2")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("all answers right", result.stdout)
+        names = [b["name"] for b in json.loads((self.folder / "results/small/results.json").read_text())["benchmarks"] if b.get("shading_share")]
+        self.assertEqual({n.split("/")[9] for n in names}, {"whitted", "path"})
+
 
 if __name__ == "__main__":
     unittest.main()
