@@ -89,7 +89,7 @@ std::optional<Scatter> Bsdf::smooth(Vec3d in, Lobes lobes, ScatterKind kind) con
 Vec3d Bsdf::glossy_direction(double u, double v) const noexcept {
   const double a = surface_.alpha;
   const Vec3d out = normalize(Vec3d{a * out_.x, a * out_.y, out_.z});
-  const UnitCircle circle(u);
+  const Turn circle(u);
   const double z = (1.0 - v) * (1.0 + out.z) - out.z, r = std::sqrt(std::max(0.0, 1.0 - z * z));
   const Vec3d half = Vec3d{r * circle.cosine, r * circle.sine, z} + out;
   const Vec3d normal = normalize(Vec3d{a * half.x, a * half.y, std::max(half.z, 1e-12)});
@@ -119,7 +119,7 @@ std::optional<Scatter> Bsdf::scatter(Lobes lobes, double choice, double u, doubl
   const double share = share_of_diffuse(lobes);
   if (share < 0.0) return std::nullopt;
   if (choice < share) {
-    const Vec3d in = cosine_direction(u, v);
+    const Vec3d in = cosine_direction(u, Turn(v));
     if (glossy()) return smooth(in, lobes, ScatterKind::diffuse);
     if (!(in.z > 0.0)) return std::nullopt;
     return Scatter{in, share == 1.0 ? diffuse_ : diffuse_ * float(1.0 / share), share * in.z / kPi, ScatterKind::diffuse};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "rendering/directions.h"
 
@@ -49,8 +50,16 @@ struct PathWave::Shading {
       : ray(r), time(t), owner(o), path(p), hit(h), surface(scene.surface(h.primitive)), point(scene.mesh(), r, t, h), frame(point.normal()),
         node(o.node == Sampler::kCamera ? 0 : o.node),
         bsdf(surface, scene.diffuse(surface, h), to_local(normalize(Vec3d(r.direction)) * -1.0), point.is_front()) {}
+  /// Where rays start that leave on the viewer's side.
+  [[nodiscard]] Vec3f origin() const noexcept {
+    if (!known_origin_) known_origin_ = point.origin(point.normal(), SelfIntersection::error_bound);
+    return *known_origin_;
+  }
   [[nodiscard]] Vec3d to_local(Vec3d v) const noexcept { return {dot(v, frame.tangent), dot(v, frame.bitangent), dot(v, frame.normal)}; }
   [[nodiscard]] double random(HitDimension d) const noexcept { return owner.sampler.hit(node, d); }
+
+ private:
+  mutable std::optional<Vec3f> known_origin_;
 };
 
 PathWave::PathWave(const BatchTracer& tracer, const RenderSettings& settings)
@@ -147,7 +156,7 @@ void PathWave::add_light(const Shading& at, const LightSample& light) {
   const Vec3f arriving = at.path.throughput * f * light.radiance;
   if (!is_bright(arriving)) return;
   const Vec3d normal = at.point.normal();
-  const Vec3f origin = at.point.origin(normal, SelfIntersection::error_bound);
+  const Vec3f origin = at.origin();
   Ray ray{.origin = origin, .direction = {}};
   if (!light.on) {
     const bool far = std::isinf(light.distance);
@@ -175,7 +184,7 @@ void PathWave::add_environment(const Shading& at) {
   const Vec3f arriving = at.path.throughput * scatter->weight * scene_.environment();
   if (!is_bright(arriving)) return;
   const Vec3d normal = at.point.normal();
-  const Ray ray{.origin = at.point.origin(normal, SelfIntersection::error_bound), .direction = leaving(at.frame.to_world(scatter->direction), normal)};
+  const Ray ray{.origin = at.origin(), .direction = leaving(at.frame.to_world(scatter->direction), normal)};
   push_shadow(RayKind::env_light, at, ray, arriving);
 }
 
@@ -207,9 +216,10 @@ void PathWave::go_on(const Shading& at, const Scatter& scatter, std::uint64_t no
     if (at.random(HitDimension::roulette) >= survival) return;
     path.throughput = path.throughput * float(1.0 / survival);
   }
-  const Vec3d side = scatter.direction.z >= 0.0 ? at.point.normal() : at.point.normal() * -1.0;
+  const bool through = scatter.direction.z < 0.0;
+  const Vec3d side = through ? at.point.normal() * -1.0 : at.point.normal();
   Queue& queue = next_[index_of(kind_of(scatter.kind))];
-  queue.rays.rays.push_back({.origin = at.point.origin(side, SelfIntersection::error_bound),
+  queue.rays.rays.push_back({.origin = through ? at.point.origin(side, SelfIntersection::error_bound) : at.origin(),
                              .direction = leaving(at.frame.to_world(scatter.direction), side)});
   queue.rays.owners.push_back({at.owner.sampler, node});
   if (scene_.effects().has(EffectKind::motion_blur)) queue.rays.times.push_back(at.time);

@@ -34,7 +34,7 @@ void trace_ambient_occlusion(const BatchTracer& tracer, const TracedRays& camera
     if (!hits[i].is_hit()) continue;
     const SurfacePoint point(tracer.scene().mesh(), camera_rays.rays[i], camera_rays.time(i), hits[i]);
     const Sampler& sampler = camera_rays.owners[i].sampler;
-    const Vec3d in = cosine_direction(sampler.hit(0, HitDimension::environment_u), sampler.hit(0, HitDimension::environment_v));
+    const Vec3d in = cosine_direction(sampler.hit(0, HitDimension::environment_u), Turn(sampler.hit(0, HitDimension::environment_v)));
     rays.rays.push_back({.origin = point.origin(point.normal(), SelfIntersection::error_bound),
                          .direction = leaving(Frame(point.normal()).to_world(in), point.normal()),
                          .tfar = float(kOcclusionLength * tracer.scene().radius())});

@@ -193,7 +193,7 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
     const Vec3d normal = surface.normal();
     const auto cosine_about = [&](std::uint64_t dimension) {
       const double u = random_double(view.seed, i, dimension), v = random_double(view.seed, i, dimension + 1);
-      return Frame(normal).to_world(cosine_direction(u, v));
+      return Frame(normal).to_world(cosine_direction(u, UnitCircle(v)));
     };
     workload.sources.push_back(primary_hits[i].primitive);
     workload.starts.push_back(surface.exact_point());

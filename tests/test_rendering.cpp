@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "rendering/bsdf.h"
+#include "rendering/directions.h"
 #include "rendering/heat_map.h"
 #include "rendering/lights.h"
 #include "rendering/picture.h"
@@ -172,6 +173,16 @@ TEST_CASE("lobes: densities add up to at most 1, directions follow them, weights
       }
     }
   }
+}
+
+TEST_CASE("turns are circles") {
+  for (int i = 0; i < 1000; ++i) {
+    const Turn turn(i / 1000.0);
+    CHECK(turn.cosine == Approx(std::cos(2 * std::numbers::pi * i / 1000)).margin(1e-14));
+    CHECK(turn.sine == Approx(std::sin(2 * std::numbers::pi * i / 1000)).margin(1e-14));
+  }
+  CHECK(Turn(0.0).cosine == 1.0);
+  CHECK(Turn(0.0).sine == 0.0);
 }
 
 TEST_CASE("lobes: light goes both ways alike (reciprocity)") {
