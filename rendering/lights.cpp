@@ -105,7 +105,7 @@ std::optional<LightSample> LightTable::from_triangle(const Emitter& emitter, dou
   const double facing = std::abs(dot(triangle.normal, to_light));  // twice the area times the cosine times the distance
   if (!(facing > 0.0) || !(distance > 0.0)) return std::nullopt;
   const double pdf = probability * distance2 * distance * 2.0 / facing;
-  if (!std::isfinite(pdf)) return std::nullopt;
+  if (!(pdf > 1e-30) || !std::isfinite(pdf)) return std::nullopt;  // 1 / pdf stays within float32
   return LightSample{to_light * (1.0 / distance), distance, emitter.emission * float(1.0 / pdf), pdf,
                      Hit{.t = 0.0f, .u = float(b), .v = float(c), .primitive = emitter.triangle}};
 }
