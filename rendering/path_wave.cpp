@@ -106,7 +106,7 @@ void PathWave::trace_shadows(RenderStatistics& statistics) {
 
 void PathWave::shade(const Ray& ray, float time, const RayOwner& owner, const Path& path, const Hit& hit) {
   if (!hit.is_hit()) {
-    if (scene_.effects().has(EffectKind::env_light)) add(path.slot, path.bounce, path.throughput * scene_.environment());
+    if (scene_.effects().has(EffectKind::env_light)) add_escaped(path, normalize(Vec3d(ray.direction)));
     return;
   }
   const Shading at(scene_, ray, time, owner, path, hit);
@@ -151,7 +151,7 @@ void PathWave::add_light(const Shading& at, const LightSample& light) {
   Vec3f f = value.diffuse + value.glossy;
   if (light.pdf > 0.0) {  // lobes that a path goes on by may find the light themselves
     const float weight = power_weight(light.pdf, at.bsdf.pdf(in, bounced_));
-    f = value.diffuse * (bounced_.diffuse ? weight : 1.0f) + value.glossy * (bounced_.glossy ? weight : 1.0f);
+    f = weighed(value, weight);
   }
   const Vec3f arriving = at.path.throughput * f * light.radiance;
   if (!is_bright(arriving)) return;
@@ -174,14 +174,38 @@ void PathWave::add_light(const Shading& at, const LightSample& light) {
   push_shadow(RayKind::shadow_soft, at, ray, arriving);
 }
 
-/// The environment's light by the lobes that no path goes on by; the others meet it where they leave the scene.
+/// What a shadow ray brings that lobes which paths go on by may find too, with that weight, and the others alone.
+Vec3f PathWave::weighed(const Bsdf::Value& value, float weight) const noexcept {
+  return value.diffuse * (bounced_.diffuse ? weight : 1.0f) + value.glossy * (bounced_.glossy ? weight : 1.0f);
+}
+
+/// A path has left the scene.
+void PathWave::add_escaped(const Path& path, Vec3d direction) {
+  const Environment& environment = scene_.environment();
+  Vec3f radiance = environment.radiance(direction);
+  if (!environment.is_constant() && path.pdf > 0.0) radiance = radiance * power_weight(path.pdf, environment.pdf(direction));
+  add(path.slot, path.bounce, path.throughput * radiance);
+}
+
 void PathWave::add_environment(const Shading& at) {
+  const Environment& environment = scene_.environment();
+  if (environment.is_constant()) return add_constant_environment(at);
+  const Environment::Sample sample = environment.sample(at.random(HitDimension::environment_u), at.random(HitDimension::environment_v));
+  const Vec3d in = at.to_local(sample.direction);
+  if (!(sample.pdf > 1e-30) || !(in.z > 0.0)) return;
+  const Vec3f f = weighed(at.bsdf.evaluate(in), power_weight(sample.pdf, at.bsdf.pdf(in, bounced_)));
+  const Vec3f arriving = at.path.throughput * f * sample.radiance * float(1.0 / sample.pdf);
+  if (is_bright(arriving)) push_shadow(RayKind::env_light, at, {.origin = at.origin(), .direction = leaving(sample.direction, at.point.normal())}, arriving);
+}
+
+/// The environment's light by the lobes that no path goes on by; the others meet it where they leave the scene.
+void PathWave::add_constant_environment(const Shading& at) {
   const Lobes lobes{!bounced_.diffuse, !bounced_.glossy, false};
   if (!lobes.diffuse && !lobes.glossy) return;
   const auto scatter = at.bsdf.scatter(lobes, at.random(HitDimension::environment_lobe), at.random(HitDimension::environment_u),
                                        at.random(HitDimension::environment_v));
   if (!scatter) return;
-  const Vec3f arriving = at.path.throughput * scatter->weight * scene_.environment();
+  const Vec3f arriving = at.path.throughput * scatter->weight * scene_.environment().radiance({});
   if (!is_bright(arriving)) return;
   const Vec3d normal = at.point.normal();
   const Ray ray{.origin = at.origin(), .direction = leaving(at.frame.to_world(scatter->direction), normal)};

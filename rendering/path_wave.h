@@ -43,7 +43,10 @@ class PathWave {
   void add_emission(const Shading& at);
   void add_direct_light(const Shading& at);
   void add_light(const Shading& at, const LightSample& light);
+  void add_escaped(const Path& path, Vec3d direction);
   void add_environment(const Shading& at);
+  void add_constant_environment(const Shading& at);
+  [[nodiscard]] Vec3f weighed(const Bsdf::Value& value, float weight) const noexcept;
   void go_on(const Shading& at, const Scatter& scatter, std::uint64_t node);
   void scatter(const Shading& at);
   void push_shadow(RayKind kind, const Shading& at, const Ray& ray, Vec3f light);

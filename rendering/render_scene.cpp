@@ -11,7 +11,8 @@ RenderScene::RenderScene(const Scene& scene, EffectSet effects) : effects_(effec
   take_mesh(scene);
   settle_motion(scene);
   if (!effects.has(EffectKind::dof)) camera_.aperture_radius = 0.0f;
-  if (effects.has(EffectKind::env_light)) environment_ = max(scene.environment, Vec3f{});
+  if (effects.has(EffectKind::env_light) && is_bright(scene.environment))
+    environment_ = scene.environment_image.empty() ? Environment(max(scene.environment, Vec3f{})) : Environment(read_radiance(scene.environment_image));
   const Bounds3f bounds = mesh_.bounds();
   if (!bounds.empty()) radius_ = 0.5 * length(Vec3d(bounds.upper) - Vec3d(bounds.lower));
   for (const Material& m : scene.materials) surfaces_.push_back(make_surface(m, effects));

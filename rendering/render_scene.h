@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rendering/effect_set.h"
+#include "rendering/environment.h"
 #include "rendering/lights.h"
 #include "rendering/surface.h"
 #include "rendering/texture.h"
@@ -30,7 +31,7 @@ class RenderScene {
   [[nodiscard]] Shutter shutter() const noexcept { return shutter_; }
   [[nodiscard]] const LightTable& lights() const noexcept { return lights_; }
   /// Black without `env_light`.
-  [[nodiscard]] Vec3f environment() const noexcept { return environment_; }
+  [[nodiscard]] const Environment& environment() const noexcept { return environment_; }
   /// Half the diagonal of the mesh.
   [[nodiscard]] double radius() const noexcept { return radius_; }
 
@@ -57,7 +58,7 @@ class RenderScene {
   EffectSet effects_;
   Camera camera_;
   Shutter shutter_;
-  Vec3f environment_{};
+  Environment environment_;
   double radius_ = 0.0;
   std::vector<TextureTriangle> texture_coordinates_;
   std::vector<Surface> surfaces_;

@@ -76,8 +76,8 @@ class Effects {
         "light from surfaces (Ke > 0)");
     const bool environment = is_bright(scene_.environment);
     set("env_light", environment,
-        environment ? fmt::format("the environment's radiance is ({:.3g}, {:.3g}, {:.3g})",
-                                  scene_.environment.x, scene_.environment.y, scene_.environment.z)
+        environment ? fmt::format("the environment's {}radiance is ({:.3g}, {:.3g}, {:.3g})",
+                                  scene_.environment_image.empty() ? "" : "mean ", scene_.environment.x, scene_.environment.y, scene_.environment.z)
                     : std::string("no environment, or a black one"));
     emitters_ = bright + emitters + environment;
     set("multi_light", emitters_ > 1,

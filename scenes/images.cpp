@@ -22,25 +22,31 @@
 
 namespace arboretum {
 
-Vec3f mean_radiance(const std::filesystem::path& image) {
+RadianceImage read_radiance(const std::filesystem::path& image) {
   check_readable_file(image);
   int width = 0, height = 0, channels = 0;
   const std::unique_ptr<float, void (*)(void*)> pixels(
       stbi_loadf(image.c_str(), &width, &height, &channels, 3), stbi_image_free);
   if (!pixels) throw UserError(image.string() + ": no image that can be read: " + stbi_failure_reason());
+  RadianceImage read{unsigned(width), unsigned(height), {}};
+  read.pixels.resize(std::size_t(width) * std::size_t(height));
+  for (std::size_t i = 0; i < read.pixels.size(); ++i) {
+    const float* p = pixels.get() + 3 * i;
+    read.pixels[i] = {p[0], p[1], p[2]};
+    if (!is_finite(read.pixels[i])) throw UserError(image.string() + ": holds values that are not finite");
+  }
+  return read;
+}
+
+Vec3f mean_radiance(const RadianceImage& image) {
   Vec3d sum;
   double weights = 0.0;
-  for (int y = 0; y < height; ++y) {
-    const double weight = UnitCircle(0.5 * (y + 0.5) / height).sine;  // solid angle of the row's pixels
-    for (int x = 0; x < width; ++x) {
-      const float* p = pixels.get() + 3 * (std::size_t(y) * std::size_t(width) + std::size_t(x));
-      sum = sum + Vec3d(p[0], p[1], p[2]) * weight;
-    }
-    weights += weight * width;
+  for (unsigned y = 0; y < image.height; ++y) {
+    const double weight = UnitCircle(0.5 * (y + 0.5) / image.height).sine;  // solid angle of the row's pixels
+    for (unsigned x = 0; x < image.width; ++x) sum = sum + Vec3d(image.pixels[std::size_t(y) * image.width + x]) * weight;
+    weights += weight * image.width;
   }
-  const Vec3f mean = to_float(sum * (1.0 / weights));
-  if (!is_finite(mean)) throw UserError(image.string() + ": holds values that are not finite");
-  return mean;
+  return to_float(sum * (1.0 / weights));
 }
 
 std::optional<Image> read_image(const std::filesystem::path& image) {

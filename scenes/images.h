@@ -10,8 +10,15 @@
 
 namespace arboretum {
 
-/// Mean over all directions of a latitude-longitude image (HDR, PNG, JPEG …). Throws UserError.
-[[nodiscard]] Vec3f mean_radiance(const std::filesystem::path& image);
+/// Linear radiance, rows downwards.
+struct RadianceImage {
+  unsigned width = 0, height = 0;
+  std::vector<Vec3f> pixels;
+};
+/// HDR as it is, PNG, JPEG … made linear. Throws UserError where it cannot be read or holds values that are not finite.
+[[nodiscard]] RadianceImage read_radiance(const std::filesystem::path& image);
+/// Mean over all directions of a latitude-longitude image.
+[[nodiscard]] Vec3f mean_radiance(const RadianceImage& image);
 
 /// Least and greatest value of any channel of an image, 0 to 1; nothing where it cannot be read.
 struct ValueRange {

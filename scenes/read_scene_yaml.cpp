@@ -72,10 +72,8 @@ class SceneFile {
       return;
     }
     const std::filesystem::path image = file_.beside(file_.text(node["image"], "environment image"));
-    scene_.environment = mean_radiance(image);
-    scene_.report.warnings.push_back(
-        fmt::format("{}: the environment image stands as its mean radiance ({:.4g}, {:.4g}, {:.4g})",
-                    image.string(), scene_.environment.x, scene_.environment.y, scene_.environment.z));
+    scene_.environment = mean_radiance(read_radiance(image));
+    scene_.environment_image = image.string();
   }
 
   Light light(const YAML::Node& node) {

@@ -72,7 +72,8 @@ struct Scene {
   std::vector<TextureTriangle> texture_coordinates;  ///< one a triangle of `mesh`, or empty: the scene has none
   std::vector<Material> materials;
   std::vector<Light> lights;
-  Vec3f environment{0, 0, 0};
+  Vec3f environment{0, 0, 0};        ///< mean radiance from afar
+  std::string environment_image{};   ///< latitude-longitude, y up; empty: the radiance is the same all around
   std::optional<Camera> camera;
   Shutter shutter;
   unsigned key_frames = 1;    ///< most key frames of one mesh in the scene file

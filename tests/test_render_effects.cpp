@@ -188,6 +188,25 @@ TEST_CASE("opacity maps: all 1 is none, 0 is no surface, holes let light and sha
     CHECK(std::abs(open.pixels[i].x - bare.pixels[i].x) <= 1e-4f * std::abs(bare.pixels[i].x));
 }
 
+TEST_CASE("an image around the scene: of one colour as that colour, black as none") {
+  const Folder folder;
+  folder.write("thing.obj", obj_text());
+  const auto under = [&](const std::string& environment) {
+    return load_file(folder.write("scene.yaml", "meshes: [thing.obj]\nenvironment: " + environment + "\ncamera: {position: [0.4, -3, 2], look_at: [0.5, 0.5, 0.4], up: [0, 0, 1]}\n"));
+  };
+  folder.write("white.ppm", pixels({255, 255, 255})), folder.write("black.ppm", pixels({0, 0})), folder.write("sky.ppm", pixels({10, 255, 90, 20, 0, 0, 0, 40}));
+  const Scene white = under("{image: white.ppm}"), black = under("{image: black.ppm}"), sky = under("{image: sky.ppm}"), constant = under("{radiance: 1}");
+  for (const Scene* scene : {&white, &black, &sky}) check_detected_is_all(*scene);
+  CHECK(same_bits(picture_of(white, detected(white), kSmall), picture_of(constant, detected(constant), kSmall)));
+  CHECK_FALSE(detected(black).has(EffectKind::env_light));
+  CHECK(is_black(picture_of(black, EffectSet::all(), kSmall)));
+  RenderStatistics of_constant, of_sky;
+  static_cast<void>(picture_of(constant, detected(constant), kSmall, {}, &of_constant));
+  static_cast<void>(picture_of(sky, detected(sky), kSmall, {}, &of_sky));
+  CHECK(of_constant[RayKind::env_light].rays == 0);
+  CHECK(of_sky[RayKind::env_light].rays > 0);
+}
+
 TEST_CASE("diffuse maps: of one colour no texture, of several one") {
   const Folder folder;
   Scene scene = lit_scene();

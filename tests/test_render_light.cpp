@@ -1,4 +1,6 @@
 // Radiance against what it must be: furnaces, point and area lights, mirrors, glass, holes, motion, a lens.
+#include <filesystem>
+#include <fstream>
 #include <numbers>
 
 #include "rendering/bsdf.h"
@@ -11,6 +13,8 @@ using namespace arboretum;
 using namespace arboretum::test;
 
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -69,6 +73,85 @@ TEST_CASE("furnace: inside a closed room of albedo a that glows with e, radiance
   check_near(seen(scene, 20000, Integrator::path, 2), {1.75f, 1 + 0.8f + 0.64f, 1}, 0.01);
   check_near(seen(scene, 20000, Integrator::path, 0), {1, 1, 1}, 1e-6);
   check_near(seen(scene, 20000, detected(scene).without(EffectKind::diffuse_gi)), {1.5f, 1.8f, 1}, 0.01);
+}
+
+namespace {
+
+/// 8 x 4 pixels, every one another colour, one of them a hundred times as bright.
+RadianceImage sky_image() {
+  RadianceImage image{8, 4, {}};
+  for (int i = 0; i < 32; ++i) image.pixels.push_back(Vec3f{0.1f * float(i % 5), 0.2f, 0.05f * float(i % 7)} * (i == 13 ? 100.0f : 1.0f));
+  return image;
+}
+
+}  // namespace
+
+TEST_CASE("an image around the scene: where its pixels are, and densities that add up") {
+  const Environment sky(sky_image());
+  const std::vector<Vec3f>& pixels = sky_image().pixels;
+  const double slope = kPi / 8, turn = kPi / 8;
+  const auto towards = [&](int column, int row) {  // a pixel's middle
+    const double down = (2 * row + 1) * slope, around = (2 * column + 1 - 8) * turn;
+    return Vec3d{std::sin(down) * std::sin(around), std::cos(down), -std::sin(down) * std::cos(around)};
+  };
+  for (int i = 0; i < 32; ++i) CHECK(length(sky.radiance(towards(i % 8, i / 8)) - pixels[std::size_t(i)]) < 1e-5f);
+  CHECK(towards(4, 1).z < 0.0);  // the middle is towards -z, the next columns towards +x
+  CHECK(towards(4, 1).x > 0.0);
+  CHECK(towards(0, 0).y > 0.0);
+  double sum = 0.0;
+  Dice dice(3);
+  for (int i = 0; i < 2000; ++i) {
+    const Environment::Sample s = sky.sample(double(dice.uniform(0, 1)), double(dice.uniform(0, 1)));
+    CHECK(length(s.direction) == Approx(1.0));
+    CHECK(s.pdf == Approx(sky.pdf(s.direction)).epsilon(1e-6));
+    CHECK(s.radiance == sky.radiance(s.direction));
+  }
+  constexpr int kSteps = 800;
+  for (int i = 0; i < kSteps * kSteps; ++i) {
+    const double y = 2 * (i % kSteps + 0.5) / kSteps - 1, around = 2 * kPi * (i / kSteps + 0.5) / kSteps, r = std::sqrt(1 - y * y);
+    sum += sky.pdf({r * std::sin(around), y, r * std::cos(around)}) * 4 * kPi / (kSteps * kSteps);
+  }
+  CHECK(sum == Approx(1.0).epsilon(0.005));
+  CHECK(Environment(RadianceImage{2, 1, {{1, 2, 3}, {1, 2, 3}}}).is_constant());
+  CHECK(Environment(RadianceImage{2, 1, {{0, 0, 0}, {0, 0, 0}}}).radiance({0, 1, 0}) == Vec3f{0, 0, 0});
+}
+
+TEST_CASE("a floor under an image: paths and shadow rays against the integral") {
+  const RadianceImage image = sky_image();
+  const Environment sky(image);
+  const fs::path folder = fs::temp_directory_path() / "arboretum-sky.hdr";
+  std::string bytes = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";  // flat RGBE pixels
+  for (const Vec3f& p : image.pixels) {
+    int exponent = 0;
+    const float scale = std::frexp(std::max({p.x, p.y, p.z}), &exponent) * 256.0f / std::max({p.x, p.y, p.z});
+    for (const float c : {p.x, p.y, p.z}) bytes += char(std::uint8_t(c * scale));
+    bytes += char(exponent + 128);
+  }
+  std::ofstream(folder, std::ios::binary) << bytes;
+  const Environment stored(read_radiance(folder));
+  for (const float roughness : {0.0f, 0.5f}) {
+    Scene scene = floor_scene();
+    scene.materials[0] = {.diffuse = {0.5f, 0.5f, 0.5f}, .specular = Vec3f{1, 1, 1} * (roughness > 0 ? 0.3f : 0.0f), .roughness = roughness};
+    scene.environment = mean_radiance(image), scene.environment_image = folder.string();
+    const Vec3d at{0.25, 0, -0.3}, viewer{1, 2, 1.5};
+    scene.camera = aimed(to_float(viewer), to_float(at));
+    const Surface surface = make_surface(scene.materials[0], EffectSet::all());
+    const auto local = [](Vec3d v) { return Vec3d{v.x, -v.z, v.y}; };
+    const Bsdf bsdf(surface, surface.diffuse, local(normalize(viewer - at)), true);
+    Vec3d sum;
+    constexpr int kSteps = 600;
+    for (int i = 0; i < kSteps * kSteps; ++i) {
+      const double y = (i % kSteps + 0.5) / kSteps, around = 2 * kPi * (i / kSteps + 0.5) / kSteps, r = std::sqrt(1 - y * y);
+      const Vec3d in{r * std::sin(around), y, r * std::cos(around)};
+      const Bsdf::Value value = bsdf.evaluate(local(in));
+      sum = sum + Vec3d((value.diffuse + value.glossy) * stored.radiance(in)) * (2 * kPi / (kSteps * kSteps));
+    }
+    INFO("roughness " << roughness);
+    check_near(seen(scene, 100000), to_float(sum), 0.01);
+    check_near(seen(scene, 100000, detected(scene).without(EffectKind::diffuse_gi)), to_float(sum), 0.01);
+    check_near(seen(scene, 100000, Integrator::whitted), to_float(sum), 0.01);
+  }
+  fs::remove(folder);
 }
 
 TEST_CASE("clamped paths bring no more than that from beyond the first hit") {
