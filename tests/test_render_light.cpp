@@ -276,6 +276,27 @@ TEST_CASE("a mirror shows a lamp by Ks, a holed screen by its holes, and lets th
   }
 }
 
+TEST_CASE("through a slab of glass a ray goes on in its direction, moved aside by Snell's law, less what is reflected") {
+  Scene scene;
+  add_box(scene, {-50, -50, -1}, {50, 50, 0}, 0);  // a pane one thick
+  scene.materials = {{.diffuse = {0, 0, 0}, .specular = {1, 1, 1}, .transmission = {0.5f, 1, 1}, .ior = 1.6f, .opacity = 0, .illum = 7},
+                     {.diffuse = {0, 0, 0}, .emission = {1, 1, 1}}};
+  const double sine = 0.8, cosine = 0.6, inside = 0.8 / 1.6, inside_cosine = std::sqrt(1 - inside * inside);
+  scene.camera = aimed({float(-4 * sine / cosine), 0, 4}, {0, 0, 0});  // enters at the origin
+  const double exit = inside / inside_cosine, behind = exit + 2 * sine / cosine;  // at z = -1 and -3
+  const double s = (cosine - 1.6 * inside_cosine) / (cosine + 1.6 * inside_cosine), p = (1.6 * cosine - inside_cosine) / (1.6 * cosine + inside_cosine);
+  const double through = std::pow(1 - 0.5 * (s * s + p * p), 2);
+  for (const double aside : {0.0, 0.3}) {  // what bounced within comes out farther on
+    Scene lit = scene;
+    add_square(lit, {float(behind + aside - 0.1), -0.1f, -3}, {0.2f, 0, 0}, {0, 0.2f, 0}, 1);
+    const Vec3f wanted = aside == 0.0 ? Vec3f{0.25f, 1, 1} * float(through) : Vec3f{0, 0, 0};
+    for (const Integrator integrator : {Integrator::whitted, Integrator::path}) {
+      INFO(to_string(integrator) << ", " << aside);
+      check_near(seen(lit, integrator == Integrator::path ? 40000 : 4, integrator), wanted, integrator == Integrator::path ? 0.01 : 1e-4);
+    }
+  }
+}
+
 TEST_CASE("no light leaks into a closed room, near the origin and 100 from it, nor out of a closed lamp") {
   for (const float far : {0.0f, 100.0f, 10000.0f}) {
     INFO("at " << far);
