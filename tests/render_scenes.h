@@ -1,6 +1,8 @@
 // What the tests of rendering share: small scenes made of squares, and pictures of them by any row of the kernel table.
 #pragma once
 
+#include <algorithm>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <string_view>

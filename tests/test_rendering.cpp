@@ -1,6 +1,7 @@
 // The parts of rendering: effect sets, random numbers, textures, surfaces and their lobes, lights, pictures in files.
 #include <numbers>
 #include <numeric>
+#include <set>
 
 #include "rendering/bsdf.h"
 #include "rendering/directions.h"
