@@ -14,17 +14,26 @@
 namespace arboretum {
 namespace {
 
-/// The first line by which two effective.yaml differ, comments apart; empty where they do not, or one is not there.
+/// The settings of an effective.yaml: its lines without indentation, comments and empty lines.
+std::vector<std::string> setting_lines(const ResultFolder& folder) {
+  std::ifstream stream(folder.path / "effective.yaml");
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) {
+    const std::size_t start = line.find_first_not_of(" \t\r");
+    if (start != std::string::npos && line[start] != '#') lines.push_back(line.substr(start));
+  }
+  return lines;
+}
+
+/// The first line by which two effective.yaml differ; empty where they do not, or one is not there.
 std::string first_difference(const ResultFolder& a, const ResultFolder& b) {
-  std::ifstream of_a(a.path / "effective.yaml"), of_b(b.path / "effective.yaml");
-  const auto next = [](std::ifstream& stream, std::string& line) {
-    while (std::getline(stream, line))
-      if (!line.starts_with("#")) return true;
-    return false;
-  };
-  for (std::string line_a, line_b; next(of_a, line_a) && next(of_b, line_b);)
-    if (line_a != line_b) return fmt::format("; they differ in `{}` against `{}`", line_a.substr(line_a.find_first_not_of(' ')), line_b.substr(line_b.find_first_not_of(' ')));
-  return {};
+  const std::vector<std::string> of_a = setting_lines(a), of_b = setting_lines(b);
+  if (of_a.empty() || of_b.empty()) return {};
+  const auto [in_a, in_b] = std::ranges::mismatch(of_a, of_b);
+  if (in_a == of_a.end() && in_b == of_b.end()) return {};
+  if (in_a == of_a.end()) return fmt::format("; {} alone has `{}`", b.path.string(), *in_b);
+  if (in_b == of_b.end()) return fmt::format("; {} alone has `{}`", a.path.string(), *in_a);
+  return fmt::format("; they differ in `{}` against `{}`", *in_a, *in_b);
 }
 
 void refuse_different_configurations(const ResultFolder& first, const ResultFolder& part) {

@@ -198,6 +198,16 @@ TEST_CASE("parts that do not belong together are refused, or merged when told to
   const std::string configuration = error_of([&] { (void)merged({one, write_part(other_sweep, "other", {2, 2})}); });
   CHECK(configuration.find("different configurations") != std::string::npos);
   CHECK(configuration.find("repetitions: 9") != std::string::npos);
+  // Neither an empty line nor the shorter file hides the first difference.
+  const fs::path other = other_sweep.folder.path / "other";
+  const auto told = [&](const std::string& of_one, const std::string& of_other) {
+    write_whole(one / "effective.yaml", of_one), write_whole(other / "effective.yaml", of_other);
+    return error_of([&] { (void)merged({one, other}); });
+  };
+  CHECK(told("a: 1\n\nb: 2\n", "a: 1\nb: 3\n").find("differ in `b: 2` against `b: 3`") != std::string::npos);
+  CHECK(told("a: 1\n", "a: 1\n  b: 3\n").find("other alone has `b: 3`") != std::string::npos);
+  CHECK(told("a: 1\n  b: 3\n", "a: 1\n").find("one alone has `b: 3`") != std::string::npos);
+  write_part(sweep, "one", {1, 2});
 
   Json elsewhere = machine();
   elsewhere["cpu"] = "another processor";
