@@ -71,6 +71,7 @@ void declare_compare(CLI::App& app, CompareCommand& compare) {
   c->add_option("--min-difference", compare.options.min_difference, "Smallest difference of speed that counts, in per cent (default 3)")->check(CLI::Range(0.0, 1000.0));
   c->add_option("--significance", compare.options.significance, "Share of false findings among the findings at most (default 0.05)")->check(CLI::Range(1e-6, 0.5));
   c->add_option("--control", compare.options.control, "Cells whose code did not change, by a regular expression (/embree/): speeds are taken relative to theirs");
+  c->add_flag("--strict", compare.options.strict, "Undecided cells whose whole interval is beyond the smallest difference on the slow side count as slower");
   c->add_option("--filter", compare.filter, "Only cells whose name this regular expression finds");
   c->add_option("--skip", compare.skip, "No cells whose name this regular expression finds");
   c->add_flag("--all", compare.all, "Also list indistinguishable cells where there are many");

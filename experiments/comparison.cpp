@@ -187,18 +187,18 @@ class Comparer {
     const double limit = 1.0 + 0.01 * o.min_difference;
     const auto least = [](const ComparedCell& c) { return smallest_p(c.a.repetitions.size(), c.b.repetitions.size()); };
     const std::vector<std::size_t> tested = places([&](const ComparedCell& c) { return least(c) <= o.significance; });
+    for (ComparedCell& cell : out_.cells) cell.beyond = cell.ratio.low > limit || cell.ratio.high < 1.0 / limit;
     std::vector<double> p;
     for (std::size_t i : tested) p.push_back(out_.cells[i].p);
     p = benjamini_hochberg(p);
     for (std::size_t k = 0; k < tested.size(); ++k) {
       ComparedCell& cell = out_.cells[tested[k]];
       cell.tested = true, cell.adjusted_p = p[k];
-      const bool up = cell.ratio.low > limit, down = cell.ratio.high < 1.0 / limit;
       cell.equal = cell.ratio.low > 1.0 / limit && cell.ratio.high < limit;
-      if (up || down) {
+      if (cell.beyond) {
         // Even the clearest difference of so few repetitions would not stand out among so many cells.
         const bool too_few = least(cell) * static_cast<double>(tested.size()) > o.significance;
-        cell.verdict = p[k] <= o.significance ? (up ? Verdict::faster : Verdict::slower) : too_few ? Verdict::undecided : Verdict::indistinguishable;
+        cell.verdict = p[k] <= o.significance ? (cell.ratio.low > 1.0 ? Verdict::faster : Verdict::slower) : too_few ? Verdict::undecided : Verdict::indistinguishable;
       } else {
         cell.verdict = Verdict::indistinguishable;
       }
@@ -274,6 +274,10 @@ std::size_t Comparison::count(Verdict verdict) const {
 
 std::size_t Comparison::more_wrong() const {
   return static_cast<std::size_t>(std::ranges::count_if(cells, [](const ComparedCell& c) { return c.more_wrong_answers().value_or(0.0) > 0.0; }));
+}
+
+std::size_t Comparison::suspects() const {
+  return static_cast<std::size_t>(std::ranges::count_if(cells, &ComparedCell::is_suspect));
 }
 
 Comparison compare_results(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options) {

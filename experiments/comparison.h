@@ -18,7 +18,8 @@ namespace arboretum {
 struct CompareOptions {
   double min_difference = 3.0;  ///< per cent
   double significance = 0.05;   ///< of the adjusted p-values
-  std::string control;          ///< regular expression: cells whose geometric mean all speeds are taken relative to; empty: none
+  std::string control = {};     ///< regular expression: cells whose geometric mean all speeds are taken relative to; empty: none
+  bool strict = false;          ///< an undecided cell whose whole interval is beyond the limit on the slow side is a regression
 };
 
 enum class Verdict { faster, slower, indistinguishable, undecided };
@@ -31,9 +32,11 @@ struct ComparedCell {
   double p = 1.0, adjusted_p = 1.0;
   bool tested = false;      ///< there are repetitions enough for the test to find something
   Verdict verdict = Verdict::undecided;
-  bool equal = false;  ///< the whole interval lies within the smallest difference that counts
+  bool equal = false;   ///< the whole interval lies within the smallest difference that counts
+  bool beyond = false;  ///< the whole interval lies beyond it, to one side
 
   [[nodiscard]] bool is_trace() const noexcept { return a.is_trace(); }
+  [[nodiscard]] bool is_suspect() const noexcept { return verdict == Verdict::undecided && beyond && ratio.median < 1.0; }
   /// Wrong answers that B has more than A; std::nullopt where one of them was not checked.
   [[nodiscard]] std::optional<double> more_wrong_answers() const;
 };
@@ -64,7 +67,9 @@ struct Comparison {
   [[nodiscard]] std::size_t count(Verdict verdict) const;
   /// Cells with more wrong answers in B.
   [[nodiscard]] std::size_t more_wrong() const;
-  [[nodiscard]] bool is_regression() const { return count(Verdict::slower) > 0 || more_wrong() > 0; }
+  /// Undecided cells that look slower: their whole interval is beyond the smallest difference.
+  [[nodiscard]] std::size_t suspects() const;
+  [[nodiscard]] bool is_regression() const { return count(Verdict::slower) > 0 || more_wrong() > 0 || (options.strict && suspects() > 0); }
 };
 
 /// Throws UserError for a control that finds no cell of both.

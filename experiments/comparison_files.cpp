@@ -22,7 +22,7 @@ Json cell_json(const ComparedCell& c) {
   json["rate_a"] = c.rate_a.median, json["rate_b"] = c.rate_b.median;
   json["ratio"] = c.ratio.median, json["ratio_low"] = c.ratio.low, json["ratio_high"] = c.ratio.high;
   json["p"] = c.p, json["adjusted_p"] = c.tested ? Json(c.adjusted_p) : Json();
-  json["verdict"] = to_string(c.verdict), json["equal"] = c.equal;
+  json["verdict"] = to_string(c.verdict), json["equal"] = c.equal, json["beyond"] = c.beyond;
   json["repetitions_a"] = c.a.repetitions.size(), json["repetitions_b"] = c.b.repetitions.size();
   for (const char* fact : {"rays", "wrong_answers", "sah_cost", "bytes"}) {
     for (const auto& [letter, result] : {std::pair{"a", &c.a}, std::pair{"b", &c.b}})
@@ -47,7 +47,7 @@ std::string comparison_json(const Comparison& comparison, const ResultFolder& a,
   const auto [status, why] = verdict(comparison);
   Json json = Json::object();
   json["verdict"] = why, json["exit_status"] = static_cast<int>(status);
-  json["options"] = {{"min_difference_percent", o.min_difference}, {"significance", o.significance}, {"control", o.control}};
+  json["options"] = {{"min_difference_percent", o.min_difference}, {"significance", o.significance}, {"control", o.control}, {"strict", o.strict}};
   json["a"] = folder_json(a), json["b"] = folder_json(b);
   Json& differences = json["differences"] = Json::array();
   for (const std::string& line : machine_differences(a.context, b.context)) differences.push_back(line);

@@ -11,7 +11,7 @@
 namespace arboretum {
 namespace {
 
-constexpr std::size_t kMostRows = 60, kMostNames = 10;
+constexpr std::size_t kMostRows = 60, kMostNames = 10, kMostBeyond = 3;
 
 /// "7", "3 to 7" repetitions.
 std::string repetitions(const std::vector<CellResult>& cells) {
@@ -182,6 +182,19 @@ std::string name_list(const std::vector<std::string>& names, const std::string& 
   return text;
 }
 
+/// Of the undecided cells those whose whole interval is beyond the smallest difference, for the last line: "no regression found" alone would hide them.
+std::string beyond_text(const Comparison& comparison) {
+  const auto undecided = [](const ComparedCell& c) { return c.verdict == Verdict::undecided && c.beyond; };
+  const auto cells = std::ranges::count_if(comparison.cells, undecided);
+  if (cells == 0) return {};
+  std::vector<std::string> names;
+  for (const ComparedCell& c : comparison.cells)
+    if (undecided(c) && names.size() < kMostBeyond) names.push_back(fmt::format("{} (B/A {:.3f})", c.a.cell.name(), c.ratio.median));
+  return fmt::format("; {} {} wholly beyond {:g} % but undecided, {} on the slow side: {}{}; {} repetitions would do", cells, cells == 1 ? "cell is" : "cells are",
+                     comparison.options.min_difference, comparison.suspects(), fmt::join(names, ", "), static_cast<std::size_t>(cells) > names.size() ? ", …" : "",
+                     comparison.repetitions_needed);
+}
+
 }  // namespace
 
 std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
@@ -217,8 +230,9 @@ std::pair<ExitStatus, std::string> verdict(const Comparison& comparison) {
     if (const std::size_t n = comparison.count(v); n > 0) counts.push_back(fmt::format("{} {}", n, to_string(v)));
   if (const std::size_t n = comparison.more_wrong(); n > 0) counts.push_back(fmt::format("{} with more wrong answers", n));
   const std::string of = fmt::format("of {} cells {}", comparison.cells.size(), fmt::join(counts, ", "));
-  if (comparison.is_regression()) return {ExitStatus::kRegression, fmt::format("regression: {}; exit status 3", of)};
-  return {ExitStatus::kDone, fmt::format("no regression{}: {}", comparison.count(Verdict::undecided) > 0 ? " found" : "", of)};
+  const std::string beyond = beyond_text(comparison);
+  if (comparison.is_regression()) return {ExitStatus::kRegression, fmt::format("regression: {}{}; exit status 3", of, beyond)};
+  return {ExitStatus::kDone, fmt::format("no regression{}: {}{}", comparison.count(Verdict::undecided) > 0 ? " found" : "", of, beyond)};
 }
 
 }  // namespace arboretum

@@ -180,6 +180,17 @@ TEST_CASE("too few repetitions are undecided, never a verdict") {
   const Comparison four = compare_results(a, b, {});
   CHECK(find(four, "bvh8").verdict == Verdict::undecided);
   CHECK(find(four, "bvh2").verdict == Verdict::indistinguishable);
+  // It looks halved: the last line says so, and --strict takes it for slower; what looks faster it leaves alone.
+  CHECK(four.suspects() == 1);
+  CHECK(verdict(four).first == ExitStatus::kDone);
+  const std::string last = verdict(four).second;
+  CHECK(last.find("no regression found") != std::string::npos);
+  CHECK(last.find("1 cell is wholly beyond 3 % but undecided, 1 on the slow side: " + find(four, "bvh8").a.cell.name()) != std::string::npos);
+  CHECK(last.find(std::to_string(four.repetitions_needed) + " repetitions would do") != std::string::npos);
+  CHECK(verdict(compare_results(a, b, {.strict = true})).first == ExitStatus::kRegression);
+  CHECK(verdict(compare_results(b, a, {.strict = true})).first == ExitStatus::kDone);
+  CHECK(verdict(compare_results(b, a, {})).second.find("undecided, 0 on the slow side") != std::string::npos);
+  CHECK(verdict(compare_results(a, a, {.strict = true})).second.find("beyond") == std::string::npos);
   CHECK(compare_results({*find(a, "bvh8")}, {*find(b, "bvh8")}, {}).count(Verdict::slower) == 1);
 }
 
