@@ -21,7 +21,7 @@ namespace {
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
   throw UserError(
       fmt::format("{}: cannot be written: {}; {}", path.string(), std::strerror(error),
-                  full ? "free some space, then go on with --resume" : "choose another folder with --out"));
+                  full ? "free some space and start again (a run goes on with --resume)" : "name a file in a folder that exists and may be written to"));
 }
 
 /// Bytes up to and with the last newline.
@@ -101,6 +101,14 @@ void write_whole(const std::filesystem::path& path, std::string_view text) {
     ::unlink(beside.c_str());
     cannot_write(path, error);
   }
+}
+
+void require_writable(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) cannot_write(path, EISDIR);
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) cannot_write(path, errno);
+  if (!std::filesystem::is_directory(folder, ignored)) cannot_write(path, ENOTDIR);
 }
 
 void make_output_folder(const std::filesystem::path& folder) {

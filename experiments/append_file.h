@@ -33,6 +33,8 @@ class AppendFile {
 [[nodiscard]] std::vector<std::string> read_lines(const std::filesystem::path& path);
 /// Writes beside `path` and renames over it, so that a failure leaves the old file. Throws UserError.
 void write_whole(const std::filesystem::path& path, std::string_view text);
+/// Throws UserError where write_whole could not write to `path`, as far as can be seen without writing.
+void require_writable(const std::filesystem::path& path);
 /// Creates the folder, if need be, and tries whether files can be made in it. Throws UserError.
 void make_output_folder(const std::filesystem::path& folder);
 

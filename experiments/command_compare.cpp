@@ -43,19 +43,23 @@ void write(const std::string& path, const std::string& text) {
 ExitStatus command_compare(const CompareCommand& command) {
   if (command.json == "-" && command.csv == "-") throw UserError("compare: --json and --csv cannot both go to stdout; give one of them a file");
   refuse_unknown_format(command.plot);
+  for (const std::filesystem::path& file : {std::filesystem::path(command.json), std::filesystem::path(command.csv), command.plot})
+    if (!file.empty() && file != "-") require_writable(file);
   ResultFolder a = read_result_folder(command.a), b = read_result_folder(command.b);
   if (!command.allow_different_machines) refuse_different_machines(a, b);
   filter_cells(a, command.filter, command.skip), filter_cells(b, command.filter, command.skip);
   const Comparison comparison = compare_results(a.cells, b.cells, command.options);
   const auto [status, why] = verdict(comparison);
-  write(command.json, comparison_json(comparison, a, b));
-  write(command.csv, comparison_csv(comparison));
-  if (!command.plot.empty() && !comparison.cells.empty()) {
-    if (const std::string problem = draw_ratios(comparison_json(comparison, a, b), command.plot); !problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
-  }
   if (command.json != "-" && command.csv != "-") {
     fmt::print("{}{}", origins_text(a, b), comparison_text(comparison, command.all));
     if (status != ExitStatus::kNothingMeasured) fmt::print("\n{}\n", why);
+  }
+  // After the text: what fails here takes nothing from it.
+  write(command.json, comparison_json(comparison, a, b));
+  write(command.csv, comparison_csv(comparison));
+  if (!command.plot.empty() && !comparison.cells.empty()) {
+    std::fflush(stdout);  // the script may print too
+    if (const std::string problem = draw_ratios(comparison_json(comparison, a, b), command.plot); !problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
   }
   std::fflush(stdout);
   if (status == ExitStatus::kNothingMeasured) fmt::print(stderr, "arboretum: {}\n", why);
