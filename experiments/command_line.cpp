@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <new>
@@ -30,6 +32,13 @@ struct Arguments {
   std::vector<std::string> figures, fetched;
 };
 
+/// A whole number from 0 to 2^64 - 1. By itself the conversion takes -1 for 2^64 - 1.
+std::string refuse_no_count(const std::string& word) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  return error == std::errc{} && end == word.data() + word.size() ? "" : fmt::format("'{}' is no whole number from 0 to {}", word, ~std::uint64_t{0});
+}
+
 void declare_run(CLI::App& app, RunCommand& run) {
   CLI::App* c =
       app.add_subcommand("run", "Run the sweep of a configuration; table, results, plots and report");
@@ -48,7 +57,7 @@ void declare_run(CLI::App& app, RunCommand& run) {
       ->check(CLI::Range(1, 100000));
   c->add_option("--threads", run.overrides.threads, "Threads, in place of the configuration's")
       ->check(CLI::Range(1, 4096));
-  c->add_option("--seed", run.overrides.seed, "Seed of the workloads' random numbers");
+  c->add_option("--seed", run.overrides.seed, "Seed of the workloads' random numbers")->check(refuse_no_count);
   c->add_flag("--fail-fast", run.fail_fast, "Stop at the first wrong answer");
   c->add_flag("--no-plots", run.no_plots, "Draw no plots and write no report");
   c->footer("Google Benchmark's --benchmark_* flags pass through.");
@@ -86,8 +95,9 @@ void declare_verify(CLI::App& app, VerifyCommand& verify) {
   CLI::App* c = app.add_subcommand("verify", "Combinations against exact arithmetic, ray by ray, on hard rays");
   c->add_option("SUBJECT", verify.subject, "A scene as for `info`, a cases file (.json), or `random`: random small meshes")->required();
   c->add_option("AXIS", verify.axes, "axis=value,value: which combinations (isa=avx2,avx512); axis=all");
-  c->add_option("--rays", verify.rays, "Rays in all (default 100000; a cases file: each case once, and mutations of them beyond that)");
-  c->add_option("--seed", verify.seed, "Seed of the rays (default 1)");
+  c->add_option("--rays", verify.rays, "Rays in all (default 100000; a cases file: each case once, and mutations of them beyond that)")
+      ->check(refuse_no_count);
+  c->add_option("--seed", verify.seed, "Seed of the rays (default 1)")->check(refuse_no_count);
   c->add_option("--offset", verify.offsets, "Moves the scene by these distances along (1, -3/4, 1/2)")->delimiter(',')->allow_extra_args(false);
   c->add_option("--scale", verify.scales, "Scales the moved scene by these powers of two: -60,0,60")->delimiter(',')->allow_extra_args(false);
   c->add_option("--kinds", verify.kinds, "Kinds of rays: vertex, edge, border, interior, grazing, axis, plane, surface, far, interval, invalid")
@@ -112,7 +122,7 @@ void declare_render(CLI::App& app, RenderCommand& render) {
   c->add_option("--clamp", render.settings.clamp, "Most light that one path brings at once from beyond its first hit: fewer bright specks, some light lost (default: none)")
       ->check(CLI::PositiveNumber);
   c->add_option("--exposure", render.exposure, "auto, or stops: radiance 1 is white at 0");
-  c->add_option("--seed", render.settings.seed, "Seed of the random numbers (default 1)");
+  c->add_option("--seed", render.settings.seed, "Seed of the random numbers (default 1)")->check(refuse_no_count);
   c->add_option("--threads", render.settings.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
   c->add_option("--structure", render.kernel.structure, "Structure to trace with (default bvh8, bvh4_motion for what moves)");
   c->add_option("--builder", render.kernel.builder, "Its builder");
