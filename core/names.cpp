@@ -29,10 +29,17 @@ std::string nearest_name(std::string_view name, std::span<const std::string> can
   return best;
 }
 
+std::string close_name(std::string_view name, std::span<const std::string> candidates) {
+  const std::string nearest = nearest_name(name, candidates);
+  const bool same_start = name.size() >= 3 && nearest.starts_with(name.substr(0, 3));
+  return same_start || 3 * edit_distance(name, nearest) <= std::max(name.size(), nearest.size()) ? nearest : "";
+}
+
 std::string unknown_name_message(std::string_view kind, std::string_view name, std::span<const std::string> candidates) {
   std::string message = "unknown " + std::string(kind) + " '" + std::string(name) + "'";
   if (candidates.empty()) return message;
-  message += "; did you mean '" + nearest_name(name, candidates) + "'? (valid:";
+  const std::string close = close_name(name, candidates);
+  message += close.empty() ? " (valid:" : "; did you mean '" + close + "'? (valid:";
   for (const std::string& candidate : candidates) message += " " + candidate;
   return message + ")";
 }

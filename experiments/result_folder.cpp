@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "experiments/append_file.h"
+#include "experiments/results_writer.h"
 
 namespace arboretum {
 namespace {
@@ -35,14 +36,16 @@ std::vector<std::string> folders_in(const fs::path& path) {
   std::error_code ignored;
   const bool is_folder = fs::is_directory(path, ignored), is_there = fs::exists(path, ignored);
   std::string what = is_folder ? "no result folder: neither cells.jsonl nor results.json in it" : is_there ? "a file; give the folder that `run` wrote" : "no such folder";
+  const std::string text = path.lexically_normal().string();
+  // Within or around what was named a folder may be called anything; beside it only what is spelt alike is meant.
   std::vector<std::string> near;
   if (is_folder) near = folders_in(path);
   if (near.empty() && is_result_folder(path.parent_path())) near = {path.parent_path().string()};
-  if (near.empty()) near = folders_in(path.has_parent_path() ? path.parent_path() : fs::path("."));
-  if (near.empty()) near = folders_in("results");
-  const std::string text = path.lexically_normal().string();
-  throw UserError(near.empty() ? fmt::format("{}: {}; `arboretum run` makes result folders", path.string(), what)
-                               : fmt::format("{}: {}; did you mean '{}'?", path.string(), what, nearest_name(text, near)));
+  std::string meant = nearest_name(text, near);
+  for (const fs::path& beside : {path.has_parent_path() ? path.parent_path() : fs::path("."), fs::path("results")})
+    if (meant.empty()) meant = close_name(text, folders_in(beside));
+  throw UserError(meant.empty() ? fmt::format("{}: {}; `arboretum run` makes result folders", path.string(), what)
+                                : fmt::format("{}: {}; did you mean '{}'?", path.string(), what, meant));
 }
 
 Json read_json(const fs::path& path) {
@@ -139,10 +142,9 @@ std::string hash_of_configuration(const fs::path& folder) {
 std::string text_of(const Json& context, const char* key) {
   const auto found = context.find(key);
   if (found == context.end()) return "unknown";
-  if (found->is_string()) return found->get<std::string>();
-  if (!found->is_array()) return found->dump();
+  if (!found->is_array()) return plain_text(*found);
   std::vector<std::string> words;
-  for (const Json& word : *found) words.push_back(word.is_string() ? word.get<std::string>() : word.dump());
+  for (const Json& word : *found) words.push_back(plain_text(word));
   return fmt::format("{}", fmt::join(words, " "));
 }
 

@@ -14,6 +14,8 @@ namespace arboretum {
 /// One row a repetition; empty where a figure does not apply.
 [[nodiscard]] std::string results_csv(const RunOutcome& outcome);
 
+/// A value as people read it: strings without their quotes.
+[[nodiscard]] std::string plain_text(const Json& value);
 /// A value of a CSV row, quoted where need be.
 [[nodiscard]] std::string csv_field(const Json& value);
 

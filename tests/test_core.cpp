@@ -65,6 +65,14 @@ TEST_CASE("the nearest name to a misspelt one") {
   CHECK(edit_distance("ab", "ba") == 1);
   CHECK(edit_distance("", "abc") == 3);
   CHECK_THAT(unknown_name_message("structure", "bhv8", names), Catch::Contains("did you mean 'bvh8'?"));
+  // What is not spelt alike is not asked for: a third of the longer word, or its first three letters.
+  CHECK(unknown_name_message("scene", "kitchn", std::vector<std::string>{"city", "forest"}) == "unknown scene 'kitchn' (valid: city forest)");
+  CHECK(close_name("nosuch", std::vector<std::string>{"forest"}).empty());
+  CHECK(close_name("nonexist", std::vector<std::string>{"A"}).empty());
+  CHECK(close_name("rum", std::vector<std::string>{"run", "render"}) == "run");
+  CHECK(close_name("rotation", std::vector<std::string>{"scale", "rotate"}) == "rotate");
+  CHECK(close_name("", names).empty());
+  CHECK(close_name("bvh", {}).empty());
 }
 
 TEST_CASE("random numbers depend on seed, index and dimension alone, and fill [0, 1)") {

@@ -74,6 +74,7 @@ class ResultFolders(CommandLineCase):
         self.assert_error(self.call("merge", "other", parts[0], parts[0]), "given twice")
         self.assert_error(self.call("merge", "other", "results"), "did you mean")
         self.assert_error(self.call("merge", "other", "results/smal"), "did you mean 'results/small")
+        self.assertNotIn("did you mean", self.call("merge", "other", parts[0], "nonexist").stderr)
         self.assert_error(self.call("merge", "other"), "PART")
         self.assert_error(self.run_small(*FEW, "--shard", "2/3", "--resume", "--out", parts[0]), "holds shard 1/3")
         self.assertFalse((self.folder / "other").exists())
@@ -172,7 +173,10 @@ class ResultFolders(CommandLineCase):
         self.assert_error(self.call("compare", first, first, "--filter", "("), "regular expression")
         self.assert_error(self.call("compare", first, first, "--control", "nothing-is-called-so"), "finds no cell")
         self.assert_error(self.call("compare", first, first, "--plot", "ratios.doc"), ".png, .svg or .pdf")
-        self.assert_error(self.call("compare", first, first, "--csv", "/nowhere/out.csv"), "cannot be written")
+        for option, file in (("--csv", "/nowhere/out.csv"), ("--json", "/nowhere/out.json"), ("--plot", "/nowhere/out.svg"), ("--json", ".")):
+            refused = self.call("compare", first, first, option, file)
+            self.assert_error(refused, f"{file}: cannot be written", "a folder that exists")
+            self.assertNotIn("--out", refused.stderr)
         self.write("results.json", "{")
         self.assert_error(self.call("compare", first, "."), "results.json")
 
