@@ -3,14 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <optional>
 #include <set>
 
+#include "experiments/results_writer.h"
 #include "experiments/table_text.h"
 
 namespace arboretum {
 namespace {
 
+constexpr double kLoadDifference = 0.5;  // half a core
 constexpr std::size_t kMostRows = 60, kMostNames = 10, kMostBeyond = 3;
 
 /// "7", "3 to 7" repetitions.
@@ -34,18 +38,14 @@ struct Axes {
   std::vector<std::string> constant;  ///< "builder binned_sah"
 };
 
-std::string text_of(const Json& value) {
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
-
 Axes axes_of(const std::vector<Json>& cells) {
   Axes axes;
   for (const auto& [axis, value] : cells.front().items()) {
     const bool same = std::ranges::all_of(cells, [&, &key = axis, &of_first = value](const Json& cell) { return cell[key] == of_first; });
     if (!same)
       axes.varying.push_back(axis);
-    else if (axis != "metric" && text_of(value) != "-")
-      axes.constant.push_back(fmt::format("{} {}", axis, text_of(value)));
+    else if (axis != "metric" && plain_text(value) != "-")
+      axes.constant.push_back(fmt::format("{} {}", axis, plain_text(value)));
   }
   return axes;
 }
@@ -80,7 +80,7 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
       continue;
     }
     TableRow row;
-    for (const std::string& axis : axes.varying) row.push_back(text_of(values[i][axis]));
+    for (const std::string& axis : axes.varying) row.push_back(plain_text(values[i][axis]));
     if (row.empty()) row.push_back(c->a.cell.structure);
     const double triangles = c->a.fact("triangles");
     const auto speed = [&](double rate) { return trace ? fmt::format("{:.2f}", rate * 1e-6) : fmt::format("{:.2f}", 1e3 * triangles / rate); };
@@ -120,6 +120,7 @@ std::string legend(const Comparison& comparison) {
       "of their ratio. p: Mann-Whitney test, adjusted for the number of cells (Benjamini-Hochberg). faster, slower: the whole interval is beyond {:g} %, and p at\n"
       "most {:g}.\n",
       o.min_difference, o.significance);
+  if (!comparison.control) text += "Drift of the machine between the two runs is in neither the interval nor p; --control REGEX (cells whose code did not change) takes it out.\n";
   if (const std::size_t n = comparison.count(Verdict::indistinguishable); n > 0) {
     text += fmt::format("Of the {} indistinguishable cells {} are known to be equal: their whole interval is within {:g} %.\n", n,
                         std::ranges::count(comparison.cells, true, &ComparedCell::equal), o.min_difference);
@@ -195,6 +196,25 @@ std::string beyond_text(const Comparison& comparison) {
                      comparison.repetitions_needed);
 }
 
+/// One-minute load average when the run began.
+std::optional<double> load_of(const ResultFolder& f) {
+  const std::string text = f.context_text("load");
+  double load = 0.0;
+  return std::from_chars(text.data(), text.data() + text.size(), load).ec == std::errc{} ? std::optional(load) : std::nullopt;
+}
+
+/// What speaks for a machine that was busy while A or B was measured.
+std::string busy_text(const ResultFolder& a, const ResultFolder& b) {
+  std::string text;
+  const std::optional<double> of_a = load_of(a), of_b = load_of(b);
+  if (of_a && of_b && std::abs(*of_a - *of_b) > kLoadDifference) text += fmt::format("differs: load average at the start: {:.2f} against {:.2f}\n", *of_a, *of_b);
+  for (const auto& [letter, folder] : {std::pair{"A", &a}, std::pair{"B", &b}}) {
+    for (const Json& warning : folder->context.value("warnings", Json::array()))
+      if (warning.is_string() && warning.get<std::string>().starts_with("noisy machine")) text += fmt::format("{} warned: {}\n", letter, warning.get<std::string>());
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
@@ -205,7 +225,7 @@ std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
   for (const auto& [key, title] : {std::pair{"host_name", "host"}, std::pair{"seed", "seed, and so the rays"}})
     if (a.context_text(key) != b.context_text(key)) text += fmt::format("differs: {}: {} against {}\n", title, a.context_text(key), b.context_text(key));
   if (a.configuration_hash != b.configuration_hash) text += "differs: configuration (effective.yaml); cells are matched by name, and compared where rays and triangles are as many\n";
-  return text;
+  return text + busy_text(a, b);
 }
 
 std::string comparison_text(const Comparison& comparison, bool all) {
