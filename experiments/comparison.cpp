@@ -12,11 +12,13 @@
 #include "core/random.h"
 #include "experiments/axes.h"
 #include "experiments/rank_test.h"
+#include "experiments/results_writer.h"
 
 namespace arboretum {
 namespace {
 
 constexpr std::size_t kResamples = 2000;
+constexpr const char* kEmbree = "machine";  // the group that is no axis of the table
 using Replicates = std::vector<double>;  // logarithms of ratios
 
 /// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
@@ -58,18 +60,21 @@ class Comparer {
   Comparer(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options) { out_.options = options, match(a, b); }
 
   Comparison run() {
-    for (const ComparedCell& cell : out_.cells) {
-      const std::vector<double> a = rates(cell.a), b = rates(cell.b);
-      logs_.push_back(log_ratios(cell.a.cell.name(), a, b));
-      centres_.push_back(std::log(median(b) / median(a)));
+    for (const ComparedCell& cell : out_.cells) centres_.push_back(std::log(median(rates(cell.b)) / median(rates(cell.a))));
+    if (!out_.options.control.empty()) take_relative();
+    const std::vector<Group> groups = make_groups();
+    std::vector<std::vector<std::size_t>> groups_of(out_.cells.size());
+    std::vector<Replicates> sums(groups.size(), Replicates(kResamples, 0.0));
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      for (std::size_t i : groups[g].cells) groups_of[i].push_back(g);
+    // One cell's replicates at a time: those of a large sweep would fill gigabytes.
+    for (std::size_t i = 0; i < out_.cells.size(); ++i) {
+      Replicates logs = replicates(i);
+      for (std::size_t g : groups_of[i]) add(sums[g], logs);
+      estimate(i, std::move(logs));
     }
-    if (out_.options.control.empty())
-      out_.embree = mean_if("structure", "embree", [](const ComparedCell& c) { return c.is_trace() && c.a.cell.structure == "embree"; });
-    else
-      take_relative();
-    for (std::size_t i = 0; i < out_.cells.size(); ++i) estimate(i);
     judge();
-    add_means();
+    for (std::size_t g = 0; g < groups.size(); ++g) add_mean(groups[g], std::move(sums[g]));
     add_structures();
     return std::move(out_);
   }
@@ -116,34 +121,48 @@ class Comparer {
     return found;
   }
 
-  /// Mean of the centres, and of each replicate.
-  std::pair<double, Replicates> mean_logs(const std::vector<std::size_t>& cells) const {
-    double centre = 0.0;
-    Replicates sum(kResamples, 0.0);
-    for (std::size_t i : cells) {
-      centre += centres_[i];
-      for (std::size_t k = 0; k < kResamples; ++k) sum[k] += logs_[i][k];
-    }
-    const double n = static_cast<double>(cells.size());
-    for (double& v : sum) v /= n;
-    return {centre / n, std::move(sum)};
+  /// Cells of which there is a geometric mean.
+  struct Group {
+    std::string axis, value;
+    std::vector<std::size_t> cells;
+  };
+
+  static void add(Replicates& sum, const Replicates& logs) {
+    for (std::size_t k = 0; k < kResamples; ++k) sum[k] += logs[k];
   }
 
-  template <class Choose>
-  std::optional<MeanRatio> mean_if(std::string axis, std::string value, const Choose& choose) const {
-    const std::vector<std::size_t> cells = places(choose);
-    if (cells.empty()) return std::nullopt;
-    return mean_of(std::move(axis), std::move(value), cells);
+  /// Logarithms of the cell's ratio, relative to the control's.
+  Replicates replicates(std::size_t i) const {
+    const ComparedCell& cell = out_.cells[i];
+    Replicates logs = log_ratios(cell.a.cell.name(), rates(cell.a), rates(cell.b));
+    if (const Replicates& control = control_[cell.is_trace()]; !control.empty())
+      for (std::size_t k = 0; k < kResamples; ++k) logs[k] -= control[k];
+    return logs;
   }
 
-  MeanRatio mean_of(std::string axis, std::string value, const std::vector<std::size_t>& cells) const {
-    auto [centre, logs] = mean_logs(cells);
-    MeanRatio mean{std::move(axis), std::move(value), interval(centre, std::move(logs)), cells.size()};
-    for (std::size_t i : cells) {
+  double mean_centre(const std::vector<std::size_t>& cells) const {
+    double sum = 0.0;
+    for (std::size_t i : cells) sum += centres_[i];
+    return sum / static_cast<double>(cells.size());
+  }
+
+  /// Of the sums of its cells' replicates.
+  MeanRatio mean_of(const Group& group, Replicates sums) const {
+    for (double& v : sums) v /= static_cast<double>(group.cells.size());
+    MeanRatio mean{group.axis, group.value, interval(mean_centre(group.cells), std::move(sums)), group.cells.size()};
+    for (std::size_t i : group.cells) {
       const Verdict v = out_.cells[i].verdict;
       ++(v == Verdict::faster ? mean.faster : v == Verdict::slower ? mean.slower : v == Verdict::undecided ? mean.undecided : mean.indistinguishable);
     }
     return mean;
+  }
+
+  void add_mean(const Group& group, Replicates sums) {
+    MeanRatio mean = mean_of(group, std::move(sums));
+    if (group.axis == kEmbree)
+      out_.embree = std::move(mean);
+    else
+      out_.means.push_back(std::move(mean));
   }
 
   /// Divides all ratios by those of the control cells: trace by trace, builds by builds where the control has some.
@@ -160,22 +179,23 @@ class Comparer {
       const std::vector<std::size_t> cells = places(is_control);
       if (cells.empty()) continue;
       any = true;
-      if (trace) out_.control = mean_if("control", out_.options.control, is_control);
-      const auto [centre, logs] = mean_logs(cells);
-      for (std::size_t i : places([&](const ComparedCell& c) { return c.is_trace() == trace; })) {
-        centres_[i] -= centre;
-        for (std::size_t k = 0; k < kResamples; ++k) logs_[i][k] -= logs[k];
-      }
+      Replicates sum(kResamples, 0.0);
+      for (std::size_t i : cells) add(sum, replicates(i));
+      if (trace) out_.control = mean_of({"control", out_.options.control, cells}, sum);
+      const double centre = mean_centre(cells);
+      for (std::size_t i : places([&](const ComparedCell& c) { return c.is_trace() == trace; })) centres_[i] -= centre;
+      for (double& v : sum) v /= static_cast<double>(cells.size());
+      control_[trace] = std::move(sum);
     }
     if (!any) throw UserError(fmt::format("--control '{}' finds no cell that is in both; it is a regular expression on cell names, as in --control /embree/", out_.options.control));
   }
 
-  void estimate(std::size_t i) {
+  void estimate(std::size_t i, Replicates logs) {
     ComparedCell& cell = out_.cells[i];
     const std::vector<double> a = rates(cell.a);
     std::vector<double> b = rates(cell.b);
     cell.rate_a = bootstrap_median(a), cell.rate_b = bootstrap_median(b);
-    cell.ratio = interval(centres_[i], logs_[i]);
+    cell.ratio = interval(centres_[i], std::move(logs));
     const double machine = cell.ratio.median / (cell.rate_b.median / cell.rate_a.median);  // 1 without a control
     if (!out_.options.control.empty())
       for (double& rate : b) rate *= machine;
@@ -208,27 +228,30 @@ class Comparer {
     while (smallest_p(out_.repetitions_needed, out_.repetitions_needed) * static_cast<double>(out_.cells.size()) > o.significance) ++out_.repetitions_needed;
   }
 
-  void add_means() {
-    const auto add = [&](std::optional<MeanRatio> mean) {
-      if (mean) out_.means.push_back(std::move(*mean));
+  /// All rays, the values of each axis that varies, all builds; and Embree's cells, which tell of the machine.
+  std::vector<Group> make_groups() const {
+    std::vector<Group> groups;
+    const auto add_group = [&](std::string axis, std::string value, std::vector<std::size_t> cells) {
+      if (!cells.empty()) groups.push_back({std::move(axis), std::move(value), std::move(cells)});
     };
-    add(mean_if("", "rays", [](const ComparedCell& c) { return c.is_trace(); }));
     const std::vector<std::size_t> traced = places([](const ComparedCell& c) { return c.is_trace(); });
+    add_group("", "rays", traced);
     std::vector<Json> axes(traced.size(), Json::object());
     for (std::size_t k = 0; k < traced.size(); ++k) add_axes(axes[k], out_.cells[traced[k]].a.cell);
     for (const char* axis : {"scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads"}) {
       std::vector<std::pair<std::string, std::vector<std::size_t>>> by_value;
       for (std::size_t k = 0; k < traced.size(); ++k) {
-        const Json& value = axes[k][axis];
-        std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+        std::string text = plain_text(axes[k][axis]);
         auto entry = std::ranges::find(by_value, text, &std::pair<std::string, std::vector<std::size_t>>::first);
         if (entry == by_value.end()) entry = by_value.insert(entry, {std::move(text), {}});
         entry->second.push_back(traced[k]);
       }
       if (by_value.size() < 2) continue;
-      for (const auto& [value, cells] : by_value) out_.means.push_back(mean_of(axis, value, cells));
+      for (auto& [value, cells] : by_value) add_group(axis, std::move(value), std::move(cells));
     }
-    add(mean_if("", "builds", [](const ComparedCell& c) { return !c.is_trace(); }));
+    add_group("", "builds", places([](const ComparedCell& c) { return !c.is_trace(); }));
+    if (out_.options.control.empty()) add_group(kEmbree, "embree", places([](const ComparedCell& c) { return c.is_trace() && c.a.cell.structure == "embree"; }));
+    return groups;
   }
 
   /// Trees are the same from run to run, so any difference is a change. Each is told once.
@@ -247,8 +270,8 @@ class Comparer {
   }
 
   Comparison out_;
-  std::vector<Replicates> logs_;  // of each cell
-  std::vector<double> centres_;
+  std::vector<double> centres_;  // of each cell, the logarithm of its ratio
+  Replicates control_[2];        // mean replicates of the control's builds and rays; empty: none
 };
 
 }  // namespace

@@ -243,6 +243,45 @@ TEST_CASE("a machine that was slower as a whole: a control takes it out, and emb
   CHECK(error_of([&] { (void)compare_results(a, b, {.control = "("}); }).find("regular expression") != std::string::npos);
 }
 
+TEST_CASE("what speaks for a busy machine is told: loads that differ, a warning of noise, drift") {
+  ResultFolder a, b;
+  a.context = {{"load", "0.10 0.20 0.30 1/99 1234"}}, b.context = {{"load", "0.45 0.20 0.30 1/99 1234"}};
+  CHECK(origins_text(a, b).find("load") == std::string::npos);
+  b.context = {{"load", "3.45 0.20 0.30 1/99 1234"}, {"warnings", {"noisy machine: the repetitions spread", "no avx512"}}};
+  const std::string text = origins_text(a, b);
+  CHECK(text.find("differs: load average at the start: 0.10 against 3.45\n") != std::string::npos);
+  CHECK(text.find("B warned: noisy machine: the repetitions spread\n") != std::string::npos);
+  CHECK(text.find("no avx512") == std::string::npos);
+  CHECK(origins_text({}, {}).find("load") == std::string::npos);
+  const Comparison c = compare_results(run(1), run(900), {});
+  CHECK(comparison_text(c, false).find("Drift of the machine between the two runs is in neither the interval nor p") != std::string::npos);
+  CHECK(comparison_text(compare_results(run(1), run(900), {.control = "kdtree"}), false).find("Drift") == std::string::npos);
+}
+
+TEST_CASE("means are those of their cells, whatever the order they are summed in") {
+  std::vector<CellResult> a = run(1), b = run(900);
+  slow_down(*find(b, "bvh8"), 1.25);
+  for (const std::string control : {"", "/kdtree/"}) {
+    const Comparison c = compare_results(a, b, {.control = control});
+    REQUIRE(c.means.size() == 6);  // rays, four structures, builds
+    CHECK((c.means.front().value == "rays" && c.means.back().value == "builds"));
+    double logs = 0.0;
+    for (const ComparedCell& cell : c.cells) {
+      if (!cell.is_trace()) continue;
+      logs += std::log(cell.ratio.median) / 4;
+      const auto mean = std::ranges::find(c.means, cell.a.cell.structure, &MeanRatio::value);
+      REQUIRE(mean != c.means.end());
+      CHECK(mean->ratio.median == Approx(cell.ratio.median));
+      CHECK(mean->ratio.low == Approx(cell.ratio.low));
+      CHECK(mean->ratio.high == Approx(cell.ratio.high));
+    }
+    CHECK(c.means.front().ratio.median == Approx(std::exp(logs)));
+    CHECK(c.means.front().ratio.low < c.means.front().ratio.median);
+    CHECK(c.means.front().cells == 4);
+    CHECK(c.means.front().slower == static_cast<std::size_t>(std::ranges::count_if(c.cells, [](const ComparedCell& cell) { return cell.is_trace() && cell.verdict == Verdict::slower; })));
+  }
+}
+
 TEST_CASE("the comparison as JSON and CSV") {
   const std::vector<CellResult> a = run(1);
   const Comparison c = compare_results(a, run(900), {});
