@@ -115,55 +115,77 @@ Json merged_context(const std::vector<ResultFolder>& parts, const std::string& c
   return context;
 }
 
-/// The union of the parts' plans, and by it the order of the cells, the skipped ones and what is missing.
-void follow_plan(const std::vector<ResultFolder>& parts, Merged& merged) {
-  PlanRecord& record = merged.record;
-  std::set<std::string> planned, skippable;
-  std::size_t whole = 0;
-  for (const ResultFolder& part : parts) {
-    if (!part.plan) continue;
-    whole = std::max(whole, part.plan->cells.size() + part.plan->filtered);
-    record.excluded = part.plan->excluded;
-    if (record.cells.empty()) record.filter = part.plan->filter, record.skip = part.plan->skip;
-    merged.shards = std::max(merged.shards, part.plan->shard.of);
-    for (const PlanRecord::Entry& entry : part.plan->cells)
-      if (planned.insert(entry.name).second) record.cells.push_back(entry);
-    for (const PlanRecord::Entry& entry : part.plan->skipped)
-      if (skippable.insert(entry.name).second) record.skipped.push_back(entry);
-    if (part.plan->filter != record.filter || part.plan->skip != record.skip) record.filter.clear(), record.skip.clear();
+/// The plan of the whole in the making: the union of the parts' plans, and what the parts say of its cells.
+class WholePlan {
+ public:
+  WholePlan(const std::vector<ResultFolder>& parts, Merged& merged) : parts_(parts), merged_(merged) {
+    for (const ResultFolder& part : parts)
+      if (part.plan) unite(*part.plan);
+    for (const ResultFolder& part : parts) take_outcome(part);
   }
-  std::map<std::string, std::pair<const ResultFolder*, std::size_t>> measured;
-  std::map<std::string, std::string> reasons;
-  for (const ResultFolder& part : parts) {
+
+  /// In the plan's order: what was measured, and what neither was nor is said to be impossible.
+  void place_cells() {
+    for (const PlanRecord::Entry& entry : merged_.record.cells) {
+      if (const auto found = measured_.find(entry.name); found != measured_.end()) {
+        const auto& [part, place] = found->second;
+        merged_.outcome.results.push_back(part->cells[place]), merged_.lines.push_back(part->lines[place]);
+      } else if (!reasons_.contains(entry.name)) {
+        merged_.missing.push_back(entry), merged_.outcome.missing.push_back(entry.name);
+      }
+    }
+  }
+
+  /// Skipped cells, the plan's first. What one part skips and another measured is none.
+  void place_skipped() {
+    for (const PlanRecord::Entry& entry : merged_.record.skipped) {
+      const auto found = reasons_.find(entry.name);
+      if (found != reasons_.end() || !planned_.contains(entry.name)) skip(entry.name, found != reasons_.end() ? found->second : entry.reason);
+    }
+    for (const ResultFolder& part : parts_)
+      for (const SkippedCell& cell : part.skipped)
+        if (!skippable_.contains(cell.name)) skip(cell.name, cell.reason);
+  }
+
+  void count() {
+    merged_.plan.excluded = merged_.record.excluded;
+    merged_.plan.filtered = merged_.record.filtered = whole_ - std::min(whole_, merged_.record.cells.size());
+  }
+
+ private:
+  void unite(const PlanRecord& plan) {
+    PlanRecord& record = merged_.record;
+    whole_ = std::max(whole_, plan.cells.size() + plan.filtered);
+    record.excluded = plan.excluded;
+    if (record.cells.empty()) record.filter = plan.filter, record.skip = plan.skip;
+    merged_.shards = std::max(merged_.shards, plan.shard.of);
+    for (const PlanRecord::Entry& entry : plan.cells)
+      if (planned_.insert(entry.name).second) record.cells.push_back(entry);
+    for (const PlanRecord::Entry& entry : plan.skipped)
+      if (skippable_.insert(entry.name).second) record.skipped.push_back(entry);
+    if (plan.filter != record.filter || plan.skip != record.skip) record.filter.clear(), record.skip.clear();
+  }
+
+  void take_outcome(const ResultFolder& part) {
     for (std::size_t i = 0; i < part.cells.size(); ++i) {
       const std::string name = part.cells[i].cell.name();
-      measured.emplace(name, std::pair{&part, i});
-      if (planned.insert(name).second) record.cells.push_back({name, 1, ""});
+      measured_.emplace(name, std::pair{&part, i});
+      if (planned_.insert(name).second) merged_.record.cells.push_back({name, 1, ""});
     }
-    for (const SkippedCell& cell : part.skipped) reasons.emplace(cell.name, cell.reason);
+    for (const SkippedCell& cell : part.skipped) reasons_.emplace(cell.name, cell.reason);
   }
-  for (const PlanRecord::Entry& entry : record.cells) {
-    if (const auto found = measured.find(entry.name); found != measured.end()) {
-      const auto& [part, place] = found->second;
-      merged.outcome.results.push_back(part->cells[place]), merged.lines.push_back(part->lines[place]);
-    } else if (!reasons.contains(entry.name)) {
-      merged.missing.push_back(entry);
-    }
+
+  void skip(const std::string& name, const std::string& reason) {
+    if (!measured_.contains(name)) merged_.plan.skipped.push_back({name, reason});
   }
-  const auto skip = [&](const std::string& name, const std::string& reason) {
-    if (!measured.contains(name)) merged.plan.skipped.push_back({name, reason});
-  };
-  for (const PlanRecord::Entry& entry : record.skipped) {
-    const auto found = reasons.find(entry.name);
-    if (found != reasons.end() || !planned.contains(entry.name)) skip(entry.name, found != reasons.end() ? found->second : entry.reason);
-  }
-  for (const ResultFolder& part : parts)
-    for (const SkippedCell& cell : part.skipped)
-      if (!skippable.contains(cell.name)) skip(cell.name, cell.reason);
-  for (const PlanRecord::Entry& entry : merged.missing) merged.outcome.missing.push_back(entry.name);
-  merged.plan.excluded = record.excluded;
-  merged.plan.filtered = record.filtered = whole - std::min(whole, record.cells.size());
-}
+
+  const std::vector<ResultFolder>& parts_;
+  Merged& merged_;
+  std::set<std::string> planned_, skippable_;  // names of merged_.record's cells and skipped cells
+  std::map<std::string, std::pair<const ResultFolder*, std::size_t>> measured_;
+  std::map<std::string, std::string> reasons_;  // of the cells that some part skipped
+  std::size_t whole_ = 0;                       // cells of the plan before a filter
+};
 
 }  // namespace
 
@@ -179,7 +201,8 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
     one_machine = one_machine && merged.outcome.warnings.empty();
   }
   refuse_doubled_cells(parts);
-  follow_plan(parts, merged);
+  WholePlan whole(parts, merged);
+  whole.place_cells(), whole.place_skipped(), whole.count();
   merged.context = merged_context(parts, command);
   merged.record.context = merged.context;
   if (!one_machine) {  // each row then knows whose it is
