@@ -19,6 +19,15 @@ struct Placed {
   [[nodiscard]] double area() const { return 0.5 * length(normal); }
 };
 
+/// Over the key frames and the moments halfway between them: twice the area is the length of a quadratic function of time, which
+/// is 0 all along where it is 0 at three moments.
+double largest_area(const TriangleMesh& mesh, std::uint32_t triangle) {
+  const std::size_t steps = 2 * (mesh.frames() - 1);
+  double area = 0.0;
+  for (std::size_t i = 0; i <= steps; ++i) area = std::max(area, Placed(mesh, triangle, steps == 0 ? 0.0f : float(i) / float(steps)).area());
+  return area;
+}
+
 double cosine_of_cone(const Light& light) { return UnitCircle(0.5 * double(light.cone_degrees) / 360.0).cosine; }
 
 }  // namespace
@@ -33,11 +42,12 @@ LightTable::LightTable(const TriangleMesh& mesh, const std::vector<Surface>& sur
 
 void LightTable::add_lights(const std::vector<Light>& lights, double radius) {
   for (const Light& light : lights) {
-    double solid_angle = 4.0 * kPi;
-    if (light.type == Light::Type::spot) solid_angle = 2.0 * kPi * (1.0 - cosine_of_cone(light));
+    const double cone_cosine = light.type == Light::Type::spot ? cosine_of_cone(light) : -1.0;
+    double solid_angle = 2.0 * kPi * (1.0 - cone_cosine);
     if (light.type == Light::Type::directional) solid_angle = kPi * radius * radius;
     const double power = luminance(light.intensity) * solid_angle;
-    if (is_bright(light.intensity)) emitters_.push_back({.light = light, .power = std::max(power, 1e-300)});
+    if (!is_bright(light.intensity)) continue;
+    emitters_.push_back({.light = light, .direction = normalize(Vec3d(light.direction)), .cone_cosine = cone_cosine, .power = std::max(power, 1e-300)});
   }
 }
 
@@ -45,7 +55,7 @@ void LightTable::add_triangles(const std::vector<Surface>& surfaces) {
   for (std::uint32_t i = 0; i < mesh_->size(); ++i) {
     const Vec3f emission = surfaces[mesh_->materials.empty() ? 0 : mesh_->materials[i]].emission;
     if (!is_bright(emission)) continue;
-    const double power = 2.0 * kPi * Placed(*mesh_, i, 0.0f).area() * luminance(emission);
+    const double power = 2.0 * kPi * largest_area(*mesh_, i) * luminance(emission);
     if (power > 0.0) emitters_.push_back({.triangle = i, .emission = emission, .power = power});
   }
 }
@@ -55,14 +65,18 @@ void LightTable::settle(bool strongest_alone) {
   if (strongest_alone)
     emitters_ = {*std::ranges::max_element(emitters_, {}, &Emitter::power)};
   delta_lights_ = std::size_t(std::ranges::count(emitters_, ~0u, &Emitter::triangle));
-  double sum = 0.0;
-  for (const Emitter& e : emitters_) sum += e.power;
-  double up_to = 0.0;
-  for (Emitter& e : emitters_) {
-    e.probability = e.power / sum;
+  // Apart from each other: where delta lights hold almost all power, what is left for areas is rounding alone.
+  double delta_power = 0.0, area_power = 0.0;
+  for (std::size_t i = 0; i < emitters_.size(); ++i) (i < delta_lights_ ? delta_power : area_power) += emitters_[i].power;
+  double up_to = 0.0, up_to_area = 0.0;
+  for (std::size_t i = 0; i < emitters_.size(); ++i) {
+    Emitter& e = emitters_[i];
+    e.probability = e.power / (delta_power + area_power);
     up_to_.push_back(up_to += e.probability);
+    if (i >= delta_lights_) areas_up_to_.push_back(up_to_area += e.probability_among_areas = e.power / area_power);
   }
   up_to_.back() = 1.0;
+  if (!areas_up_to_.empty()) areas_up_to_.back() = 1.0;
 }
 
 std::optional<LightSample> LightTable::sample(Vec3d from, float time, double choice, double u, double v) const noexcept {
@@ -76,23 +90,22 @@ std::optional<LightSample> LightTable::sample(Vec3d from, float time, double cho
 }
 
 std::optional<LightSample> LightTable::sample_area(Vec3d from, float time, double choice, double u, double v) const noexcept {
-  if (delta_lights_ == emitters_.size()) return std::nullopt;
-  const double before = delta_lights_ == 0 ? 0.0 : up_to_[delta_lights_ - 1], all = 1.0 - before;
-  const auto first = up_to_.begin() + std::ptrdiff_t(delta_lights_);
-  const auto chosen = std::size_t(std::upper_bound(first, up_to_.end(), before + choice * all) - up_to_.begin());
+  if (areas_up_to_.empty()) return std::nullopt;
+  const auto chosen = delta_lights_ + std::size_t(std::ranges::upper_bound(areas_up_to_, choice) - areas_up_to_.begin());
   const Emitter& emitter = emitters_[std::min(chosen, emitters_.size() - 1)];
-  return from_triangle(emitter, emitter.probability / all, from, time, u, v);
+  return from_triangle(emitter, emitter.probability_among_areas, from, time, u, v);
 }
 
 std::optional<LightSample> LightTable::delta_light(std::size_t i, Vec3d from) const noexcept {
-  const Light& light = emitters_[i].light;
+  const Emitter& emitter = emitters_[i];
+  const Light& light = emitter.light;
   if (light.type == Light::Type::directional)
-    return LightSample{normalize(Vec3d(light.direction)) * -1.0, std::numeric_limits<double>::infinity(), light.intensity, 0.0, {}};
+    return LightSample{emitter.direction * -1.0, std::numeric_limits<double>::infinity(), light.intensity, 0.0, {}};
   const Vec3d to_light = Vec3d(light.position) - from;
   const double distance2 = dot(to_light, to_light), distance = std::sqrt(distance2);
   if (!(distance > 0.0)) return std::nullopt;
   const Vec3d direction = to_light * (1.0 / distance);
-  if (light.type == Light::Type::spot && -dot(direction, normalize(Vec3d(light.direction))) < cosine_of_cone(light)) return std::nullopt;
+  if (light.type == Light::Type::spot && -dot(direction, emitter.direction) < emitter.cone_cosine) return std::nullopt;
   return LightSample{direction, distance, light.intensity * float(1.0 / distance2), 0.0, {}};
 }
 

@@ -1,7 +1,8 @@
 // LightTable: the emitters that hit points send shadow rays to, and how one is chosen: by power, from one random number.
 //
 // Point and spot lights: intensity in power per solid angle; a spot's cone opens by cone_degrees in all and has a sharp edge.
-// Directional: irradiance on a surface that faces it. Emissive triangles: radiance Ke on both sides, points uniform over the area.
+// Directional: irradiance on a surface that faces it. Emissive triangles: radiance Ke on both sides, points uniform over the area;
+// one that moves has the power of its largest area while it does.
 // The environment is constant and in no table: rays that leave the scene meet it.
 #pragma once
 
@@ -53,7 +54,10 @@ class LightTable {
     Light light{};                  ///< of one without an extent
     std::uint32_t triangle = ~0u;   ///< else of an emissive triangle
     Vec3f emission{};
+    Vec3d direction{};              ///< of a light that has one, of unit length
+    double cone_cosine = -1.0;      ///< of a spot's cone
     double power = 0.0, probability = 0.0;
+    double probability_among_areas = 0.0;
   };
   [[nodiscard]] std::optional<LightSample> from_triangle(const Emitter& emitter, double probability, Vec3d from, float time, double u, double v) const noexcept;
   [[nodiscard]] const Emitter* of(std::uint32_t triangle) const noexcept;
@@ -64,6 +68,7 @@ class LightTable {
   const TriangleMesh* mesh_ = nullptr;
   std::vector<Emitter> emitters_;  ///< triangles in ascending order behind the rest
   std::vector<double> up_to_;      ///< probability of all emitters up to and with this one
+  std::vector<double> areas_up_to_;  ///< the same among emissive triangles alone
   std::size_t delta_lights_ = 0;
 };
 

@@ -2,10 +2,26 @@
 
 #include <algorithm>
 
+#include "core/error.h"
 #include "scenes/camera.h"
 #include "scenes/layout.h"
 
 namespace arboretum {
+namespace {
+
+/// So that no number needs a look before it is used.
+void check_materials(const Scene& scene) {
+  const std::vector<std::uint16_t>& numbers = scene.mesh.materials;
+  if (!numbers.empty() && numbers.size() != scene.mesh.size())
+    throw UserError(scene.name + ": " + std::to_string(scene.mesh.size()) + " triangles have " + std::to_string(numbers.size()) + " materials' numbers");
+  const std::size_t materials = std::max<std::size_t>(1, scene.materials.size());
+  const auto beyond = std::ranges::find_if(numbers, [&](std::uint16_t number) { return number >= materials; });
+  if (beyond != numbers.end())
+    throw UserError(scene.name + ": triangle " + std::to_string(beyond - numbers.begin()) + " is of material " + std::to_string(*beyond) + ", but there are " +
+                    std::to_string(materials));
+}
+
+}  // namespace
 
 RenderScene::RenderScene(const Scene& scene, EffectSet effects) : effects_(effects), camera_(view_of(scene)), shutter_(scene.shutter) {
   take_mesh(scene);
@@ -25,11 +41,12 @@ RenderScene::RenderScene(const Scene& scene, EffectSet effects) : effects_(effec
 
 /// Without what cannot be seen.
 void RenderScene::take_mesh(const Scene& scene) {
+  check_materials(scene);
   mesh_ = scene.mesh, texture_coordinates_ = scene.texture_coordinates;
   std::vector<bool> seen(mesh_.size(), true);
   for (std::size_t i = 0; i < mesh_.size(); ++i) {
     const std::size_t material = mesh_.materials.empty() ? 0 : mesh_.materials[i];
-    seen[i] = material >= scene.materials.size() || !is_invisible(scene.materials[material]);
+    seen[i] = scene.materials.empty() || !is_invisible(scene.materials[material]);
   }
   if (!effects_.has(EffectKind::instancing)) mesh_.instancing.reset();
   if (std::ranges::find(seen, false) == seen.end()) return;

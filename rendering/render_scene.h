@@ -19,7 +19,8 @@ namespace arboretum {
 class RenderScene {
  public:
   /// Surfaces that cannot be seen (is_invisible) are taken out of the mesh. Without `motion_blur`, and where all key frames are alike,
-  /// the mesh stands as when the shutter opens; without `instancing` it keeps no instances.
+  /// the mesh stands as when the shutter opens; without `instancing` it keeps no instances. Throws UserError where a triangle's
+  /// material is none of the scene's.
   RenderScene(const Scene& scene, EffectSet effects);
   RenderScene(const RenderScene&) = delete;  // the light table points at the mesh
   RenderScene& operator=(const RenderScene&) = delete;

@@ -81,8 +81,9 @@ class Effects {
                     : std::string("no environment, or a black one"));
     emitters_ = bright + emitters + environment;
     set("multi_light", emitters_ > 1,
-        fmt::format("{} emitter{} in all: {} lights, {} emissive triangles, {} environment", emitters_,
-                    emitters_ == 1 ? "" : "s", bright, emitters, int(environment)));
+        fmt::format("{} emitter{} in all: {} light{}, {} emissive triangle{}, {} environment{}", emitters_,
+                    emitters_ == 1 ? "" : "s", bright, bright == 1 ? "" : "s", emitters, emitters == 1 ? "" : "s", int(environment),
+                    environment ? "" : "s"));
   }
 
   void surfaces() {

@@ -278,12 +278,54 @@ TEST_CASE("lights are chosen by power, and their densities add up") {
   CHECK(strongest.emission(2) == Vec3f{0, 0, 0});
   CHECK(strongest.sample(from, 0, 0.0, 0.5, 0.5)->distance > 4.0);
 }
+  // A delta light that holds all power but 2^-80 of it leaves the areas' shares as they are.
+  scene.lights[0].intensity = Vec3f{1, 1, 1} * 1e24f;
+  const LightTable dim(scene.mesh, surfaces, scene.lights, EffectSet::all());
+  for (const double choice : {0.0, 0.49, 0.51, 0.999999}) {
+    const LightSample among = *dim.sample_area(from, 0, choice, 0.5, 0.5), before = *table.sample_area(from, 0, choice, 0.5, 0.5);
+    CHECK(among.on->primitive == (choice < 0.5 ? 2u : 3u));
+    CHECK(among.radiance == before.radiance);
+    CHECK(before.radiance.x == Approx(chosen(choice < 0.5 ? 0.7 : 0.9).radiance.x / 3));  // a third of the power is theirs
+  }
+  scene.lights[0].intensity = {1, 1, 1};
 
 TEST_CASE("pictures: developed by exposure and sRGB, and the same again from their file") {
   const Folder folder;
   Picture picture{3, 2, {{0, 0.5f, 1}, {2, -1, 0.0031308f}, {0.25f, 0.1f, 0.001f}, {1, 1, 1}, {0, 0, 0}, {0.2158605f, 0, 0}}};
   const std::vector<std::uint8_t> plain = develop(picture, 0);
   CHECK(std::vector<std::uint8_t>(plain.begin(), plain.begin() + 6) == std::vector<std::uint8_t>{0, 188, 255, 255, 0, 10});
+TEST_CASE("an emitter counts by the largest area that it has while it moves") {
+  Scene scene;
+  scene.materials = {{.emission = {1, 1, 1}}};
+  const std::vector<Surface> surfaces{make_surface(scene.materials[0], EffectSet::all())};
+  const auto table_of = [&](std::vector<std::vector<Vec3f>> frames) {
+    scene.mesh.vertices = frames[0], scene.mesh.later_frames.assign(frames.begin() + 1, frames.end());
+    scene.mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
+    return LightTable(scene.mesh, surfaces, {}, EffectSet::all());
+  };
+  const auto both = [](Vec3f a, Vec3f b, Vec3f c) { return std::vector<Vec3f>{a, b, c, {0, 0, 9}, {1, 0, 9}, {0, 1, 9}}; };
+  const std::vector<Vec3f> nothing = both({0, 0, 0}, {0, 0, 0}, {0, 0, 0}), large = both({0, 0, 0}, {3, 0, 0}, {0, 1, 0});
+  CHECK(table_of({nothing, nothing}).size() == 1);
+  for (const auto& frames : {std::vector{nothing, large}, std::vector{large, nothing}, std::vector{nothing, large, nothing}}) {
+    const LightTable table = table_of(frames);
+    REQUIRE(table.size() == 2);
+    CHECK(table.emission(0) == Vec3f{1, 1, 1});
+    const float time = frames.size() == 3 ? 0.5f : frames[0] == large ? 0.0f : 1.0f;  // 3/4 of the power
+    CHECK(table.sample({0, 0, 5}, time, 0.74, 0.5, 0.5)->on->primitive == 0);
+    CHECK(table.sample({0, 0, 5}, time, 0.76, 0.5, 0.5)->on->primitive == 1);
+  }
+  // Without area in both key frames, but not between them.
+  CHECK(table_of({both({0, 0, 0}, {1, 0, 0}, {0, 0, 0}), both({0, 0, 0}, {0, 0, 0}, {0, 1, 0})}).size() == 2);
+}
+
+TEST_CASE("a material that is not there is an error") {
+  Scene scene = floor_scene();
+  scene.mesh.materials[1] = 1;
+  CHECK(error_of([&] { static_cast<void>(RenderScene(scene, EffectSet::all())); }).find("triangle 1 is of material 1") != std::string::npos);
+  scene.mesh.materials.resize(1);
+  CHECK(error_of([&] { static_cast<void>(RenderScene(scene, EffectSet::all())); }).find("2 triangles have 1") != std::string::npos);
+}
+
   CHECK(plain[15] == 128);
   CHECK(develop(picture, 1)[1] == 255);
   CHECK(develop(picture, -1)[2] == 188);
