@@ -16,13 +16,24 @@ EffectSet called_for(const std::vector<Effect>& effects) {
   return set;
 }
 
+namespace {
+
+std::string trimmed(const std::string& word) {
+  const std::size_t begin = word.find_first_not_of(" \t"), end = word.find_last_not_of(" \t");
+  return begin == std::string::npos ? std::string{} : word.substr(begin, end - begin + 1);
+}
+
+}  // namespace
+
 EffectSet parse_effects(const std::string& words, EffectSet called_for) {
-  if (words == "auto") return called_for;
-  if (words == "all") return EffectSet::all();
+  if (trimmed(words) == "auto") return called_for;
+  if (trimmed(words) == "all") return EffectSet::all();
   EffectSet set;
   for (std::size_t begin = 0; begin <= words.size();) {
     const std::size_t end = std::min(words.find(',', begin), words.size());
-    const std::string word = words.substr(begin, end - begin);
+    const std::string word = trimmed(words.substr(begin, end - begin));
+    if (word.empty()) throw UserError("effects '" + words + "' have an empty name");
+    if (word == "auto" || word == "all") throw UserError("effects '" + words + "': '" + word + "' stands alone");
     const auto found = std::ranges::find(kEffectNames, word);
     if (found == kEffectNames.end()) {
       std::vector<std::string> valid{"auto", "all"};

@@ -47,7 +47,7 @@ class EffectSet {
 [[nodiscard]] constexpr std::string_view to_string(EffectKind kind) noexcept { return kEffectNames[std::size_t(kind)]; }
 /// Those that are called for.
 [[nodiscard]] EffectSet called_for(const std::vector<Effect>& effects);
-/// `auto`: what is called for; `all`; or names with commas between them, those alone. Throws UserError, naming the nearest.
+/// `auto`: what is called for; `all`; or names with commas between them, those alone; blanks around them are none of the names'. Throws UserError, naming the nearest.
 [[nodiscard]] EffectSet parse_effects(const std::string& words, EffectSet called_for);
 
 }  // namespace arboretum

@@ -1,11 +1,14 @@
 #include "rendering/heat_map.h"
 
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <thread>
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic push
@@ -55,13 +58,25 @@ class Sheet {
   DrawnPicture picture_;
 };
 
-/// 1, 2 or 5 times a power of ten, so that the scale has four to ten of them.
-std::uint64_t tick_step(std::uint64_t top) {
+/// Where all is, in pixels.
+struct Layout {
+  unsigned scale, margin, bar, letter, left, high, low, width, height;
+  Layout(unsigned map_width, unsigned map_height, const std::string& unit, const std::string& top)
+      : scale(map_height >= 360 ? 2 : 1), margin(8 * scale), bar(14 * scale), letter(8 * scale), left(map_width + margin), high(3 * letter) {
+    const unsigned labels = std::max(bar + 5 * scale + Sheet::width_of(top, scale), Sheet::width_of(unit, scale));
+    width = map_width + 2 * margin + labels, height = std::max(map_height, 12 * letter);
+    low = height - 2 * letter;
+  }
+};
+
+/// 1, 2 or 5 times a power of ten, so that the scale has at most eight of them, and no more than the bar has room for.
+std::uint64_t tick_step(std::uint64_t top, std::uint64_t room) {
+  const std::uint64_t most = std::clamp<std::uint64_t>(room, 1, 8);
   std::uint64_t step = 1;
   for (std::uint64_t power = 1;; power *= 10) {
     for (const std::uint64_t times : {1u, 2u, 5u}) {
       step = times * power;
-      if (top / step <= 8) return step;
+      if (top / step <= most) return step;
     }
   }
 }
@@ -89,6 +104,8 @@ HeatMap count_work(const BatchTracer& tracer, const RenderSettings& settings, He
   const RayGenerator camera(tracer.scene().camera(), settings.width, settings.height);
   const Shutter shutter = tracer.scene().shutter();
   const float time = tracer.scene().mesh().moves() ? 0.5f * (shutter.open + shutter.close) : 0.0f;
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, std::max(cores, settings.threads));
   tbb::task_arena arena(settings.threads == 0 ? tbb::task_arena::automatic : int(settings.threads));
   arena.execute([&] {
     tbb::parallel_for(0u, settings.height, [&](unsigned y) {
@@ -106,24 +123,35 @@ HeatMap count_work(const BatchTracer& tracer, const RenderSettings& settings, He
 }
 
 DrawnPicture draw(const HeatMap& map, const std::string& unit) {
-  const unsigned scale = map.height >= 360 ? 2 : 1, margin = 8 * scale, bar = 14 * scale, letter = 8 * scale;
   const std::string top = std::to_string(map.top) + (map.most > map.top ? "+" : "");
-  const unsigned labels = std::max(bar + 5 * scale + Sheet::width_of(top, scale), Sheet::width_of(unit, scale));
-  Sheet sheet(map.width + 2 * margin + labels, std::max(map.height, 12 * letter));
+  const Layout at(map.width, map.height, unit, top);
+  Sheet sheet(at.width, at.height);
   for (unsigned y = 0; y < map.height; ++y)
     for (unsigned x = 0; x < map.width; ++x) sheet.set(x, y, heat_color(double(map.counts[std::size_t(y) * map.width + x]) / double(map.top)));
-  const unsigned left = map.width + margin, high = 3 * letter, low = std::max(map.height, 12 * letter) - 2 * letter;
-  sheet.write(left, letter / 2, scale, unit);
-  for (unsigned y = high; y <= low; ++y) sheet.fill(left, y, bar, 1, heat_color(double(low - y) / double(low - high)));
-  const std::uint64_t step = tick_step(map.top);
-  const auto tick = [&](std::uint64_t count, const std::string& text) {
-    const auto y = unsigned(std::lround(double(low) - double(low - high) * double(count) / double(map.top)));
-    sheet.fill(left + bar, y, 3 * scale, scale, {0, 0, 0});
-    sheet.write(left + bar + 5 * scale, y - 3 * scale, scale, text);
-  };
-  for (std::uint64_t count = 0; count + step / 2 < map.top; count += step) tick(count, std::to_string(count));
-  tick(map.top, top);
+  sheet.write(at.left, at.letter / 2, at.scale, unit);
+  for (unsigned y = at.high; y <= at.low; ++y) sheet.fill(at.left, y, at.bar, 1, heat_color(double(at.low - y) / double(at.low - at.high)));
+  for (const HeatTick& tick : heat_ticks(map.top, at.high, at.low, at.letter)) {
+    sheet.fill(at.left + at.bar, tick.y, 3 * at.scale, at.scale, {0, 0, 0});
+    sheet.write(at.left + at.bar + 5 * at.scale, tick.y - 3 * at.scale, at.scale, tick.count == map.top ? top : std::to_string(tick.count));
+  }
   return sheet.take();
+}
+
+std::vector<HeatTick> heat_ticks(std::uint64_t top, unsigned high, unsigned low, unsigned letter) {
+  const std::uint64_t step = tick_step(top, (low - high) / (letter + letter / 2));
+  std::vector<HeatTick> ticks;
+  for (std::uint64_t count = 0; count < top; count += step) {
+    const auto y = unsigned(std::lround(double(low) - double(low - high) * double(count) / double(top)));
+    if (y < high + letter) break;
+    ticks.push_back({count, y});
+  }
+  ticks.push_back({top, high});
+  return ticks;
+}
+
+std::array<unsigned, 2> drawn_size_at_most(unsigned width, unsigned height, const std::string& unit) {
+  const Layout at(width, height, unit, std::to_string(std::numeric_limits<std::uint64_t>::max()) + "+");
+  return {at.width, at.height};
 }
 
 }  // namespace arboretum

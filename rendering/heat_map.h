@@ -40,5 +40,15 @@ struct DrawnPicture {
 };
 /// The map with its bar on the right, `unit` above the bar.
 [[nodiscard]] DrawnPicture draw(const HeatMap& map, const std::string& unit);
+/// Width and height that draw() does not exceed, whatever is counted.
+[[nodiscard]] std::array<unsigned, 2> drawn_size_at_most(unsigned width, unsigned height, const std::string& unit);
+
+/// A labelled count beside the bar, at its row.
+struct HeatTick {
+  std::uint64_t count = 0;
+  unsigned y = 0;
+};
+/// Of a bar from row `low` (a count of 0) up to row `high` (`top`, always the last of them): labels `letter` pixels high are apart.
+[[nodiscard]] std::vector<HeatTick> heat_ticks(std::uint64_t top, unsigned high, unsigned low, unsigned letter);
 
 }  // namespace arboretum

@@ -19,7 +19,6 @@ float power_weight(double own, double other) {
 constexpr std::uint32_t kFirstRoulette = 3;       // hits that are never the last one by chance
 constexpr double kMostSurvival = 0.95;
 constexpr float kLeastBranch = 0x1p-10f;          // branches of whitted with less of the pixel's light than that end
-constexpr std::uint32_t kMostBranching = 32;      // the number of a node doubles with each hit
 constexpr double kShortOfLight = 1.0 - 0x1p-20;   // a shadow ray ends that much before an area light, by its own rounding
 
 RayKind kind_of(ScatterKind kind) {
@@ -64,7 +63,6 @@ struct PathWave::Shading {
 
 PathWave::PathWave(const BatchTracer& tracer, const RenderSettings& settings)
     : tracer_(tracer), scene_(tracer.scene()), branching_(settings.integrator == Integrator::whitted), depth_(settings.depth), clamp_(settings.clamp) {
-  if (branching_) depth_ = std::min(depth_, kMostBranching);
   bounced_ = branching_ ? Lobes{false, false, true} : Lobes{scene_.effects().has(EffectKind::diffuse_gi), true, true};
 }
 

@@ -41,6 +41,16 @@ std::vector<double> block_luminances(const Picture& picture) {
   return blocks;
 }
 
+/// By opening it, which leaves a file that is there as it is and none that was not.
+void check_writable(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  const bool exists = std::filesystem::exists(status);
+  if (exists && !std::filesystem::is_regular_file(status) && !std::filesystem::is_directory(status)) return;  // opening a pipe would wait
+  if (!std::ofstream(path, std::ios::binary | std::ios::app)) throw UserError(path.string() + ": cannot be written; is it a file, and may you write there?");
+  if (!exists) std::filesystem::remove(path, error);
+}
+
 void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
   std::ofstream file(path, std::ios::binary);
   file.write(bytes.data(), std::streamsize(bytes.size()));
@@ -81,6 +91,7 @@ std::vector<std::uint8_t> develop(const Picture& picture, double stops) {
 }
 
 void write_png(const std::filesystem::path& path, unsigned width, unsigned height, const std::vector<std::uint8_t>& rgb) {
+  check_png_size(width, height);
   std::string bytes;
   const auto append = [](void* to, void* data, int size) {
     static_cast<std::string*>(to)->append(static_cast<const char*>(data), std::size_t(size));
@@ -104,6 +115,14 @@ void check_picture_path(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.parent_path();
   if (std::error_code error; !folder.empty() && !std::filesystem::is_directory(folder, error))
     throw UserError(folder.string() + ": no such folder; make it first, or write elsewhere with --out");
+  check_writable(path);
+}
+
+void check_png_size(unsigned width, unsigned height) {
+  constexpr std::uint64_t kMost = 1u << 30;  // the encoder counts bytes in int, and its growing buffer's capacity more than doubles
+  const std::uint64_t bytes = (std::uint64_t(3) * width + 1) * height;
+  if (bytes > kMost)
+    throw UserError(std::to_string(width) + " x " + std::to_string(height) + " pixels are too many for a .png, which may hold 2^30 bytes; .pfm holds pictures of any size");
 }
 
 }  // namespace arboretum

@@ -29,7 +29,10 @@ struct Picture {
 void write_picture(const std::filesystem::path& path, const Picture& picture, double stops);
 /// As a .png, of bytes that are colours already, rows downwards. Throws UserError.
 void write_png(const std::filesystem::path& path, unsigned width, unsigned height, const std::vector<std::uint8_t>& rgb);
-/// Throws UserError for an extension that write_picture does not know, or a folder that is not there: before any work.
+/// Throws UserError for an extension that write_picture does not know, a folder that is not there, or a file that cannot be
+/// written: before any work.
 void check_picture_path(const std::filesystem::path& path);
+/// Throws UserError where write_png could not hold so many pixels: before any work.
+void check_png_size(unsigned width, unsigned height);
 
 }  // namespace arboretum

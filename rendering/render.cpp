@@ -68,6 +68,9 @@ void check(const RenderSettings& s) {
   if (!within(s.width) || !within(s.height))
     throw UserError("resolution " + std::to_string(s.width) + "x" + std::to_string(s.height) + " is not possible; each must be within 1 to 65536");
   if (!within(s.samples)) throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
+  if (s.integrator == Integrator::whitted && s.depth > kMostBranching)
+    throw UserError("depth " + std::to_string(s.depth) + " is not possible for whitted, which follows every branch; 0 to " + std::to_string(kMostBranching) + " are");
+  if (!(s.clamp > 0.0f)) throw UserError("a clamp of " + std::to_string(s.clamp) + " is not possible; it must be above 0");
 }
 
 Integrator parse_integrator(const std::string& word) {

@@ -27,6 +27,9 @@ inline constexpr std::array<std::string_view, 4> kIntegratorNames{"path", "whitt
 /// Throws UserError, naming the nearest.
 [[nodiscard]] Integrator parse_integrator(const std::string& word);
 
+/// Scatterings of a path of `whitted` at most: the number of a node doubles with each hit.
+inline constexpr unsigned kMostBranching = 32;
+
 struct RenderSettings {
   Integrator integrator = Integrator::path;
   unsigned width = 512, height = 512;
@@ -40,7 +43,7 @@ struct RenderSettings {
 /// Told how much is done, within [0, 1]; may be called from several threads, one at a time.
 using RenderProgress = std::function<void(double)>;
 
-/// Throws UserError for a size or count of 0, or beyond 65 536.
+/// Throws UserError for a size or count of 0, or beyond 65 536; a depth that `whitted` cannot follow; a clamp that is not above 0.
 void check(const RenderSettings& settings);
 /// What `tracer` holds must be ready for rays. Throws UserError as check() does.
 [[nodiscard]] Picture render(const BatchTracer& tracer, const RenderSettings& settings, RenderStatistics& statistics,

@@ -29,7 +29,12 @@ TEST_CASE("effect sets: auto, all, names, and the nearest name") {
     CHECK(parse_effects(std::string(kEffectNames[i]), {}) == EffectSet{}.with(EffectKind(i)));
   }
   CHECK(error_of([] { static_cast<void>(parse_effects("glosy", {})); }).find("did you mean 'glossy'") != std::string::npos);
-  CHECK(error_of([] { static_cast<void>(parse_effects("dof,", {})); }).find("effect ''") != std::string::npos);
+  CHECK(parse_effects(" dof,\tmirror ", {}) == EffectSet{}.with(EffectKind::dof).with(EffectKind::mirror));
+  CHECK(parse_effects(" all", {}) == EffectSet::all());
+  for (const char* const words : {"", " ", "dof,", ",dof", "dof, ,mirror"})
+    CHECK(error_of([&] { static_cast<void>(parse_effects(words, {})); }).find("an empty name") != std::string::npos);
+  CHECK(error_of([] { static_cast<void>(parse_effects("all,mirror", {})); }).find("'all' stands alone") != std::string::npos);
+  CHECK(error_of([] { static_cast<void>(parse_effects("mirror,auto", {})); }).find("'auto' stands alone") != std::string::npos);
   CHECK(error_of([] { static_cast<void>(parse_integrator("pth")); }).find("did you mean 'path'") != std::string::npos);
 }
 
@@ -273,11 +278,6 @@ TEST_CASE("lights are chosen by power, and their densities add up") {
     sum += table.pdf(triangle, from, point, 0) * 2.0 / (kSteps * kSteps) * way.y / std::pow(dot(way, way), 1.5);
   }
   CHECK(sum == Approx(1.0 / 3.0).epsilon(1e-3));
-  const LightTable strongest(scene.mesh, surfaces, scene.lights, EffectSet::all().without(EffectKind::multi_light));
-  CHECK(strongest.size() == 1);
-  CHECK(strongest.emission(2) == Vec3f{0, 0, 0});
-  CHECK(strongest.sample(from, 0, 0.0, 0.5, 0.5)->distance > 4.0);
-}
   // A delta light that holds all power but 2^-80 of it leaves the areas' shares as they are.
   scene.lights[0].intensity = Vec3f{1, 1, 1} * 1e24f;
   const LightTable dim(scene.mesh, surfaces, scene.lights, EffectSet::all());
@@ -288,12 +288,12 @@ TEST_CASE("lights are chosen by power, and their densities add up") {
     CHECK(before.radiance.x == Approx(chosen(choice < 0.5 ? 0.7 : 0.9).radiance.x / 3));  // a third of the power is theirs
   }
   scene.lights[0].intensity = {1, 1, 1};
+  const LightTable strongest(scene.mesh, surfaces, scene.lights, EffectSet::all().without(EffectKind::multi_light));
+  CHECK(strongest.size() == 1);
+  CHECK(strongest.emission(2) == Vec3f{0, 0, 0});
+  CHECK(strongest.sample(from, 0, 0.0, 0.5, 0.5)->distance > 4.0);
+}
 
-TEST_CASE("pictures: developed by exposure and sRGB, and the same again from their file") {
-  const Folder folder;
-  Picture picture{3, 2, {{0, 0.5f, 1}, {2, -1, 0.0031308f}, {0.25f, 0.1f, 0.001f}, {1, 1, 1}, {0, 0, 0}, {0.2158605f, 0, 0}}};
-  const std::vector<std::uint8_t> plain = develop(picture, 0);
-  CHECK(std::vector<std::uint8_t>(plain.begin(), plain.begin() + 6) == std::vector<std::uint8_t>{0, 188, 255, 255, 0, 10});
 TEST_CASE("an emitter counts by the largest area that it has while it moves") {
   Scene scene;
   scene.materials = {{.emission = {1, 1, 1}}};
@@ -326,6 +326,11 @@ TEST_CASE("a material that is not there is an error") {
   CHECK(error_of([&] { static_cast<void>(RenderScene(scene, EffectSet::all())); }).find("2 triangles have 1") != std::string::npos);
 }
 
+TEST_CASE("pictures: developed by exposure and sRGB, and the same again from their file") {
+  const Folder folder;
+  Picture picture{3, 2, {{0, 0.5f, 1}, {2, -1, 0.0031308f}, {0.25f, 0.1f, 0.001f}, {1, 1, 1}, {0, 0, 0}, {0.2158605f, 0, 0}}};
+  const std::vector<std::uint8_t> plain = develop(picture, 0);
+  CHECK(std::vector<std::uint8_t>(plain.begin(), plain.begin() + 6) == std::vector<std::uint8_t>{0, 188, 255, 255, 0, 10});
   CHECK(plain[15] == 128);
   CHECK(develop(picture, 1)[1] == 255);
   CHECK(develop(picture, -1)[2] == 188);
@@ -394,7 +399,38 @@ TEST_CASE("heat maps: what the counting kernel counts for each pixel's ray, with
     return std::array<std::uint8_t, 3>{p[0], p[1], p[2]};
   };
   for (const unsigned x : {0u, 9u, 19u}) CHECK(pixel(x, 4) == heat_color(double(triangles.counts[4 * 20 + x]) / double(triangles.top)));
+  CHECK(drawn_size_at_most(20, 10, "triangles a ray")[0] >= drawn.width);
+  CHECK(drawn_size_at_most(20, 10, "triangles a ray")[1] == drawn.height);
   CHECK(error_of([] { static_cast<void>(parse_heat_count("node")); }).find("did you mean 'nodes'") != std::string::npos);
+}
+
+TEST_CASE("labels beside a heat map's bar do not overlap") {
+  for (const unsigned length : {40u, 56u, 80u, 200u, 1000u}) {
+    for (std::uint64_t top = 1; top < 3000; ++top) {
+      const std::vector<HeatTick> ticks = heat_ticks(top, 24, 24 + length, 8);
+      INFO("top " << top << ", " << length << " pixels");
+      REQUIRE(ticks.size() >= 2);
+      REQUIRE(ticks.size() <= 10);
+      REQUIRE((ticks.front().count == 0 && ticks.front().y == 24 + length && ticks.back().count == top && ticks.back().y == 24));
+      for (std::size_t i = 1; i < ticks.size(); ++i) REQUIRE(ticks[i].y + 8 <= ticks[i - 1].y);
+    }
+  }
+  CHECK(heat_ticks(std::uint64_t(1) << 60, 24, 400, 8).size() >= 2);
+}
+
+TEST_CASE("pictures that a .png cannot hold are refused before they are made") {
+  check_png_size(18000, 18000);
+  CHECK(error_of([] { check_png_size(65536, 65536); }).find(".pfm") != std::string::npos);
+  CHECK(error_of([] { check_png_size(30000, 30000); }).find(".pfm") != std::string::npos);  // beyond 2^31 bytes
+  check_png_size(65536, 5461);
+  CHECK(error_of([] { check_png_size(65536, 5462); }).find(".pfm") != std::string::npos);
+}
+
+TEST_CASE("settings that cannot be") {
+  const auto error = [](RenderSettings s) { return error_of([&] { check(s); }); };
+  CHECK(error({.integrator = Integrator::whitted, .depth = 33}).find("0 to 32") != std::string::npos);
+  for (const float clamp : {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN()}) CHECK(error({.clamp = clamp}).find("clamp") != std::string::npos);
+  check({.integrator = Integrator::whitted, .depth = 32}), check({.depth = 4096});
 }
 
 TEST_CASE("automatic exposure brings three quarters of what is not black below half of white") {
