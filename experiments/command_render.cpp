@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -38,8 +39,12 @@ void set_resolution(const std::string& word, const Camera& camera, RenderSetting
     throw UserError(fmt::format("--resolution '{}' is no WIDTHxHEIGHT, as in 640x480", word));
 }
 
-std::optional<double> parse_exposure(const std::string& word) {
-  if (word == "auto") return std::nullopt;
+bool draws_light(Integrator integrator) { return integrator == Integrator::path || integrator == Integrator::whitted; }
+
+/// Nothing: automatic.
+std::optional<double> parse_exposure(const std::string& word, Integrator integrator) {
+  if (word.empty() && !draws_light(integrator)) return 0.0;  // values within [0, 1] that mean the same in every picture
+  if (word.empty() || word == "auto") return std::nullopt;
   try {
     std::size_t used = 0;
     if (const double stops = std::stod(word, &used); used == word.size() && std::isfinite(stops)) return stops;
@@ -69,7 +74,7 @@ EffectSet simulated(EffectSet chosen, Integrator integrator) {
   return chosen;
 }
 
-void print_effects(const std::vector<Effect>& effects, EffectSet simulated, Integrator integrator) {
+void print_effects(const std::vector<Effect>& effects, EffectSet chosen, EffectSet simulated, Integrator integrator) {
   fmt::print("effects\n");
   for (std::size_t i = 0; i < effects.size(); ++i) {
     const Effect& e = effects[i];
@@ -80,11 +85,17 @@ void print_effects(const std::vector<Effect>& effects, EffectSet simulated, Inte
       fmt::print("  + {:<13} as asked, though the scene does not call for it: {}\n", e.name, e.reason);
     else if (e.called_for && !takes_part(EffectKind(i), integrator))
       fmt::print("  - {:<13} no part of {}; the scene has {}\n", e.name, to_string(integrator), e.reason);
+    else if (!e.called_for && chosen.has(EffectKind(i)))
+      fmt::print("  - {:<13} no part of {}, though asked for; {}\n", e.name, to_string(integrator), e.reason);
     else if (e.called_for)
       fmt::print("  - {:<13} LEFT OUT as asked, though the scene calls for it: {}\n", e.name, e.reason);
     else
       fmt::print("  - {:<13} {}\n", e.name, e.reason);
   }
+}
+
+std::string threads_in_words(unsigned threads) {
+  return threads == 0 ? "a thread a core" : fmt::format("{} thread{}", threads, threads == 1 ? "" : "s");
 }
 
 void print_rays(const RenderStatistics& statistics) {
@@ -125,17 +136,33 @@ class Bar {
 void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSettings settings, const std::filesystem::path& out) {
   const HeatCount what = parse_heat_count(command.heat_map);
   if (out.extension() != ".png") throw UserError(fmt::format("{}: heat maps are written as .png", out.string()));
-  const RenderScene ready(scene, called_for(effects_of(scene)).without(EffectKind::dof));
+  const std::string unit = command.heat_map + " a ray";
+  const auto [width, height] = drawn_size_at_most(settings.width, settings.height, unit);
+  check_png_size(width, height);
+  // Of all effects these two alone change what a ray through a pixel's centre meets.
+  constexpr EffectSet kPart = EffectSet{}.with(EffectKind::motion_blur).with(EffectKind::instancing);
+  const EffectSet chosen = parse_effects(command.effects, called_for(effects_of(scene)));
+  EffectSet set = chosen;
+  std::vector<std::string_view> no_part;
+  for (std::size_t i = 0; i < kEffectNames.size(); ++i) {
+    if (kPart.has(EffectKind(i))) continue;
+    set = set.without(EffectKind(i));
+    if (command.effects != "auto" && chosen.has(EffectKind(i))) no_part.push_back(kEffectNames[i]);
+  }
+  const RenderScene ready(scene, set);
   KernelChoice choice = command.kernel;
   if (choice.traversal == "auto") choice.traversal = "single";
   const BuiltKernel built = build_kernel(choice, ready.mesh(), this_registry());
   const HeatMap map = count_work(BatchTracer(ready, *built.accel, *built.kernel), settings, what);
-  const DrawnPicture picture = draw(map, command.heat_map + " a ray");
-  write_png(out, picture.width, picture.height, picture.rgb);
+  const DrawnPicture picture = draw(map, unit);
   fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
   fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
+  for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
+  if (!no_part.empty()) fmt::print("effects       no part of heat maps, though asked for: {}\n", fmt::join(no_part, ", "));
   fmt::print("heat map      {} a camera ray: mean {:.2f}, median {}, most {}; the brightest colour is {}\n", command.heat_map, map.mean, map.median,
              map.most, map.top);
+  std::fflush(stdout);
+  write_png(out, picture.width, picture.height, picture.rgb);
   fmt::print("picture       {} ({} x {} rays)\n", out.string(), map.width, map.height);
 }
 
@@ -144,7 +171,7 @@ void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSet
 ExitStatus command_render(const RenderCommand& command) {
   const std::filesystem::path out = command.out.empty() ? "image.png" : command.out;
   check_picture_path(out);
-  const std::optional<double> exposure = parse_exposure(command.exposure);
+  static_cast<void>(parse_exposure(command.exposure, Integrator::path));  // before the scene is read
   const Scene scene = load_scene(parse_scene_word(command.scene));
   const std::vector<Effect> effects = effects_of(scene);
   RenderSettings settings = command.settings;
@@ -155,16 +182,20 @@ ExitStatus command_render(const RenderCommand& command) {
     render_heat_map(command, scene, settings, out);
     return ExitStatus::kDone;
   }
-  const EffectSet set = simulated(parse_effects(command.effects, called_for(effects)), settings.integrator);
+  if (out.extension() == ".png") check_png_size(settings.width, settings.height);
+  const std::optional<double> exposure = parse_exposure(command.exposure, settings.integrator);
+  const EffectSet chosen = parse_effects(command.effects, called_for(effects)), set = simulated(chosen, settings.integrator);
   const RenderScene ready(scene, set);
   const BuiltKernel built = build_kernel(command.kernel, ready.mesh(), this_registry());
   fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
-  fmt::print("integrator    {}, {} x {}, {} sample{} a pixel, seed {}\n", to_string(settings.integrator), settings.width, settings.height,
-             settings.samples, settings.samples == 1 ? "" : "s", settings.seed);
+  fmt::print("integrator    {}, {} x {}, {} sample{} a pixel, seed {}, {}\n", to_string(settings.integrator), settings.width, settings.height,
+             settings.samples, settings.samples == 1 ? "" : "s", settings.seed, threads_in_words(settings.threads));
+  if (draws_light(settings.integrator))
+    fmt::print("paths         depth {}, {}\n", settings.depth, std::isinf(settings.clamp) ? "no clamp" : fmt::format("clamp {}", settings.clamp));
   fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
   for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
   for (const std::string& warning : ready.warnings()) fmt::print("warning       {}\n", warning);
-  print_effects(effects, set, settings.integrator);
+  print_effects(effects, chosen, set, settings.integrator);
   std::fflush(stdout);
 
   const BatchTracer tracer(ready, *built.accel, *built.kernel);
@@ -174,9 +205,10 @@ ExitStatus command_render(const RenderCommand& command) {
   const Picture picture = render(tracer, settings, statistics, [&](double done) { bar(done); });
   const double seconds = wall_seconds() - begin;
   const double stops = exposure.value_or(auto_exposure(picture));
-  write_picture(out, picture, stops);
   print_rays(statistics);
   if (statistics.not_finite > 0) fmt::print("warning       {} samples were no finite number and are left out\n", statistics.not_finite);
+  std::fflush(stdout);
+  write_picture(out, picture, stops);
   fmt::print("picture       {} ({}exposure {:+.2f} stops; {:.2f} s)\n", out.string(), exposure ? "" : "automatic ", stops, seconds);
   return ExitStatus::kDone;
 }

@@ -62,7 +62,8 @@ struct CompareCommand {
 struct RenderCommand {
   std::string scene;
   std::filesystem::path out;     ///< empty: image.png
-  std::string effects = "auto", integrator = "auto", exposure = "auto";
+  std::string effects = "auto", integrator = "auto";
+  std::string exposure;          ///< auto or stops; empty: auto, or 0 where what is drawn is no light
   std::string heat_map;          ///< empty, nodes or triangles
   std::string resolution;        ///< WIDTHxHEIGHT; empty: the camera's
   RenderSettings settings;       ///< but what the words above say

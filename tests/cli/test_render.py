@@ -38,9 +38,23 @@ class Render(CommandLineCase):
     def test_render_other_integrators_and_heat_maps(self):
         for integrator in ("whitted", "ambient_occlusion", "normals"):
             self.assertIn(f"integrator    {integrator}", self.render("--integrator", integrator))
-        self.assertIn("no part of normals", self.render("--integrator", "normals"))
+        normals = self.render("--integrator", "normals", "--effects", "mirror,env_light", "--threads", "2")
+        self.assertIn("  - mirror        no part of normals; the scene has", normals)
+        self.assertIn("  - env_light     no part of normals, though asked for", normals)
+        self.assertIn(", seed 1, 2 threads\n", normals)
+        self.assertIn("(exposure +0.00 stops", normals)
+        self.assertIn("(exposure +0.00 stops", self.render("--integrator", "ambient_occlusion"))
+        self.assertIn("(automatic exposure", self.render("--integrator", "normals", "--exposure", "auto"))
+        self.assertIn("paths         depth 7, clamp 2.5\n", self.render("--depth", "7", "--clamp", "2.5"))
         for what in ("nodes", "triangles"):
-            self.assertIn(f"heat map      {what} a camera ray: mean", self.render("--heatmap", what))
+            result = self.call("render", "cornell_box:600", "--resolution", "16x12", "--heatmap", what)
+            self.assertIn(f"heat map      {what} a camera ray: mean", result.stdout)
+        result = self.call("render", "cornell_box:600", "--resolution", "16x12", "--heatmap", "nodes", "--effects", "mirror,motion_blur")
+        self.assertIn("effects       no part of heat maps, though asked for: mirror\n", result.stdout)
+        # Without motion_blur the cloth stands still, which structures that hold no motion can trace.
+        still = self.call("render", "waving_cloth:200", "--resolution", "8x8", "--heatmap", "nodes", "--effects", "dof", "--structure", "bvh8")
+        self.assertEqual(still.returncode, 0, still.stderr)
+        self.assert_error(self.call("render", "waving_cloth:200", "--resolution", "8x8", "--heatmap", "nodes", "--structure", "bvh8"), "bvh4_motion")
         (self.folder / "cube.obj").write_text(CUBE)
         dark = self.call("render", "cube.obj", "--resolution", "8x8")
         self.assertIn("ambient_occlusion", dark.stdout)  # nothing emits light
@@ -60,9 +74,21 @@ class Render(CommandLineCase):
             (("--out", "a.jpg"), ".png"),
             (("--out", "nowhere/a.png"), "no such folder"),
             (("--heatmap", "nodes", "--out", "a.pfm"), ".png"),
+            (("--heatmap", "nodes", "--resolution", "65000x65000"), ".pfm"),
+            (("--resolution", "40000x40000"), ".pfm"),
+            (("--out", "folder.png"), "cannot be written"),
+            (("--clamp", "nan"), "clamp"),
+            (("--clamp", "0"), "--clamp"),
+            (("--integrator", "whitted", "--depth", "33"), "0 to 32"),
+            (("--effects", "all,mirror"), "'all' stands alone"),
+            (("--effects", "mirror,"), "an empty name"),
+            (("--heatmap", "nodes", "--effects", "mirrors"), "did you mean 'mirror'"),
             (("--isa", "ssse"), "did you mean 'sse'"),
             (("--sppp", "4"), "did you mean '--spp'"),
         ]
+        (self.folder / "folder.png").mkdir()
+        for option, value in (("--spp", "4"), ("--depth", "3"), ("--clamp", "2"), ("--exposure", "0"), ("--integrator", "path"), ("--seed", "2")):
+            cases.append((("--heatmap", "nodes", option, value), option))
         for words, part in cases:
             with self.subTest(words=words):
                 self.assert_error(self.call("render", "cornell_box:600", *words), part)
