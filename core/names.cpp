@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/error.h"
+
 namespace arboretum {
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -42,6 +44,12 @@ std::string unknown_name_message(std::string_view kind, std::string_view name, s
   message += close.empty() ? " (valid:" : "; did you mean '" + close + "'? (valid:";
   for (const std::string& candidate : candidates) message += " " + candidate;
   return message + ")";
+}
+
+std::size_t index_of_name(std::string_view kind, std::string_view name, std::span<const std::string_view> names) {
+  const auto found = std::ranges::find(names, name);
+  if (found == names.end()) throw UserError(unknown_name_message(kind, name, std::vector<std::string>(names.begin(), names.end())));
+  return std::size_t(found - names.begin());
 }
 
 }  // namespace arboretum

@@ -17,5 +17,7 @@ namespace arboretum {
 /// "unknown <kind> 'naem'; did you mean 'name'? (valid: a, b, c)": one line for UserError. Asks only for a close name.
 [[nodiscard]] std::string unknown_name_message(std::string_view kind, std::string_view name,
                                                std::span<const std::string> candidates);
+/// Where `name` stands in `names`; throws UserError with unknown_name_message() where it does not.
+[[nodiscard]] std::size_t index_of_name(std::string_view kind, std::string_view name, std::span<const std::string_view> names);
 
 }  // namespace arboretum

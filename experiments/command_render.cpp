@@ -63,9 +63,7 @@ bool takes_part(EffectKind kind, Integrator integrator) {
 /// Without a light in it a scene is black; its shape can be seen all the same.
 Integrator chosen_integrator(const std::string& word, const std::vector<Effect>& effects) {
   if (!word.empty() && word != "auto") return parse_integrator(word);
-  const EffectSet set = called_for(effects);
-  const bool lit = set.has(EffectKind::shadow_hard) || set.has(EffectKind::shadow_soft) || set.has(EffectKind::env_light);
-  return lit ? Integrator::path : Integrator::ambient_occlusion;
+  return is_lit(called_for(effects)) ? Integrator::path : Integrator::ambient_occlusion;
 }
 
 EffectSet simulated(EffectSet chosen, Integrator integrator) {

@@ -62,9 +62,7 @@ Scene for_whole_mesh(const Scene& scene, Vec3d light) {
   Scene ready = scene;
   for (Material& m : ready.materials)
     if (is_invisible(m)) m = Material{.name = m.name, .opacity = 0.0f};
-  const EffectSet effects = called_for(effects_of(ready));
-  const bool lit = effects.has(EffectKind::shadow_hard) || effects.has(EffectKind::shadow_soft) || effects.has(EffectKind::env_light);
-  if (!lit) ready.lights = {Light{.position = to_float(light), .intensity = {1, 1, 1}}};
+  if (!is_lit(called_for(effects_of(ready)))) ready.lights = {Light{.position = to_float(light), .intensity = {1, 1, 1}}};
   return ready;
 }
 

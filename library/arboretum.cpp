@@ -13,14 +13,7 @@
 namespace arboretum {
 namespace {
 
-[[noreturn]] void throw_unknown(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) {
-  const std::vector<std::string> names(valid.begin(), valid.end());
-  throw UserError(unknown_name_message(kind, name, names));
-}
-
-void check_name(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) {
-  if (std::ranges::find(valid, name) == valid.end()) throw_unknown(kind, name, valid);
-}
+void check_name(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) { (void)index_of_name(kind, name, valid); }
 
 void check_mesh(const TriangleMesh& mesh) {
   const auto number = [](std::size_t n) { return std::to_string(n); };
@@ -54,8 +47,8 @@ const KernelRow* find(const TracerSettings& s, std::string_view traversal, Isa i
 std::vector<Isa> allowed_isas(const TracerSettings& s) {
   const std::span<const Isa> available = available_isas();
   if (s.isa.empty()) return {available.rbegin(), available.rend()};
+  check_name("isa", s.isa, isa_names(kAllIsas));
   const std::optional<Isa> isa = parse_isa(s.isa);
-  if (!isa) throw_unknown("isa", s.isa, isa_names(kAllIsas));
   if (!is_available(*isa)) {
     std::string line = "isa " + s.isa + " is not available here; use one of";
     for (std::string_view name : isa_names(available)) line.append(" ").append(name);
@@ -118,7 +111,7 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
   if (!entry) {
     std::vector<std::string_view> names;
     for (const StructureEntry& e : all_structures()) names.push_back(e.info.name);
-    throw_unknown("structure", settings_.structure, names);
+    check_name("structure", settings_.structure, names);
   }
   if (settings_.builder.empty()) settings_.builder = entry->info.builders.front();
   if (settings_.threads == 0) settings_.threads = std::max(1u, std::thread::hardware_concurrency());

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "rendering/directions.h"
 
 namespace arboretum {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Schlick's approximation: reflectance at F0 = `normal` seen at `cosine`.
 Vec3f schlick(Vec3f normal, double cosine) noexcept {
@@ -25,7 +24,7 @@ double lambda(Vec3d w, double alpha) noexcept {
 /// Density of microfacet normals; written so that narrow lobes lose no digits.
 double ggx(Vec3d half, double alpha) noexcept {
   const double a2 = alpha * alpha, s = (half.x * half.x + half.y * half.y) / a2 + half.z * half.z;
-  return 1.0 / (kPi * a2 * s * s);
+  return 1.0 / (std::numbers::pi * a2 * s * s);
 }
 
 }  // namespace
@@ -42,7 +41,7 @@ Bsdf::Value Bsdf::evaluate(Vec3d in) const noexcept {
   Value value;
   if (!(in.z > 0.0)) return value;
   if (has_diffuse_) {
-    value.diffuse = diffuse_ * float(in.z / kPi);
+    value.diffuse = diffuse_ * float(in.z / std::numbers::pi);
     if (glossy()) value.diffuse = value.diffuse * coat_lets_through(out_.z) * coat_lets_through(in.z);
   }
   if (glossy()) {
@@ -69,7 +68,7 @@ double Bsdf::glossy_pdf(Vec3d half) const noexcept {
 double Bsdf::pdf(Vec3d in, Lobes lobes) const noexcept {
   const double share = share_of_diffuse(lobes);
   if (!(in.z > 0.0) || share < 0.0) return 0.0;
-  double pdf = share * in.z / kPi;
+  double pdf = share * in.z / std::numbers::pi;
   if (glossy() && share < 1.0) pdf += (1.0 - share) * glossy_pdf(normalize(out_ + in));
   return pdf;
 }
@@ -89,7 +88,7 @@ std::optional<Scatter> Bsdf::smooth(Vec3d in, Lobes lobes, ScatterKind kind) con
 Vec3d Bsdf::glossy_direction(double u, double v) const noexcept {
   const double a = surface_.alpha;
   const Vec3d out = normalize(Vec3d{a * out_.x, a * out_.y, out_.z});
-  const Turn circle(u);
+  const UnitCircle circle(u);
   const double z = (1.0 - v) * (1.0 + out.z) - out.z, r = std::sqrt(std::max(0.0, 1.0 - z * z));
   const Vec3d half = Vec3d{r * circle.cosine, r * circle.sine, z} + out;
   const Vec3d normal = normalize(Vec3d{a * half.x, a * half.y, std::max(half.z, 1e-12)});
@@ -119,10 +118,10 @@ std::optional<Scatter> Bsdf::scatter(Lobes lobes, double choice, double u, doubl
   const double share = share_of_diffuse(lobes);
   if (share < 0.0) return std::nullopt;
   if (choice < share) {
-    const Vec3d in = cosine_direction(u, Turn(v));
+    const Vec3d in = cosine_direction(u, UnitCircle(v));
     if (glossy()) return smooth(in, lobes, ScatterKind::diffuse);
     if (!(in.z > 0.0)) return std::nullopt;
-    return Scatter{in, share == 1.0 ? diffuse_ : diffuse_ * float(1.0 / share), share * in.z / kPi, ScatterKind::diffuse};
+    return Scatter{in, share == 1.0 ? diffuse_ : diffuse_ * float(1.0 / share), share * in.z / std::numbers::pi, ScatterKind::diffuse};
   }
   if (glossy()) return smooth(glossy_direction(u, v), lobes, ScatterKind::glossy);
   Scatter scatter = mirrored();

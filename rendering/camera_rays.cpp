@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rendering/pixels.h"
+
 namespace arboretum {
 
 void CameraRays::add(std::span<const PixelSample> samples, TracedRays& rays) const {
@@ -24,18 +26,9 @@ void CameraRays::add(std::span<const PixelSample> samples, TracedRays& rays) con
 
 std::vector<PixelSample> CameraRays::samples(std::uint32_t x, std::uint32_t y, std::uint32_t size, std::uint32_t first,
                                              std::uint32_t last) const {
-  const auto every_other_bit = [](std::uint32_t code) {
-    std::uint32_t bits = 0;
-    for (std::uint32_t i = 0; i < 16; ++i) bits |= (code >> (2 * i) & 1u) << i;
-    return bits;
-  };
   std::vector<PixelSample> all;
-  for (std::uint32_t sample = first; sample < last; ++sample) {
-    for (std::uint32_t code = 0; code < size * size; ++code) {
-      const std::uint32_t px = x + every_other_bit(code), py = y + every_other_bit(code >> 1);
-      if (px < settings_.width && py < settings_.height) all.push_back({px, py, sample});
-    }
-  }
+  for (std::uint32_t sample = first; sample < last; ++sample)
+    visit_morton(x, y, size, settings_.width, settings_.height, [&](unsigned px, unsigned py) { all.push_back({px, py, sample}); });
   return all;
 }
 

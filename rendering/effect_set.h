@@ -45,6 +45,10 @@ class EffectSet {
 };
 
 [[nodiscard]] constexpr std::string_view to_string(EffectKind kind) noexcept { return kEffectNames[std::size_t(kind)]; }
+/// Something in the scene gives light.
+[[nodiscard]] constexpr bool is_lit(EffectSet effects) noexcept {
+  return effects.has(EffectKind::shadow_hard) || effects.has(EffectKind::shadow_soft) || effects.has(EffectKind::env_light);
+}
 /// Those that are called for.
 [[nodiscard]] EffectSet called_for(const std::vector<Effect>& effects);
 /// `auto`: what is called for; `all`; or names with commas between them, those alone; blanks around them are none of the names'. Throws UserError, naming the nearest.

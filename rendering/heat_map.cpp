@@ -10,15 +10,7 @@
 #include <numeric>
 #include <thread>
 
-#if defined(__GNUC__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-function"
-#pragma GCC diagnostic ignored "-Wsign-compare"
-#endif
 #include <stb/stb_easy_font.h>
-#if defined(__GNUC__)
-#pragma GCC diagnostic pop
-#endif
 
 #include "core/error.h"
 #include "core/names.h"
@@ -91,12 +83,7 @@ void summarise(HeatMap& map) {
 
 }  // namespace
 
-HeatCount parse_heat_count(const std::string& word) {
-  const auto found = std::ranges::find(kHeatCountNames, word);
-  if (found == kHeatCountNames.end())
-    throw UserError(unknown_name_message("heat map", word, std::vector<std::string>(kHeatCountNames.begin(), kHeatCountNames.end())));
-  return HeatCount(found - kHeatCountNames.begin());
-}
+HeatCount parse_heat_count(const std::string& word) { return HeatCount(index_of_name("heat map", word, kHeatCountNames)); }
 
 HeatMap count_work(const BatchTracer& tracer, const RenderSettings& settings, HeatCount what) {
   if (!tracer.kernel().counts()) throw UserError(std::string(tracer.kernel().structure) + " does not count its work: no heat map of it");

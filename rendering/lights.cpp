@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace arboretum {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct Placed {
   Vec3d a, ab, ac, normal;  ///< the normal has the length of twice the area
@@ -43,8 +42,8 @@ LightTable::LightTable(const TriangleMesh& mesh, const std::vector<Surface>& sur
 void LightTable::add_lights(const std::vector<Light>& lights, double radius) {
   for (const Light& light : lights) {
     const double cone_cosine = light.type == Light::Type::spot ? cosine_of_cone(light) : -1.0;
-    double solid_angle = 2.0 * kPi * (1.0 - cone_cosine);
-    if (light.type == Light::Type::directional) solid_angle = kPi * radius * radius;
+    double solid_angle = 2.0 * std::numbers::pi * (1.0 - cone_cosine);
+    if (light.type == Light::Type::directional) solid_angle = std::numbers::pi * radius * radius;
     const double power = luminance(light.intensity) * solid_angle;
     if (!is_bright(light.intensity)) continue;
     emitters_.push_back({.light = light, .direction = normalize(Vec3d(light.direction)), .cone_cosine = cone_cosine, .power = std::max(power, 1e-300)});
@@ -55,7 +54,7 @@ void LightTable::add_triangles(const std::vector<Surface>& surfaces) {
   for (std::uint32_t i = 0; i < mesh_->size(); ++i) {
     const Vec3f emission = surfaces[mesh_->materials.empty() ? 0 : mesh_->materials[i]].emission;
     if (!is_bright(emission)) continue;
-    const double power = 2.0 * kPi * largest_area(*mesh_, i) * luminance(emission);
+    const double power = 2.0 * std::numbers::pi * largest_area(*mesh_, i) * luminance(emission);
     if (power > 0.0) emitters_.push_back({.triangle = i, .emission = emission, .power = power});
   }
 }

@@ -13,6 +13,7 @@
 #include "core/timer.h"
 #include "rendering/camera_rays.h"
 #include "rendering/path_wave.h"
+#include "rendering/pixels.h"
 #include "rendering/simple_wave.h"
 
 namespace arboretum {
@@ -63,22 +64,14 @@ void render_tile(const BatchTracer& tracer, const RenderSettings& settings, unsi
 }  // namespace
 
 void check(const RenderSettings& s) {
-  constexpr unsigned kMost = 65536;
-  const auto within = [](unsigned x) { return x >= 1 && x <= kMost; };
-  if (!within(s.width) || !within(s.height))
-    throw UserError("resolution " + std::to_string(s.width) + "x" + std::to_string(s.height) + " is not possible; each must be within 1 to 65536");
-  if (!within(s.samples)) throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
+  check_resolution(s.width, s.height);
+  if (s.samples < 1 || s.samples > 65536) throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
   if (s.integrator == Integrator::whitted && s.depth > kMostBranching)
     throw UserError("depth " + std::to_string(s.depth) + " is not possible for whitted, which follows every branch; 0 to " + std::to_string(kMostBranching) + " are");
   if (!(s.clamp > 0.0f)) throw UserError("a clamp of " + std::to_string(s.clamp) + " is not possible; it must be above 0");
 }
 
-Integrator parse_integrator(const std::string& word) {
-  const auto found = std::ranges::find(kIntegratorNames, word);
-  if (found == kIntegratorNames.end())
-    throw UserError(unknown_name_message("integrator", word, std::vector<std::string>(kIntegratorNames.begin(), kIntegratorNames.end())));
-  return Integrator(found - kIntegratorNames.begin());
-}
+Integrator parse_integrator(const std::string& word) { return Integrator(index_of_name("integrator", word, kIntegratorNames)); }
 
 Picture render(const BatchTracer& tracer, const RenderSettings& settings, RenderStatistics& statistics, const RenderProgress& progress) {
   check(settings);

@@ -2,11 +2,10 @@
 
 #include "rendering/directions.h"
 #include "rendering/surface_point.h"
+#include "rendering/workload.h"
 
 namespace arboretum {
 namespace {
-
-constexpr double kOcclusionLength = 0.4;  // of the scene's radius
 
 std::vector<Hit> camera_hits(const BatchTracer& tracer, const TracedRays& rays, RenderStatistics& statistics) {
   std::vector<Hit> hits(rays.size());
@@ -34,10 +33,10 @@ void trace_ambient_occlusion(const BatchTracer& tracer, const TracedRays& camera
     if (!hits[i].is_hit()) continue;
     const SurfacePoint point(tracer.scene().mesh(), camera_rays.rays[i], camera_rays.time(i), hits[i]);
     const Sampler& sampler = camera_rays.owners[i].sampler;
-    const Vec3d in = cosine_direction(sampler.hit(0, HitDimension::environment_u), Turn(sampler.hit(0, HitDimension::environment_v)));
+    const Vec3d in = cosine_direction(sampler.hit(0, HitDimension::environment_u), UnitCircle(sampler.hit(0, HitDimension::environment_v)));
     rays.rays.push_back({.origin = point.origin(point.normal(), SelfIntersection::error_bound),
                          .direction = leaving(Frame(point.normal()).to_world(in), point.normal()),
-                         .tfar = float(kOcclusionLength * tracer.scene().radius())});
+                         .tfar = float(kOcclusionReach * 2.0 * tracer.scene().radius())});
     rays.owners.push_back({sampler, 0});
     if (!camera_rays.times.empty()) rays.times.push_back(camera_rays.time(i));
     places.push_back(i);

@@ -9,6 +9,7 @@
 #include "core/names.h"
 #include "core/random.h"
 #include "rendering/directions.h"
+#include "rendering/pixels.h"
 #include "rendering/surface_point.h"
 #include "scenes/camera.h"
 
@@ -22,33 +23,7 @@ constexpr std::array<std::string_view, 6> kNames{"primary",    "shadow",  "ambie
 enum Dimension : std::uint64_t { kTimeDimension = 8, kOcclusionDimension = 16, kDiffuseDimension = 32, kRandomDimension = 48 };
 
 void check_known(std::string_view name) {
-  if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return;
-  throw UserError(
-      unknown_name_message("workload", name, std::vector<std::string>(kNames.begin(), kNames.end())));
-}
-
-void check_resolution(const View& view) {
-  constexpr unsigned kMost = 65536;
-  if (view.width == 0 || view.height == 0 || view.width > kMost || view.height > kMost) {
-    throw UserError("resolution " + std::to_string(view.width) + " x " + std::to_string(view.height) +
-                    " is not possible; each must be within 1 to " + std::to_string(kMost));
-  }
-}
-
-/// Calls visit(x, y) for the pixels of a square of side `size` (a power of two) at (x, y) that lie in the
-/// picture, in Morton order.
-template <class Visit>
-void visit_morton(unsigned x, unsigned y, unsigned size, const View& view, const Visit& visit) {
-  if (x >= view.width || y >= view.height) return;
-  if (size == 1) {
-    visit(x, y);
-    return;
-  }
-  const unsigned half = size / 2;
-  visit_morton(x, y, half, view, visit);
-  visit_morton(x + half, y, half, view, visit);
-  visit_morton(x, y + half, half, view, visit);
-  visit_morton(x + half, y + half, half, view, visit);
+  (void)index_of_name("workload", name, kNames);
 }
 
 Vec3d point_on_sphere(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) {
@@ -148,11 +123,11 @@ Vec3d light_position(const Scene& scene, RayBatch primary_rays, std::span<const 
 }
 
 Workload make_primary(const Scene& scene, const View& view) {
-  check_resolution(view);
+  check_resolution(view.width, view.height);
   Workload workload{.name = "primary", .query = Query::closest_hit, .rays = {}};
   workload.rays.reserve(std::size_t(view.width) * view.height);
   const RayGenerator camera(view_of(scene), view.width, view.height);
-  visit_morton(0, 0, std::bit_ceil(std::max(view.width, view.height)), view,
+  visit_morton(0, 0, std::bit_ceil(std::max(view.width, view.height)), view.width, view.height,
                [&](unsigned x, unsigned y) { workload.rays.push_back(camera.ray(x + 0.5, y + 0.5)); });
   if (scene.mesh.moves()) {
     for (std::size_t i = 0; i < workload.rays.size(); ++i) workload.times.push_back(time_of(scene, view, i));
@@ -163,7 +138,7 @@ Workload make_primary(const Scene& scene, const View& view) {
 Workload make_workload(std::string_view name, const Scene& scene, const View& view,
                        RayBatch primary_rays, std::span<const Hit> primary_hits) {
   check_known(name);
-  check_resolution(view);
+  check_resolution(view.width, view.height);
   if (name == "primary") return make_primary(scene, view);
   Workload workload{.name = std::string(name), .query = query_of(name), .rays = {}};
   const Bounds3f bounds = scene.mesh.bounds();
@@ -210,7 +185,7 @@ Workload make_workload(std::string_view name, const Scene& scene, const View& vi
       ray.direction = leaving(cosine_about(kDiffuseDimension), normal);
     } else {
       ray.direction = leaving(cosine_about(kOcclusionDimension), normal);
-      ray.tfar = float(0.2 * diagonal);
+      ray.tfar = float(kOcclusionReach * diagonal);
     }
     Ray reference = ray;
     reference.origin = to_float(surface.point());

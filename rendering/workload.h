@@ -15,6 +15,9 @@
 
 namespace arboretum {
 
+/// How far rays of ambient occlusion look, as a share of the diagonal of the scene's bounds.
+inline constexpr double kOcclusionReach = 0.2;
+
 enum class Query { closest_hit, any_hit };
 
 struct Workload {

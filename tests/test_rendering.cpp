@@ -181,14 +181,14 @@ TEST_CASE("lobes: densities add up to at most 1, directions follow them, weights
   }
 }
 
-TEST_CASE("turns are circles") {
+TEST_CASE("circles by turns") {
   for (int i = 0; i < 1000; ++i) {
-    const Turn turn(i / 1000.0);
+    const UnitCircle turn(i / 1000.0);
     CHECK(turn.cosine == Approx(std::cos(2 * std::numbers::pi * i / 1000)).margin(1e-14));
     CHECK(turn.sine == Approx(std::sin(2 * std::numbers::pi * i / 1000)).margin(1e-14));
   }
-  CHECK(Turn(0.0).cosine == 1.0);
-  CHECK(Turn(0.0).sine == 0.0);
+  CHECK(UnitCircle(0.0).cosine == 1.0);
+  CHECK(UnitCircle(0.0).sine == 0.0);
 }
 
 TEST_CASE("lobes: light goes both ways alike (reciprocity)") {

@@ -9,6 +9,12 @@
 
 namespace arboretum {
 
+/// Area of a box's three faces; what builders compare.
+[[nodiscard]] inline float half_area(Vec3f lower, Vec3f upper) noexcept {
+  const Vec3f d = upper - lower;
+  return d.x * d.y + d.y * d.z + d.z * d.x;
+}
+
 /// Children stand next to each other. `left` is the first child's index, 0 for a leaf (the root is nobody's child).
 struct alignas(32) BinaryNode {
   Vec3f lower;
@@ -17,10 +23,7 @@ struct alignas(32) BinaryNode {
   std::uint32_t count;  ///< primitive references below
 
   [[nodiscard]] bool is_leaf() const noexcept { return left == 0; }
-  [[nodiscard]] float half_area() const noexcept {
-    const Vec3f d = upper - lower;
-    return d.x * d.y + d.y * d.z + d.z * d.x;
-  }
+  [[nodiscard]] float half_area() const noexcept { return arboretum::half_area(lower, upper); }
 };
 static_assert(sizeof(BinaryNode) == 32);
 

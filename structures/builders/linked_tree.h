@@ -37,12 +37,6 @@ struct LinkedTree {
   bool duplicates = false;                  ///< a primitive may be referenced by several leaves
 };
 
-/// Area of a box's three faces; what builders compare.
-[[nodiscard]] inline float half_area(Vec3f lower, Vec3f upper) noexcept {
-  const Vec3f d = upper - lower;
-  return d.x * d.y + d.y * d.z + d.z * d.x;
-}
-
 /// The same tree with children next to each other and references in order of the leaves; a subtree of at most `leaf_width`
 /// references becomes one leaf, unless it might name a primitive twice. The result depends on the tree alone. Runs in the caller's TBB arena. The tree is not empty.
 [[nodiscard]] BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width);

@@ -57,10 +57,6 @@ class SweepSah {
     std::size_t left = 0;  ///< references on the left; 0: no split found
   };
 
-  [[nodiscard]] static float half_area(const Bounds3f& b) noexcept {
-    const Vec3f d = b.upper - b.lower;
-    return d.x * d.y + d.y * d.z + d.z * d.x;
-  }
   void hand_out(std::size_t n) { tree_.nodes.hand_out(n), tree_.first.hand_out(n); }
 
   void sort() {
@@ -80,7 +76,7 @@ class SweepSah {
   }
 
   [[nodiscard]] float cost(const Bounds3f& box, std::size_t count) const noexcept {
-    return half_area(box) * float((std::uint32_t(count) + leaf_width_ - 1) / leaf_width_);
+    return half_area(box.lower, box.upper) * float((std::uint32_t(count) + leaf_width_ - 1) / leaf_width_);
   }
 
   [[nodiscard]] Split sweep(int axis, std::size_t begin, std::size_t end) {

@@ -1,0 +1,191 @@
+// What builders are for: trees of little cost, within their memory. Reinsertion, spatial splits, the order of a wide node's children.
+#include <tbb/global_control.h>
+
+#include "core/error.h"
+#include "structures/builders/clip.h"
+#include "structures/builders/collapse.h"
+#include "tests/builder_checks.h"
+
+using namespace arboretum;
+using namespace arboretum::test;
+
+TEST_CASE("reinsertion lowers the SAH cost of every builder's tree") {
+  std::vector<KernelScene> scenes;
+  scenes.push_back({"random 20000", random_triangles(20000, 0.1f, 6)});
+  scenes.push_back({"sphere", sphere(80)});
+  for (const std::string_view builder : binary_builder_names()) {
+    if (!builder.ends_with(kReinsertion)) continue;
+    const std::string_view plain = builder.substr(0, builder.size() - kReinsertion.size());
+    REQUIRE(std::ranges::find(binary_builder_names(), plain) != binary_builder_names().end());
+    for (const KernelScene& scene : scenes) {
+      INFO(builder << ", " << scene.name);
+      CHECK(sah_of(builder, scene.mesh) < sah_of(plain, scene.mesh));
+    }
+  }
+}
+
+namespace {
+
+void append(TriangleMesh& mesh, const TriangleMesh& more) {
+  const auto first = std::uint32_t(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), more.vertices.begin(), more.vertices.end());
+  for (const Triangle& t : more.triangles) mesh.triangles.push_back({first + t.a, first + t.b, first + t.c});
+}
+
+}  // namespace
+
+TEST_CASE("reinsertion of the top lowers the SAH cost where triangles differ in size") {
+  // Many small triangles among a few that span the scene: what a plane cannot part.
+  const tbb::global_control more_threads_than_cores(tbb::global_control::max_allowed_parallelism, 7);
+  TriangleMesh crowded = random_triangles(20000, 0.01f, 6);
+  const TriangleMesh walls = random_triangles(300, 1.0f, 7);
+  append(crowded, walls);
+  const TriangleMesh even = sphere(80);
+  for (const std::string_view builder : binary_builder_names()) {
+    if (builder.ends_with(kReinsertion)) continue;
+    INFO(builder);
+    BuilderParameters with, without;
+    with.reinsertion_top = 512, without.reinsertion_top = 0;
+    const auto hash = [&](unsigned threads) { return check_tree(build(builder, crowded, 8, threads, best_isa(), with), crowded, 8, splits_triangles(builder)).hash; };
+    CHECK(hash(1) == hash(3));
+    // Left to itself a builder from the top down does it.
+    const bool does = builder == "binned_sah" || builder == "sweep_sah" || builder == "spatial_sah";
+    CHECK(sah_of(builder, crowded, with) < (does ? 0.99 : 1.0) * sah_of(builder, crowded, without));
+    CHECK(sah_of(builder, even, with) < 1.001 * sah_of(builder, even, without));
+    CHECK(sah_of(builder, crowded) == sah_of(builder, crowded, does ? with : without));
+  }
+  BuilderParameters parameters;
+  parameters.reinsertion_top = 65537;
+  CHECK_THROWS_AS(build("binned_sah", even, 4, 1, best_isa(), parameters), UserError);
+}
+
+TEST_CASE("of a wide node's children the ones that cost least stand last") {
+  // Walls among small things: leaves and subtrees of all sizes side by side.
+  TriangleMesh mesh = random_triangles(20000, 0.01f, 8);
+  const TriangleMesh walls = random_triangles(200, 1.0f, 9);
+  append(mesh, walls);
+  CollapseSettings settings;
+  settings.block_width = 8, settings.node_bytes = 224, settings.block_bytes = 352;
+  const WideTree wide = collapse(build("binned_sah", mesh, 8), settings);
+  std::size_t out_of_order = 0, apart = 0;
+  const auto cost = [&](const auto& self, const WideNode& node) -> double {
+    if (node.is_leaf()) return 0.25 + double(node.blocks);
+    double sum = 1.0, before = std::numeric_limits<double>::infinity();
+    for (const WideNode& child : wide.children(node)) {
+      const double its = self(self, child), steps = std::log2(its) / 3.0;
+      // Within rounding either of two neighbouring steps may be meant.
+      out_of_order += std::round(steps - 1e-4) > std::round(before + 1e-4);
+      apart += std::round(steps) < std::round(before);
+      before = steps;
+      const auto area = [](const Bounds3f& box) { return double(half_area(box.lower, box.upper)); };
+      sum += its * area(child.box) / area(node.box);
+    }
+    return sum;
+  };
+  CHECK(cost(cost, wide.nodes[0]) > 1.0);
+  CHECK(out_of_order == 0);
+  CHECK(apart > 100);
+}
+
+namespace {
+
+/// Long thin triangles in any direction.
+TriangleMesh needles(std::size_t count) {
+  TriangleMesh mesh;
+  const Bounds3f cube{{-1, -1, -1}, {1, 1, 1}};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3f middle = uniform_point(21, i, 0, cube), along = 0.3f * uniform_point(21, i, 3, cube);
+    const auto first = std::uint32_t(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {middle - along, middle + along, middle + along + 1e-3f * uniform_point(21, i, 6, cube)});
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("spatial splits keep their budget") {
+  const TriangleMesh mesh = needles(20000);
+  for (const float budget : {0.0f, 0.1f, 0.5f, 2.0f}) {
+    BuilderParameters parameters;
+    parameters.duplication_budget = budget;
+    const BinaryTree tree = build("spatial_sah", mesh, 4, 2, best_isa(), parameters);
+    check_tree(tree, mesh, 4, true);
+    INFO(budget);
+    CHECK(tree.primitives.size() <= std::size_t(double(mesh.size()) * (1.0 + double(budget))));
+    if (budget >= 0.5f) CHECK(tree.primitives.size() > mesh.size());
+  }
+  BuilderParameters parameters;
+  parameters.duplication_budget = 5.0f;
+  CHECK_THROWS_AS(build("spatial_sah", mesh, 4, 1, best_isa(), parameters), UserError);
+}
+
+TEST_CASE("binned_sah holds little beside what it builds") {
+  for (const KernelScene& scene : {KernelScene{"needles", needles(100000)}, KernelScene{"sphere", sphere(150)}}) {
+    INFO(scene.name);
+    BuildSettings settings;
+    settings.leaf = "triangle8", settings.isa = best_isa();
+    BuildReport report;
+    const auto accel = build_structure("bvh8", scene.mesh, settings, report);
+    CHECK(double(report.peak_bytes) < 1.6 * double(accel->bytes()));
+  }
+}
+
+TEST_CASE("spatial splits lower the cost of needles; a full sweep costs no more than bins") {
+  const TriangleMesh mesh = needles(20000);
+  CHECK(sah_of("spatial_sah", mesh) < 0.9 * sah_of("binned_sah", mesh));
+  CHECK(sah_of("sweep_sah", mesh) < 1.02 * sah_of("binned_sah", mesh));
+  CHECK(sah_of("sweep_sah", sphere(80)) < 1.02 * sah_of("binned_sah", sphere(80)));
+}
+
+TEST_CASE("a leaf does not hold a triangle twice") {
+  const TriangleMesh mesh = needles(20000);
+  struct Visitor final : StructureVisitor {
+    void node(const NodeView&) override {}
+    void leaf(const LeafView& leaf) override {
+      std::vector<std::uint32_t> ids(leaf.primitives.begin(), leaf.primitives.end());
+      std::ranges::sort(ids);
+      twice += std::ranges::adjacent_find(ids) != ids.end();
+      most = std::max(most, leaf.blocks);
+    }
+    std::size_t twice = 0;
+    unsigned most = 0;
+  };
+  for (const char* structure : {"bvh2", "bvh8"}) {
+    for (const char* builder : {"spatial_sah", "spatial_sah_reinsertion"}) {
+      BuildSettings settings;
+      settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa();
+      settings.parameters.intersection_cost = 0.3f;  // so that leaves are merged
+      BuildReport report;
+      Visitor visitor;
+      REQUIRE(build_structure(structure, mesh, settings, report)->visit(visitor));
+      INFO(structure << " " << builder);
+      CHECK(visitor.twice == 0);
+      CHECK(visitor.most > 1);
+    }
+  }
+}
+
+TEST_CASE("a triangle cut by a plane has the boxes of its two slabs") {
+  std::size_t cut = 0;
+  for (std::uint64_t i = 0; i < 3000; ++i) {
+    std::array<Vec3f, 3> c;
+    for (unsigned k = 0; k < 3; ++k)
+      for (unsigned a = 0; a < 3; ++a) c[k][a] = i % 3 == 0 ? float(int(8 * random_float(91, 9 * i + 3 * k + a, 0))) : random_float(91, 9 * i + 3 * k + a, 0) - 0.5f;
+    Bounds3f box;
+    for (Vec3f p : c) box.extend(p);
+    const int axis = int(i % 3);
+    for (float plane : {c[0][std::size_t(axis)], 0.3f * c[1][std::size_t(axis)] + 0.7f * c[2][std::size_t(axis)], box.upper[std::size_t(axis)] + 1.0f}) {
+      INFO("triangle " << i << ", plane " << plane);
+      Bounds3f low, high;
+      clip_by_plane(c, axis, plane, low, high);
+      const Bounds3f want_low = clip_to_slab(c, axis, box.lower[std::size_t(axis)], plane), want_high = clip_to_slab(c, axis, plane, box.upper[std::size_t(axis)]);
+      CHECK(low.empty() == want_low.empty());
+      CHECK(high.empty() == want_high.empty());
+      if (!want_low.empty()) CHECK(low == want_low);
+      if (!want_high.empty()) CHECK(high == want_high);
+      cut += !low.empty() && !high.empty();
+    }
+  }
+  CHECK(cut > 3000);
+}
