@@ -1,7 +1,6 @@
 #include "scenes/rescale.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
