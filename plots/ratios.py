@@ -15,6 +15,7 @@ from plot import fail, need_matplotlib  # noqa: E402
 AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
 COLOURS = {"faster": "#117733", "slower": "#CC3355", "indistinguishable": "#777777", "undecided": "#BBBBBB", "mean": "#332288"}
 MOST_CELLS = 80
+LETTER = 0.075  # inches that a letter of a label takes
 
 
 def labels(cells):
@@ -54,7 +55,8 @@ def draw(comparison):
     parts = [(title, *rows_of(comparison, metric)) for metric, title in (("trace", "rays a second"), ("build", "build speed"))]
     parts = [part for part in parts if part[1]]
     heights = [len(rows) + 2.5 for _, rows, _ in parts]
-    figure, axes = style.plt.subplots(len(parts), 1, figsize=(8, 0.19 * sum(heights) + 0.8), squeeze=False, layout="constrained",
+    widest = max(len(row[0]) for _, rows, _ in parts for row in rows)
+    figure, axes = style.plt.subplots(len(parts), 1, figsize=(6.5 + LETTER * widest, 0.19 * sum(heights) + 0.8), squeeze=False, layout="constrained",
                                       gridspec_kw={"height_ratios": heights})
     limit = 1 + comparison["options"]["min_difference_percent"] / 100
     for axis, (title, rows, shared) in zip(axes[:, 0], parts):
@@ -73,7 +75,7 @@ def draw(comparison):
             axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axis.xaxis.set_minor_locator(NullLocator())
         else:
-            axis.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
+            axis.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
         axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_title(title + (f": {shared}" if shared else ""), loc="left")
         axis.set_xlabel("B over A: right of 1, B is faster; grey: too little to count")
