@@ -29,8 +29,7 @@ void trace_ambient_occlusion(const BatchTracer& tracer, const TracedRays& camera
   TracedRays rays;
   std::vector<std::size_t> places;
   for (std::size_t i = 0; i < hits.size(); ++i) {
-    radiance[i] = {1, 1, 1};
-    if (!hits[i].is_hit()) continue;
+    if (!hits[i].is_hit()) continue;  // black, or what is open would not stand out from it
     const SurfacePoint point(tracer.scene().mesh(), camera_rays.rays[i], camera_rays.time(i), hits[i]);
     const Sampler& sampler = camera_rays.owners[i].sampler;
     const Vec3d in = cosine_direction(sampler.hit(0, HitDimension::environment_u), UnitCircle(sampler.hit(0, HitDimension::environment_v)));
@@ -44,7 +43,7 @@ void trace_ambient_occlusion(const BatchTracer& tracer, const TracedRays& camera
   std::vector<std::uint8_t> occluded(places.size());
   tracer.any_hit(rays, 0, occluded, RayKind::ambient_occlusion, statistics);
   for (std::size_t k = 0; k < places.size(); ++k)
-    if (occluded[k] != 0) radiance[places[k]] = {};
+    if (occluded[k] == 0) radiance[places[k]] = {1, 1, 1};
 }
 
 }  // namespace arboretum

@@ -64,6 +64,20 @@ TEST_CASE("furnace: a convex diffuse thing under a sky of radiance L gives back 
   check_near(seen(scene, 8, detected(scene).without(EffectKind::env_light)), {0, 0, 0}, 1e-6);
 }
 
+TEST_CASE("ambient occlusion: open is white, closed in is black, and so is where nothing is") {
+  Scene open = convex({});
+  check_near(seen(open, 64, Integrator::ambient_occlusion), {1, 1, 1}, 1e-6);
+  open.camera = aimed({3, 1, 2}, {30, 10, 2});
+  CHECK(seen(open, 64, Integrator::ambient_occlusion) == Vec3f{0, 0, 0});
+  // In a flat room the ceiling is nearer than a fifth of the diagonal, but for the most slanted rays: those of cosine c go as far as 0.1 / c.
+  Scene closed;
+  add_box(closed, {-1, 0, -1}, {1, 0.1f, 1});
+  closed.materials = {{}};
+  closed.camera = aimed({0, 0.05f, 0}, {0.01f, 0, 0.01f});
+  const double reach = 0.2 * std::sqrt(4 + 4 + 0.01), least = 0.1 / reach;  // a share least^2 of cosine-distributed rays is more slanted
+  check_near(seen(closed, 40000, Integrator::ambient_occlusion), Vec3f{1, 1, 1} * float(least * least), 0.1);
+}
+
 TEST_CASE("furnace: inside a closed room of albedo a that glows with e, radiance is e / (1 - a)") {
   Scene scene;
   add_box(scene, {-1, -2, -3}, {2, 1, 2});
