@@ -4,14 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <regex>
 #include <set>
+#include <span>
 
 #include "core/error.h"
 #include "core/random.h"
 #include "experiments/axes.h"
-#include "experiments/rank_test.h"
+#include "experiments/significance.h"
 #include "experiments/results_writer.h"
 
 namespace arboretum {
@@ -62,6 +64,7 @@ class Comparer {
   Comparison run() {
     for (const ComparedCell& cell : out_.cells) centres_.push_back(std::log(median(rates(cell.b)) / median(rates(cell.a))));
     if (!out_.options.control.empty()) take_relative();
+    choose_tests();
     const std::vector<Group> groups = make_groups();
     std::vector<std::vector<std::size_t>> groups_of(out_.cells.size());
     std::vector<Replicates> sums(groups.size(), Replicates(kResamples, 0.0));
@@ -117,7 +120,7 @@ class Comparer {
   std::vector<std::size_t> places(const Choose& choose) const {
     std::vector<std::size_t> found;
     for (std::size_t i = 0; i < out_.cells.size(); ++i)
-      if (choose(out_.cells[i])) found.push_back(i);
+      if (std::invoke(choose, out_.cells[i])) found.push_back(i);
     return found;
   }
 
@@ -199,33 +202,47 @@ class Comparer {
     const double machine = cell.ratio.median / (cell.rate_b.median / cell.rate_a.median);  // 1 without a control
     if (!out_.options.control.empty())
       for (double& rate : b) rate *= machine;
-    cell.p = mann_whitney_p(a, b);
+    cell.p = test_p(cell.test, a, b);
+  }
+
+  /// The same for all cells of as many repetitions, whatever was measured.
+  void choose_tests() {
+    const std::vector<std::size_t> tested = places([](const ComparedCell& c) { return std::min(c.a.repetitions.size(), c.b.repetitions.size()) > 1; });
+    for (std::size_t i : tested) {
+      ComparedCell& cell = out_.cells[i];
+      const double least = smallest_p(cell.a.repetitions.size(), cell.b.repetitions.size()) * static_cast<double>(tested.size());
+      cell.test = least <= out_.options.significance ? SignificanceTest::mann_whitney : SignificanceTest::welch;
+    }
+  }
+
+  static double test_p(SignificanceTest test, std::span<const double> a, std::span<const double> b) {
+    if (test == SignificanceTest::none) return 1.0;
+    if (test == SignificanceTest::mann_whitney) return mann_whitney_p(a, b);
+    const auto logs = [](std::span<const double> rates) {
+      std::vector<double> out;
+      for (double rate : rates) out.push_back(std::log(rate));
+      return out;
+    };
+    return welch_p(logs(a), logs(b));
   }
 
   void judge() {
     const CompareOptions& o = out_.options;
     const double limit = 1.0 + 0.01 * o.min_difference;
-    const auto least = [](const ComparedCell& c) { return smallest_p(c.a.repetitions.size(), c.b.repetitions.size()); };
-    const std::vector<std::size_t> tested = places([&](const ComparedCell& c) { return least(c) <= o.significance; });
-    for (ComparedCell& cell : out_.cells) cell.beyond = cell.ratio.low > limit || cell.ratio.high < 1.0 / limit;
+    for (ComparedCell& cell : out_.cells) {
+      cell.beyond = cell.ratio.low > limit || cell.ratio.high < 1.0 / limit;
+      cell.equal = cell.is_tested() && cell.ratio.low > 1.0 / limit && cell.ratio.high < limit;
+    }
+    const std::vector<std::size_t> tested = places(&ComparedCell::is_tested);
     std::vector<double> p;
     for (std::size_t i : tested) p.push_back(out_.cells[i].p);
     p = benjamini_hochberg(p);
     for (std::size_t k = 0; k < tested.size(); ++k) {
       ComparedCell& cell = out_.cells[tested[k]];
-      cell.tested = true, cell.adjusted_p = p[k];
-      cell.equal = cell.ratio.low > 1.0 / limit && cell.ratio.high < limit;
-      if (cell.beyond) {
-        // Even the clearest difference of so few repetitions would not stand out among so many cells.
-        const bool too_few = least(cell) * static_cast<double>(tested.size()) > o.significance;
-        cell.verdict = p[k] <= o.significance ? (cell.ratio.low > 1.0 ? Verdict::faster : Verdict::slower) : too_few ? Verdict::undecided : Verdict::indistinguishable;
-      } else {
-        cell.verdict = Verdict::indistinguishable;
-      }
+      cell.adjusted_p = p[k];
+      const bool differs = cell.beyond && cell.adjusted_p <= o.significance;
+      cell.verdict = !differs ? Verdict::indistinguishable : cell.ratio.low > 1.0 ? Verdict::faster : Verdict::slower;
     }
-    if (out_.count(Verdict::undecided) == 0) return;
-    out_.repetitions_needed = 1;
-    while (smallest_p(out_.repetitions_needed, out_.repetitions_needed) * static_cast<double>(out_.cells.size()) > o.significance) ++out_.repetitions_needed;
   }
 
   /// All rays, the values of each axis that varies, all builds; and Embree's cells, which tell of the machine.
@@ -282,6 +299,15 @@ std::string_view to_string(Verdict verdict) noexcept {
     case Verdict::slower: return "slower";
     case Verdict::indistinguishable: return "indistinguishable";
     case Verdict::undecided: return "undecided";
+  }
+  return "";
+}
+
+std::string_view to_string(SignificanceTest test) noexcept {
+  switch (test) {
+    case SignificanceTest::none: return "none";
+    case SignificanceTest::mann_whitney: return "mann_whitney";
+    case SignificanceTest::welch: return "welch";
   }
   return "";
 }

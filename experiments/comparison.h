@@ -1,8 +1,9 @@
 // Two runs cell by cell: how much faster B is than A, how sure that is, and what else changed.
 //
 // A cell is faster or slower where the whole bootstrap interval of the ratio of medians lies beyond the smallest difference that counts,
-// and the Mann-Whitney test, adjusted for the number of cells, finds it significant. Where the repetitions are too few for that test to
-// find anything the cell is undecided, never indistinguishable.
+// and a test adjusted for the number of cells finds it significant: the Mann-Whitney test, or, where there are so few repetitions that its
+// smallest p-value would not stand out among so many cells, Welch's of the logarithms of the times. Which of the two is a matter of numbers, not of
+// times, so p-values stay p-values. A cell of one repetition is undecided, never indistinguishable.
 #pragma once
 
 #include <optional>
@@ -25,17 +26,22 @@ struct CompareOptions {
 enum class Verdict { faster, slower, indistinguishable, undecided };
 [[nodiscard]] std::string_view to_string(Verdict verdict) noexcept;
 
+/// `none`: of a single repetition.
+enum class SignificanceTest { none, mann_whitney, welch };
+[[nodiscard]] std::string_view to_string(SignificanceTest test) noexcept;
+
 struct ComparedCell {
   CellResult a, b;
   Interval rate_a, rate_b;  ///< rays (trace) or triangles (build) a second: thread CPU time with one thread, else wall time
   Interval ratio;           ///< rate of B over rate of A, with the 95 % bootstrap interval of the ratio of the medians
+  SignificanceTest test = SignificanceTest::none;
   double p = 1.0, adjusted_p = 1.0;
-  bool tested = false;      ///< there are repetitions enough for the test to find something
   Verdict verdict = Verdict::undecided;
   bool equal = false;   ///< the whole interval lies within the smallest difference that counts
   bool beyond = false;  ///< the whole interval lies beyond it, to one side
 
   [[nodiscard]] bool is_trace() const noexcept { return a.is_trace(); }
+  [[nodiscard]] bool is_tested() const noexcept { return test != SignificanceTest::none; }
   [[nodiscard]] bool is_suspect() const noexcept { return verdict == Verdict::undecided && beyond && ratio.median < 1.0; }
   /// Wrong answers that B has more than A; std::nullopt where one of them was not checked.
   [[nodiscard]] std::optional<double> more_wrong_answers() const;
@@ -62,7 +68,6 @@ struct Comparison {
   std::vector<MeanRatio> means;
   std::vector<StructureChange> structures;
   std::optional<MeanRatio> control, embree;  ///< trace cells: those of `control`; embree's where there is no control
-  std::size_t repetitions_needed = 0;        ///< of each cell, for the undecided ones
 
   [[nodiscard]] std::size_t count(Verdict verdict) const;
   /// Cells with more wrong answers in B.

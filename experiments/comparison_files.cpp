@@ -21,7 +21,7 @@ Json cell_json(const ComparedCell& c) {
                               : (c.a.cell.threads == 1 ? "triangles_per_cpu_second" : "triangles_per_second");
   json["rate_a"] = c.rate_a.median, json["rate_b"] = c.rate_b.median;
   json["ratio"] = c.ratio.median, json["ratio_low"] = c.ratio.low, json["ratio_high"] = c.ratio.high;
-  json["p"] = c.p, json["adjusted_p"] = c.tested ? Json(c.adjusted_p) : Json();
+  json["test"] = to_string(c.test), json["p"] = c.is_tested() ? Json(c.p) : Json(), json["adjusted_p"] = c.is_tested() ? Json(c.adjusted_p) : Json();
   json["verdict"] = to_string(c.verdict), json["equal"] = c.equal, json["beyond"] = c.beyond;
   json["repetitions_a"] = c.a.repetitions.size(), json["repetitions_b"] = c.b.repetitions.size();
   for (const char* fact : {"rays", "wrong_answers", "sah_cost", "bytes"}) {

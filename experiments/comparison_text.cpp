@@ -85,7 +85,7 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
     const double triangles = c->a.fact("triangles");
     const auto speed = [&](double rate) { return trace ? fmt::format("{:.2f}", rate * 1e-6) : fmt::format("{:.2f}", 1e3 * triangles / rate); };
     row.insert(row.end(), {speed(c->rate_a.median), speed(c->rate_b.median), fmt::format("{:.3f}", c->ratio.median), interval_text(c->ratio),
-                           c->tested ? p_text(c->adjusted_p) : "-", std::string(to_string(c->verdict))});
+                           c->is_tested() ? p_text(c->adjusted_p) : "-", std::string(to_string(c->verdict))});
     rows.push_back(std::move(row));
   }
   std::string text = fmt::format("\n{}", trace ? "rays" : "builds");
@@ -109,17 +109,25 @@ std::string mean_table(const Comparison& comparison) {
 double usual_half_width(const Comparison& comparison) {
   std::vector<double> widths;
   for (const ComparedCell& c : comparison.cells)
-    if (c.tested) widths.push_back(0.5 * std::log(c.ratio.high / c.ratio.low));
+    if (c.is_tested()) widths.push_back(0.5 * std::log(c.ratio.high / c.ratio.low));
   return std::expm1(median(widths));
+}
+
+std::string tests_text(const Comparison& comparison) {
+  const auto with = [&](SignificanceTest test) { return std::ranges::count(comparison.cells, test, &ComparedCell::test); };
+  const auto by_ranks = with(SignificanceTest::mann_whitney), by_logs = with(SignificanceTest::welch);
+  const std::string few = "Welch's test of logarithms, as ranks of so few repetitions tell nothing among so many cells";
+  if (by_logs == 0) return "Mann-Whitney test";
+  return by_ranks == 0 ? few : fmt::format("Mann-Whitney test (of {} cells {})", by_logs, few);
 }
 
 std::string legend(const Comparison& comparison) {
   const CompareOptions& o = comparison.options;
   std::string text = fmt::format(
       "\nB/A: speed of B over that of A, so 1.10 is a tenth faster; medians of thread CPU time with one thread, else of wall time, with the 95 % bootstrap interval\n"
-      "of their ratio. p: Mann-Whitney test, adjusted for the number of cells (Benjamini-Hochberg). faster, slower: the whole interval is beyond {:g} %, and p at\n"
+      "of their ratio. p: {}, adjusted for the number of cells (Benjamini-Hochberg). faster, slower: the whole interval is beyond {:g} %, and p at\n"
       "most {:g}.\n",
-      o.min_difference, o.significance);
+      tests_text(comparison), o.min_difference, o.significance);
   if (!comparison.control) text += "Drift of the machine between the two runs is in neither the interval nor p; --control REGEX (cells whose code did not change) takes it out.\n";
   if (const std::size_t n = comparison.count(Verdict::indistinguishable); n > 0) {
     text += fmt::format("Of the {} indistinguishable cells {} are known to be equal: their whole interval is within {:g} %.\n", n,
@@ -130,8 +138,7 @@ std::string legend(const Comparison& comparison) {
                         100.0 * width);
   }
   if (comparison.count(Verdict::undecided) > 0) {
-    text += fmt::format("undecided: too few repetitions to tell a difference from noise; with {} in A and B it could be told (--repetitions {})\n",
-                        comparison.repetitions_needed, comparison.repetitions_needed);
+    text += "undecided: one repetition tells nothing of noise; run both with --repetitions 3 or more\n";
   }
   return text;
 }
@@ -191,9 +198,8 @@ std::string beyond_text(const Comparison& comparison) {
   std::vector<std::string> names;
   for (const ComparedCell& c : comparison.cells)
     if (undecided(c) && names.size() < kMostBeyond) names.push_back(fmt::format("{} (B/A {:.3f})", c.a.cell.name(), c.ratio.median));
-  return fmt::format("; {} {} wholly beyond {:g} % but undecided, {} on the slow side: {}{}; {} repetitions would do", cells, cells == 1 ? "cell is" : "cells are",
-                     comparison.options.min_difference, comparison.suspects(), fmt::join(names, ", "), static_cast<std::size_t>(cells) > names.size() ? ", …" : "",
-                     comparison.repetitions_needed);
+  return fmt::format("; {} {} wholly beyond {:g} % but undecided, {} on the slow side: {}{}; more than one repetition would tell", cells, cells == 1 ? "cell is" : "cells are",
+                     comparison.options.min_difference, comparison.suspects(), fmt::join(names, ", "), static_cast<std::size_t>(cells) > names.size() ? ", …" : "");
 }
 
 /// One-minute load average when the run began.

@@ -2,7 +2,7 @@
 #include "experiments/comparison.h"
 #include "experiments/comparison_files.h"
 #include "experiments/comparison_text.h"
-#include "experiments/rank_test.h"
+#include "experiments/significance.h"
 #include "core/random.h"
 #include "tests/catch.h"
 #include "tests/experiments_on_paper.h"
@@ -43,6 +43,17 @@ TEST_CASE("Mann-Whitney finds a difference where there is none as often as it sa
   }
   CHECK(found < 0.065 * kTrials);
   CHECK(found > 0.025 * kTrials);
+}
+
+TEST_CASE("Welch: known p-values, and none without spread or with one value") {
+  // t = 3.674235, 4 degrees of freedom: 0.02131 by tables of t.
+  CHECK(welch_p(std::vector{1.0, 2.0, 3.0}, std::vector{4.0, 5.0, 6.0}) == Approx(0.0213117).epsilon(1e-4));
+  // Variances 1 and 100: t = -0.9 / sqrt((1 + 100) / 3), 101^2 / (1 + 10^4) * 2 = 2.03998 degrees of freedom.
+  CHECK(welch_p(std::vector{1.0, 2.0, 3.0}, std::vector{-7.1, 2.9, 12.9}) == Approx(0.8907).margin(2e-4));
+  CHECK(welch_p(std::vector{1.0, 1.0}, std::vector{2.0, 2.0}) == 0.0);
+  CHECK(welch_p(std::vector{1.0, 1.0}, std::vector{1.0, 1.0}) == 1.0);
+  CHECK(welch_p(std::vector{1.0}, std::vector{2.0, 3.0}) == 1.0);
+  CHECK(welch_p({}, std::vector{2.0, 3.0}) == 1.0);
 }
 
 TEST_CASE("Benjamini-Hochberg") {
@@ -166,32 +177,65 @@ TEST_CASE("significant but smaller than counts is no regression, and known to be
   CHECK(compare_results(a, b, {.min_difference = 0.5, .control = {}}).count(Verdict::slower) == c.cells.size());
 }
 
-TEST_CASE("too few repetitions are undecided, never a verdict") {
-  std::vector<CellResult> a = run(1, 0.02, 3), b = run(900, 0.02, 3);
+TEST_CASE("few repetitions tell a difference that is large against the noise") {
+  for (std::size_t repetitions : {2u, 3u, 4u}) {
+    INFO(repetitions << " repetitions");
+    std::vector<CellResult> a = run(1, 0.01, repetitions), b = run(900, 0.01, repetitions);
+    slow_down(*find(b, "bvh8"), 2.0);
+    const Comparison c = compare_results(a, b, {});
+    CHECK(find(c, "bvh8").test == SignificanceTest::welch);
+    CHECK(find(c, "bvh8").verdict == Verdict::slower);
+    CHECK(c.count(Verdict::slower) == 1);
+    CHECK(c.count(Verdict::undecided) == 0);
+    CHECK(verdict(c).first == ExitStatus::kRegression);
+    CHECK(comparison_text(c, false).find("Welch") != std::string::npos);
+    CHECK(verdict(compare_results(b, a, {})).first == ExitStatus::kDone);
+  }
+  // Ranks of seven repetitions, all apart, reach 2 / C(14, 7) = 0.0006: enough for 8 cells, not for 160.
+  const std::vector<CellResult> a = run(1, 0.01, 7), b = run(900, 0.01, 7);
+  CHECK(find(compare_results(a, b, {}), "bvh8").test == SignificanceTest::mann_whitney);
+  std::vector<CellResult> many_a, many_b;
+  for (std::uint64_t k = 0; k < 20; ++k) {
+    for (auto [of, seed] : {std::pair{&many_a, 2 * k}, std::pair{&many_b, 2 * k + 1}}) {
+      for (CellResult& r : run(100 * seed + 1, 0.01, 7)) {
+        r.cell.scene = "scene" + std::to_string(k);
+        of->push_back(std::move(r));
+      }
+    }
+  }
+  slow_down(*find(many_b, "bvh8"), 2.0);
+  const Comparison many = compare_results(many_a, many_b, {});
+  REQUIRE(many.cells.size() == 160);
+  CHECK(find(many, "bvh8").test == SignificanceTest::welch);
+  CHECK(find(many, "bvh8").verdict == Verdict::slower);
+  CHECK(many.count(Verdict::slower) == 1);
+}
+
+TEST_CASE("noise of few repetitions is hardly ever a regression either") {
+  for (std::size_t repetitions : {2u, 3u, 5u}) {
+    int regressions = 0;
+    for (std::uint64_t trial = 0; trial < 50; ++trial)
+      regressions += compare_results(run(1000 * trial + 1, 0.15, repetitions), run(1000 * trial + 500, 0.15, repetitions), {}).is_regression();
+    INFO(repetitions << " repetitions: " << regressions << " of 50");
+    CHECK(regressions <= 3);
+  }
+}
+
+TEST_CASE("a single repetition is undecided, never a verdict") {
+  std::vector<CellResult> a = run(1, 0.02, 1), b = run(900, 0.02, 1);
   slow_down(*find(b, "bvh8"), 2.0);
-  const Comparison three = compare_results(a, b, {});
-  CHECK(three.count(Verdict::undecided) == three.cells.size());
-  CHECK(verdict(three).first == ExitStatus::kDone);
-  CHECK(comparison_text(three, false).find("too few repetitions") != std::string::npos);
-  CHECK(three.repetitions_needed == 6);  // 2 / C(12, 6) * 8 cells is 0.017, with five each 0.06
-  // Four can tell one cell apart, but not one of eight.
-  a = run(1, 0.02, 4), b = run(900, 0.02, 4);
-  slow_down(*find(b, "bvh8"), 2.0);
-  const Comparison four = compare_results(a, b, {});
-  CHECK(find(four, "bvh8").verdict == Verdict::undecided);
-  CHECK(find(four, "bvh2").verdict == Verdict::indistinguishable);
+  const Comparison one = compare_results(a, b, {});
+  CHECK(one.count(Verdict::undecided) == one.cells.size());
+  CHECK(verdict(one).first == ExitStatus::kDone);
+  CHECK(comparison_text(one, false).find("one repetition tells nothing") != std::string::npos);
   // It looks halved: the last line says so, and --strict takes it for slower; what looks faster it leaves alone.
-  CHECK(four.suspects() == 1);
-  CHECK(verdict(four).first == ExitStatus::kDone);
-  const std::string last = verdict(four).second;
+  CHECK(find(one, "bvh8").is_suspect());
+  const std::string last = verdict(one).second;
   CHECK(last.find("no regression found") != std::string::npos);
-  CHECK(last.find("1 cell is wholly beyond 3 % but undecided, 1 on the slow side: " + find(four, "bvh8").a.cell.name()) != std::string::npos);
-  CHECK(last.find(std::to_string(four.repetitions_needed) + " repetitions would do") != std::string::npos);
+  CHECK(last.find(find(one, "bvh8").a.cell.name()) != std::string::npos);
   CHECK(verdict(compare_results(a, b, {.strict = true})).first == ExitStatus::kRegression);
-  CHECK(verdict(compare_results(b, a, {.strict = true})).first == ExitStatus::kDone);
-  CHECK(verdict(compare_results(b, a, {})).second.find("undecided, 0 on the slow side") != std::string::npos);
+  CHECK(verdict(compare_results({*find(b, "bvh8")}, {*find(a, "bvh8")}, {.strict = true})).first == ExitStatus::kDone);
   CHECK(verdict(compare_results(a, a, {.strict = true})).second.find("beyond") == std::string::npos);
-  CHECK(compare_results({*find(a, "bvh8")}, {*find(b, "bvh8")}, {}).count(Verdict::slower) == 1);
 }
 
 TEST_CASE("new wrong answers are a regression, fewer are not; changed trees are told") {

@@ -1,6 +1,7 @@
-#include "experiments/rank_test.h"
+#include "experiments/significance.h"
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <numeric>
 
@@ -66,6 +67,26 @@ double mann_whitney_p(std::span<const double> a, std::span<const double> b) {
   if (a.empty() || b.empty()) return 1.0;
   const std::vector<std::size_t> ranks = doubled_ranks(a, b);
   return ranks.size() <= kMostExact ? exact_p(ranks, a.size()) : normal_p(ranks, a.size());
+}
+
+double welch_p(std::span<const double> a, std::span<const double> b) {
+  if (a.size() < 2 || b.size() < 2) return 1.0;
+  struct Sample {
+    double mean, variance_of_mean, degrees;
+    explicit Sample(std::span<const double> values) {
+      const double n = static_cast<double>(values.size());
+      mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+      double squares = 0.0;
+      for (double v : values) squares += (v - mean) * (v - mean);
+      degrees = n - 1.0, variance_of_mean = squares / (degrees * n);
+    }
+  };
+  const Sample x(a), y(b);
+  const double variance = x.variance_of_mean + y.variance_of_mean, difference = std::abs(x.mean - y.mean);
+  if (variance <= 0.0) return difference > 0.0 ? 0.0 : 1.0;
+  const double degrees = variance * variance / (x.variance_of_mean * x.variance_of_mean / x.degrees + y.variance_of_mean * y.variance_of_mean / y.degrees);
+  const boost::math::students_t distribution(degrees);
+  return std::min(1.0, 2.0 * boost::math::cdf(boost::math::complement(distribution, difference / std::sqrt(variance))));
 }
 
 double smallest_p(std::size_t a, std::size_t b) noexcept {
