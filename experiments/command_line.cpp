@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <csignal>
 #include <cstdint>
@@ -222,6 +223,9 @@ ExitStatus dispatch(std::vector<std::string> words) {
 }
 
 /// One line, whatever the message holds.
+/// What a shell reports of a program that SIGPIPE ends, as in `arboretum run … --list | head`: no error, and nobody to tell of it.
+constexpr int kReaderLeft = 128 + SIGPIPE;
+
 int fail(std::string message) {
   std::ranges::replace(message, '\n', ' ');
   fmt::print(stderr, "arboretum: {}\n", message);
@@ -235,7 +239,9 @@ int command_line(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   try {
     const int status = static_cast<int>(dispatch({argv + 1, argv + argc}));
-    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+    errno = 0;
+    if (std::fflush(stdout) != 0 && errno == EPIPE) return kReaderLeft;
+    if (std::ferror(stdout))
       return fail("output cannot be written: stdout is full or closed");
     return status;
   } catch (const UserError& e) {
@@ -244,6 +250,7 @@ int command_line(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return fail("out of memory; lower the number of triangles or the resolution");
   } catch (const std::system_error& e) {
+    if (e.code() == std::errc::broken_pipe) return kReaderLeft;
     return fail(
         fmt::format("output cannot be written: {}; free some space or write elsewhere", e.code().message()));
   } catch (const std::exception& e) {

@@ -59,13 +59,6 @@ void write_beside(const fs::path& out, const std::vector<ResultFolder>& parts, c
   }
 }
 
-std::vector<std::string> plots_of(const Json& context) {
-  std::vector<std::string> names;
-  for (const Json& plot : context.value("plots", Json::array()))
-    if (plot.is_string()) names.push_back(plot.get<std::string>());
-  return names;
-}
-
 void print_missing(const MergeCommand& command, const Merged& merged) {
   if (merged.missing.empty()) return;
   fmt::print("\nmissing:\n");
@@ -93,7 +86,7 @@ ExitStatus command_merge(const MergeCommand& command) {
   write_whole(command.out / "results.csv", results_csv(merged.outcome));
   write_whole(command.out / "results.json", results_json(merged.outcome, merged.plan, merged.context));
   write_whole(command.out / "cells.jsonl", cells);
-  const ExitStatus status = conclude(command.out, merged.outcome, merged.plan, command.no_plots ? std::vector<std::string>{} : plots_of(merged.context));
+  const ExitStatus status = conclude(command.out, merged.outcome, merged.plan, !command.no_plots);
   print_missing(command, merged);
   return status;
 }

@@ -145,7 +145,7 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
     print_warnings(outcome.warnings);
     return verdict(outcome).first;
   }
-  return conclude(folder, outcome, plan, command.no_plots ? std::vector<std::string>{} : experiment.plots);
+  return conclude(folder, outcome, plan, !command.no_plots);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ void print_warnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
 }
 
-ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan, const std::vector<std::string>& plots) {
+ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan, bool draw) {
   print_warnings(outcome.warnings);
   const auto [status, why] = verdict(outcome);
   fmt::print("{}\n{}", result_tables(outcome), skipped_lines(plan, outcome));
@@ -23,8 +23,8 @@ ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outco
     return status;
   }
   bool report = false;
-  if (!plots.empty()) {
-    const std::string problem = draw_plots(folder, plots, true);
+  if (draw) {
+    const std::string problem = draw_plots(folder, {}, true);
     if (!problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
     report = problem.empty();
   }

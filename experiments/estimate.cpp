@@ -41,7 +41,7 @@ std::vector<double> estimate_seconds(const Experiment& experiment, const std::ve
   for (const Cell& cell : cells) {
     if (cell.metric == Cell::Metric::build) {
       const double a_triangle = 1.0 / triangles_per_second(cell.builder) + (cell.builder.ends_with("_reinsertion") ? 1.0 / kReinsertedPerSecond : 0.0);
-      seconds.push_back((1.0 + std::max(m.repetitions, kFewestBuilds)) * triangles[cell.scene_index] * a_triangle);
+      seconds.push_back((1.0 + m.repetitions) * triangles[cell.scene_index] * a_triangle);
     } else {
       seconds.push_back(m.repetitions * std::max(m.min_time, pass) + (3.0 + m.warmup) * pass);
     }

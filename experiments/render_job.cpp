@@ -27,7 +27,7 @@ RenderStatistics RenderJob::render() const {
   return statistics;
 }
 
-void RenderJob::prepare(Json& facts, SceneData* data, const MeasureSettings& measure) {
+void RenderJob::prepare(Json& facts, SceneData& data, const MeasureSettings& measure) {
   // A kernel that leaves an answer unwritten must not find the last cell's there.
   std::ranges::fill(buffers_.hits, Hit{.t = -1.0f, .u = 0.0f, .v = 0.0f, .primitive = 0});
   std::ranges::fill(buffers_.occluded, std::uint8_t{0xff});
@@ -36,12 +36,10 @@ void RenderJob::prepare(Json& facts, SceneData* data, const MeasureSettings& mea
   const auto occluded = std::span(buffers_.occluded).first(rays_.any().rays.size());
   facts["hits"] = std::ranges::count_if(hits, &Hit::is_hit) + std::ranges::count(occluded, 1);
   facts["checked_rays"] = hits.size() + occluded.size();
-  if (data) {
-    AnswerCheck check = data->check(rays_, hits);
-    const AnswerCheck any = data->check(rays_, occluded);
-    check.missed_hits += any.missed_hits, check.false_hits += any.false_hits;
-    add_facts(facts, check, true);
-  }
+  AnswerCheck check = data.check(rays_, hits);
+  const AnswerCheck any = data.check(rays_, occluded);
+  check.missed_hits += any.missed_hits, check.false_hits += any.false_hits;
+  add_facts(facts, check, true);
   if (cell_.kernel->counts()) {
     Counters counters;
     trace_recorded(&counters);

@@ -13,7 +13,7 @@ class RenderJob {
   RenderJob(const Cell& cell, const Accel& accel, const RenderedRays& rays, AnswerBuffers& buffers);
 
   /// As TraceJob::prepare. `rays` are those of one picture by this cell, `hits` the recorded ones' of both queries.
-  void prepare(Json& facts, SceneData* data, const MeasureSettings& measure);
+  void prepare(Json& facts, SceneData& data, const MeasureSettings& measure);
   [[nodiscard]] std::uint64_t passes() const noexcept { return passes_; }
   [[nodiscard]] Repetition measure(TimedLoop& loop) const;
 

@@ -64,10 +64,7 @@ class Runner {
     std::size_t wanted = 0;
   };
 
-  unsigned repetitions(const Cell& cell) const {
-    const unsigned n = experiment_.measure.repetitions;
-    return cell.metric == Cell::Metric::build ? std::max(n, kFewestBuilds) : n;
-  }
+  unsigned repetitions() const { return experiment_.measure.repetitions; }
 
   bool pending(const Cell& cell) const { return !journal_.done().contains(cell.name()); }
 
@@ -79,7 +76,7 @@ class Runner {
   std::size_t pending_units() const {
     std::size_t units = 0;
     for (const Cell& cell : plan_.cells)
-      if (pending(cell)) units += kPrepareUnits + repetitions(cell) - journal_.started(cell.name()).size();
+      if (pending(cell)) units += kPrepareUnits + repetitions() - journal_.started(cell.name()).size();
     return units;
   }
 
@@ -164,7 +161,7 @@ class Runner {
       running.result.facts.update(pool.facts(*cell, accel));
       running.result.facts.update(data.facts());
       pool.add_build_facts(*cell, running.result.facts);
-      job.prepare(running.result.facts, experiment_.metrics.accuracy ? &data : nullptr, experiment_.measure);
+      job.prepare(running.result.facts, data, experiment_.measure);
       interleaved.push_back(
           interleaved_job(running, job.passes(), [&job](TimedLoop& loop) { return job.measure(loop); }));
       if (options_.fail_fast && running.result.fact("wrong_answers") > 0) {
@@ -201,7 +198,7 @@ class Runner {
     const std::string name = cell.name();
     Running& running = running_[name];
     running.result = {.cell = cell, .repetitions = journal_.started(name), .facts = Json::object()};
-    running.wanted = repetitions(cell);
+    running.wanted = repetitions();
     std::erase_if(running.result.repetitions, [&](const Repetition& r) { return r.index >= running.wanted; });
     progress_.step(name, kPrepareUnits);
     return running;
@@ -259,7 +256,7 @@ class Runner {
   void fail(const Cell& cell, const std::string& reason) {
     outcome_.failed.push_back({cell.name(), reason});
     progress_.note(fmt::format("skipped {}: {}", cell.name(), reason));
-    progress_.step(cell.name(), kPrepareUnits + repetitions(cell));
+    progress_.step(cell.name(), kPrepareUnits + repetitions());
   }
 
   const Experiment& experiment_;

@@ -11,9 +11,6 @@
 
 namespace arboretum {
 
-/// Repetitions of a build cell at least.
-inline constexpr unsigned kFewestBuilds = 3;
-
 struct RunOptions {
   bool fail_fast = false;  ///< stop after the first cell with a wrong answer
 };

@@ -56,7 +56,7 @@ std::string optional_figure(const CellResult& r, const char* fact, const char* f
 
 Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
   const Cell& c = r.cell;
-  const Interval rate = bootstrap_median(r.rates(false));
+  const Interval rate = bootstrap_median(r.rates(c.threads == 1));
   const CellResult* embree = embree_beside(r, all);
   const std::optional<double> build = build_milliseconds(r, all);
   return {c.structure,
@@ -141,9 +141,8 @@ std::string result_tables(const RunOutcome& outcome) {
   }
   if (!groups.empty()) {
     text +=
-        "\nMray/s: median of wall time with its 95 % bootstrap interval. x embree: against the fastest "
-        "embree cell of the same ISA"
-        " and threads, by CPU time with one thread.\n";
+        "\nMray/s: median with its 95 % bootstrap interval, by thread CPU time with one thread, else by wall time. "
+        "x embree: against the fastest embree cell of the same ISA and threads.\n";
   }
   return groups.empty() ? build_table(outcome.results) : text;
 }

@@ -78,7 +78,7 @@ Counters TraceJob::count() const {
   return counters;
 }
 
-void TraceJob::prepare(Json& facts, SceneData* data, const MeasureSettings& measure) {
+void TraceJob::prepare(Json& facts, SceneData& data, const MeasureSettings& measure) {
   const std::size_t rays = workload_.rays.size();
   const bool closest = workload_.query == Query::closest_hit;
   // A kernel that leaves an answer unwritten must not find the last cell's there.
@@ -89,15 +89,14 @@ void TraceJob::prepare(Json& facts, SceneData* data, const MeasureSettings& meas
   const auto occluded = std::span(buffers_.occluded).first(closest ? 0 : rays);
   facts["rays"] = rays;
   facts["hits"] = closest ? std::ranges::count_if(hits, &Hit::is_hit) : std::ranges::count(occluded, 1);
-  if (data)
-    add_facts(facts, closest ? data->check(workload_, hits) : data->check(workload_, occluded), closest);
-  if (data && closest && !workload_.pixels.empty()) {
-    facts[kLeakPoints] = picture_points(data->leak_pixels(workload_, hits), kMostPoints);
+  add_facts(facts, closest ? data.check(workload_, hits) : data.check(workload_, occluded), closest);
+  if (closest && !workload_.pixels.empty()) {
+    facts[kLeakPoints] = picture_points(data.leak_pixels(workload_, hits), kMostPoints);
   }
-  if (data && !workload_.starts.empty()) {
+  if (!workload_.starts.empty()) {
     facts["self_intersection"] = to_string(cell_.start.method);
-    add_facts(facts, closest ? data->check_starts(workload_, hits) : data->check_starts(workload_, occluded), closest);
-    facts["start_distance"] = data->start_distance(workload_);
+    add_facts(facts, closest ? data.check_starts(workload_, hits) : data.check_starts(workload_, occluded), closest);
+    facts["start_distance"] = data.start_distance(workload_);
   }
   add_facts(facts, count());
   if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";

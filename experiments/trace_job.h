@@ -23,10 +23,10 @@ class TraceJob {
   /// Nothing is traced yet. All arguments must outlive the job.
   TraceJob(const Cell& cell, const Accel& accel, const Workload& workload, AnswerBuffers& buffers);
 
-  /// Traces all rays once and adds `rays`, `hits` and, with `data`, the check against the exact answers to
+  /// Traces all rays once and adds `rays`, `hits` and the check against the exact answers to
   /// the facts; counts the work with the counting kernel; then warms up and finds how many passes take
   /// `min_time` seconds.
-  void prepare(Json& facts, SceneData* data, const MeasureSettings& measure);
+  void prepare(Json& facts, SceneData& data, const MeasureSettings& measure);
   [[nodiscard]] std::uint64_t passes() const noexcept { return passes_; }
   /// One repetition: wall time, and CPU time of the thread (of the process where the cell has several).
   [[nodiscard]] Repetition measure(TimedLoop& loop) const;

@@ -20,16 +20,20 @@ float largest(Vec3f v) {
 /// A kernel leaves none of its answers unwritten: what stood there before is none.
 constexpr Hit kUnwritten{.t = -1.0f, .u = 0.0f, .v = 0.0f, .primitive = 0xdeadbeefu};
 
+/// Of any hit, likewise.
+enum class AnyAnswer : std::uint8_t { miss = 0, hit = 1, unwritten = 0xee };
+
 /// What of the promise an answer breaks; empty: nothing.
 std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j, bool any_crack, const ExactHit& truth,
-                      const Hit& answer, bool any) {
+                      const Hit& answer, AnyAnswer any) {
   const bool is_hit = truth.hit.is_hit(), representable = !is_hit || std::isfinite(truth.hit.t);
   if (promise.coverage == Coverage::exact && representable) {
     if (j.missed) return "an exact hit is missed";
     if (j.false_hit) return "an exact miss is hit";
     if (is_hit && answer.primitive != truth.hit.primitive) return "not the lowest primitive at the exact nearest t";
     if (is_hit && answer.t != truth.hit.t) return "t is not the exact t rounded";
-    if (any != is_hit) return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
+    if (any != AnyAnswer::miss && any != AnyAnswer::hit) return "any hit leaves its answer unwritten";
+    if ((any == AnyAnswer::hit) != is_hit) return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
   }
   const bool aimed_at_edges = kind == HardKind::edge || kind == HardKind::border || kind == HardKind::interior;
   if (promise.coverage == Coverage::closed || (promise.coverage == Coverage::edges && aimed_at_edges)) {
@@ -48,7 +52,7 @@ class Judge {
     largest_ = box.empty() ? 0.0f : std::max(largest(box.lower), largest(box.upper));
   }
 
-  void operator()(std::size_t i, const Hit& answer, bool any, const Hit* reference, std::vector<VerifyTally>& tallies) const {
+  void operator()(std::size_t i, const Hit& answer, AnyAnswer any, const Hit* reference, std::vector<VerifyTally>& tallies) const {
     const Ray& ray = batch_.rays.rays[i];
     const ExactHit& truth = batch_.truth[i];
     const float time = batch_.rays.times.empty() ? 0.0f : batch_.rays.times[i];
@@ -59,8 +63,8 @@ class Judge {
     tally.exact_hits += truth.hit.is_hit();
     tally.missed += j.missed, tally.false_hits += j.false_hit, tally.wrong_surface += j.wrong_surface;
     tally.wrong_primitive += j.wrong_primitive, tally.cracks += j.crack;
-    const bool any_missed = truth.hit.is_hit() && !any;
-    tally.any_missed += any_missed, tally.any_false += !truth.hit.is_hit() && any;
+    const bool any_missed = truth.hit.is_hit() && any != AnyAnswer::hit;
+    tally.any_missed += any_missed, tally.any_false += !truth.hit.is_hit() && any != AnyAnswer::miss;
     const std::uint32_t source = batch_.rays.sources[i];
     tally.self_hits += source != kNoPrimitive && answer.primitive == source && truth.hit.primitive != source;
     tally.differs += reference && (reference->primitive != answer.primitive || reference->t != answer.t);
@@ -74,7 +78,7 @@ class Judge {
     if (what.empty()) return;
     ++tally.broken;
     if (!tally.first.what.empty() && tally.first.ray < batch_.first + i) return;
-    tally.first = {batch_.first + i, std::move(what), ray, time, kind, truth, answer, any};
+    tally.first = {batch_.first + i, std::move(what), ray, time, kind, truth, answer, any == AnyAnswer::hit};
   }
 
  private:
@@ -114,11 +118,11 @@ std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const
   tbb::enumerable_thread_specific<std::vector<VerifyTally>> local(kHardKindNames.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kBlock), [&](const tbb::blocked_range<std::size_t>& r) {
     const RayBatch rays = batch.rays.batch().part(r.begin(), r.size());
-    std::vector<std::uint8_t> occluded(r.size(), 0xee);
+    std::vector<std::uint8_t> occluded(r.size(), std::uint8_t(AnyAnswer::unwritten));
     cell.kernel->closest_hit(accel, rays, std::span(hits).subspan(r.begin(), r.size()));
     cell.kernel->any_hit(accel, rays, occluded);
     for (std::size_t i = r.begin(); i != r.end(); ++i)
-      judge(i, hits[i], occluded[i - r.begin()] != 0, reference.empty() ? nullptr : &reference[i], local.local());
+      judge(i, hits[i], AnyAnswer(occluded[i - r.begin()]), reference.empty() ? nullptr : &reference[i], local.local());
   });
   std::vector<VerifyTally> sum(kHardKindNames.size());
   for (const auto& tallies : local)

@@ -51,8 +51,13 @@ void refuse_tabs(const std::string& text, const std::filesystem::path& file) {
   }
 }
 
+/// For a message of one line: a file that is no YAML may be one scalar from end to end.
 std::string shown(const YAML::Node& node) {
-  if (node.IsScalar()) return "'" + node.Scalar() + "'";
+  constexpr std::size_t kMostShown = 60;
+  if (node.IsScalar()) {
+    const std::string& text = node.Scalar();
+    return text.size() <= kMostShown ? "'" + text + "'" : "'" + text.substr(0, kMostShown) + "…'";
+  }
   return node.IsSequence() ? "a list" : node.IsMap() ? "a map" : "nothing";
 }
 

@@ -130,9 +130,10 @@ AnswerCheck check_any_hits(RayBatch rays, std::span<const std::uint8_t> truth,
   AnswerCheck sum;
   sum.rays = rays.size();
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    if (answers[i] != 0) ++sum.hits;
-    if (truth[i] != 0 && answers[i] == 0) ++sum.missed_hits;
-    if (truth[i] == 0 && answers[i] != 0) ++sum.false_hits;
+    // What is neither 0 nor 1 was left unwritten, and is wrong whatever the truth.
+    sum.hits += answers[i] == 1;
+    sum.missed_hits += truth[i] != 0 && answers[i] != 1;
+    sum.false_hits += truth[i] == 0 && answers[i] != 0;
   }
   return sum;
 }

@@ -36,7 +36,7 @@ StartCheck check_any_starts(std::span<const ExactHit> truth, std::span<const std
   check.rays = truth.size();
   for (std::size_t i = 0; i < truth.size(); ++i) {
     check.self_hits += answers[i] != 0 && !truth[i].hit.is_hit();
-    check.leaks += answers[i] == 0 && truth[i].hit.is_hit();
+    check.leaks += answers[i] != 1 && truth[i].hit.is_hit();
   }
   return check;
 }

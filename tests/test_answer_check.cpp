@@ -176,6 +176,11 @@ TEST_CASE("any hit counts missed and false hits alone, and sizes must agree") {
   CHECK(check.false_hits == 2);
   CHECK(check.wrong_answers() == 3);
   CHECK(check.cracks == 0);
+  // A kernel that writes nothing is wrong on every ray, whatever stood there, and has hit nothing.
+  const AnswerCheck unwritten = oracle.check_any_hit(rays, truth, std::vector<std::uint8_t>(6, 0xff));
+  CHECK(unwritten.hits == 0);
+  CHECK(unwritten.missed_hits == 2);
+  CHECK(unwritten.false_hits == 4);
   CHECK_THROWS_AS(oracle.check_any_hit(rays, truth, std::vector<std::uint8_t>{1}), std::invalid_argument);
   CHECK_THROWS_AS(oracle.check_closest_hit(rays, oracle.closest_hit(rays), {}), std::invalid_argument);
 }

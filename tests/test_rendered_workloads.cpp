@@ -85,7 +85,7 @@ TEST_CASE("cells of a renderer's workload: facts, and as many rays for all that 
       AnswerBuffers buffers;
       RenderJob job(cell, structures.get(row), data.rendered(name), buffers);
       Json facts = Json::object();
-      job.prepare(facts, &data, kSmall);
+      job.prepare(facts, data, kSmall);
       CHECK(facts["wrong_answers"] == 0);
       CHECK(facts["hits"].get<std::size_t>() > 100);
       CHECK(facts["checked_rays"] == data.rendered(name).closest().rays.size() + data.rendered(name).any().rays.size());

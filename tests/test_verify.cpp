@@ -290,6 +290,27 @@ TEST_CASE("a kernel that leaks is told to leak, and a promise that it breaks is 
   CHECK_FALSE(case_json("x", "y", *part, edge.first.given).empty());
 }
 
+TEST_CASE("a kernel that writes no answer is wrong on every ray") {
+  const Registry registry = this_registry();
+  std::vector<VerifiedCell> cells = only(promising_cells(registry), "bvh8", "exact");
+  std::erase_if(cells, [](const VerifiedCell& c) { return c.cell.box != "padded"; });
+  REQUIRE_FALSE(cells.empty());
+  KernelRow silent = *cells[0].cell.kernel;
+  silent.timed.any_hit = [](const Accel&, const KernelRow&, RayBatch, std::span<std::uint8_t>, Counters*) {};
+  cells[0].cell.kernel = &silent;
+  const TriangleMesh mesh = generate_sphere(300, 1).mesh;
+  const std::array kinds{HardKind::interior, HardKind::far};
+  const HardRays rays = HardRayMaker(mesh).make(1, 0, 200, kinds);
+  const Oracle oracle(mesh);
+  StructureShelf shelf(mesh, registry, 1);
+  std::vector<Hit> hits;
+  VerifyTally sum;
+  for (const VerifyTally& t : verify_cell(cells[0].cell, shelf.get(cells[0].cell), {mesh, oracle, rays, oracle.closest_hit(rays.batch())}, hits, {})) sum += t;
+  CHECK(sum.rays == 200);
+  CHECK(sum.any_missed + sum.any_false == 200);
+  CHECK(sum.broken == 200);
+}
+
 TEST_CASE("the command's verdicts and words") {
   const std::string isa = "isa=" + any_isa();
   VerifyCommand command;
