@@ -9,28 +9,12 @@
 #include <vector>
 
 #include "core/names.h"
+#include "library/mesh_check.h"
 
 namespace arboretum {
 namespace {
 
 void check_name(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) { (void)index_of_name(kind, name, valid); }
-
-void check_mesh(const TriangleMesh& mesh) {
-  const auto number = [](std::size_t n) { return std::to_string(n); };
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    const Triangle t = mesh.triangles[i];
-    for (std::uint32_t vertex : {t.a, t.b, t.c}) {
-      if (vertex >= mesh.vertices.size())
-        throw UserError("triangle " + number(i) + " names vertex " + number(vertex) + " of " + number(mesh.vertices.size()) +
-                        "; indices count from 0");
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        if (!(std::abs(mesh.vertices[vertex][axis]) <= kMaxCoordinate))
-          throw UserError("triangle " + number(i) + ": vertex " + number(vertex) +
-                          " is not finite or beyond 2^40; drop such triangles or scale the mesh");
-      }
-    }
-  }
-}
 
 std::vector<std::string_view> isa_names(std::span<const Isa> isas) {
   std::vector<std::string_view> names;

@@ -1,8 +1,10 @@
 // Numbers out of text: correctly rounded floats, `nan` and `inf` included, whatever the locale.
 #pragma once
 
+#include <locale.h>
+#include <stdlib.h>
+
 #include <charconv>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
@@ -21,7 +23,8 @@ namespace arboretum {
   const auto [next, error] = std::from_chars(p, end, value);
   if (error == std::errc{}) return next;
   if (error != std::errc::result_out_of_range) return nullptr;
-  value = std::strtof(std::string(p, next).c_str(), nullptr);
+  static const locale_t kC = newlocale(LC_ALL_MASK, "C", nullptr);
+  value = strtof_l(std::string(p, next).c_str(), nullptr, kC);
   return next;
 }
 

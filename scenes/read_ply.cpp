@@ -294,8 +294,8 @@ void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh, s
   }
 }
 
-void read_faces(const Element& element, std::uint64_t vertices, Cursor& cursor, Scene& scene,
-                const Failure& fail) {
+void read_faces(const Element& element, Cursor& cursor, Scene& scene, const Failure& fail) {
+  const std::size_t vertices = scene.mesh.vertices.size();
   const int list = element.find({"vertex_indices", "vertex_index"});
   if (list < 0 || !element.properties[std::size_t(list)].is_list)
     fail("the faces have no list 'vertex_indices'");
@@ -365,10 +365,6 @@ Scene read_ply(const std::filesystem::path& path) {
   Cursor cursor(bytes.text().substr(header.bytes), header.format, fail);
   Scene scene;
   std::vector<std::array<float, 2>> texture;
-  std::uint64_t vertices = 0;
-  for (const Element& e : header.elements)
-    if (e.name == "vertex") vertices = e.count;
-  if (vertices >= 0xffffffffu) fail("more than 2^32 - 2 vertices");
   bool has_vertices = false, has_faces = false;
   for (const Element& element : header.elements) {
     // Every property takes a byte at least, so a count that the file cannot hold is known before memory is
@@ -379,11 +375,12 @@ Scene read_ply(const std::filesystem::path& path) {
                        element.count, one_line(element.name)));
     }
     if (element.name == "vertex" && !has_vertices) {
+      if (element.count >= 0xffffffffu) fail("more than 2^32 - 2 vertices");
       read_vertices(element, cursor, scene.mesh, texture, fail);
       has_vertices = true;
     } else if (element.name == "face" && !has_faces) {
       if (!has_vertices) fail("the faces come before the vertices; that order is not read");
-      read_faces(element, vertices, cursor, scene, fail);
+      read_faces(element, cursor, scene, fail);
       has_faces = true;
     } else if (element.name == "tristrips") {
       fail("holds triangle strips, which are not read; convert it to faces");

@@ -4,6 +4,7 @@
 
 #include <type_traits>
 
+#include "core/instances.h"
 #include "oracle/oracle.h"
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"
@@ -179,6 +180,34 @@ TEST_CASE("misuse is told in one line that names the mend") {
   CHECK_THAT(message_of({}, infinite), Catch::Contains("vertex 0 is not finite"));
   infinite.vertices[0].y = 3e12f;
   CHECK_THAT(message_of({}, infinite), Catch::Contains("beyond 2^40"));
+
+  TriangleMesh moving = sphere(4);
+  moving.later_frames.push_back(moving.vertices);
+  CHECK(message_of(with(&TracerSettings::structure, "bvh4_motion"), moving).empty());
+  moving.later_frames[0][0].z = kInfinity;
+  CHECK_THAT(message_of({}, moving), Catch::Contains("of key frame 1 is not finite"));
+  moving.later_frames[0].resize(1);
+  CHECK_THAT(message_of({}, moving), Catch::Contains("key frame 1 has 1 vertices, the first"));
+
+  const auto placed = [](const Instancing& instancing) {
+    TriangleMesh mesh = sphere(4);
+    mesh.instancing = std::make_shared<const Instancing>(instancing);
+    return message_of(with(&TracerSettings::structure, "two_level"), mesh);
+  };
+  Instancing one;
+  one.prototypes = {sphere(4)}, one.instances = {{}};
+  CHECK(placed(one).empty());
+  Instancing wrong = one;
+  wrong.instances[0].prototype = 1;
+  CHECK_THAT(placed(wrong), Catch::Contains("instance 0 names prototype 1 of 1"));
+  wrong = one, wrong.prototypes[0].triangles[2].c = 4000;
+  CHECK_THAT(placed(wrong), Catch::Contains("prototype 0: triangle 2 names vertex 4000 of"));
+  wrong = one, wrong.instances.push_back({});
+  CHECK_THAT(placed(wrong), Catch::Contains("instance 1 begins at triangle 0"));
+  wrong = one, wrong.instances.clear();
+  CHECK_THAT(placed(wrong), Catch::Contains("the instances have 0 triangles"));
+  wrong = one, wrong.instances[0].to_world.m[0][0] = 0.0;
+  CHECK_THAT(placed(wrong), Catch::Contains("determinant"));
 
   const Tracer tracer(sphere(4));
   const std::vector<Ray> rays(3);

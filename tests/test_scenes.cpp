@@ -1,6 +1,7 @@
 // Readers of every format, bad files, sanitising, polygons. Every file is written by the test.
 #include <unistd.h>
 
+#include <clocale>
 #include <cmath>
 #include <memory>
 
@@ -8,6 +9,7 @@
 
 #include "core/instances.h"
 #include "core/random.h"
+#include "scenes/number_text.h"
 #include "scenes/polygon.h"
 #include "scenes/rescale.h"
 #include "scenes/sanitise.h"
@@ -163,6 +165,32 @@ TEST_CASE("PLY: material ids, other properties, other element order of types") {
                    "uint vertex_index\nend_header\n2 0.5 1e3\n255 3 1 2\n0 6 4 5\n9 9 7 9\n0.1 3 0 1 2\n"));
   CHECK(odd.mesh.corners(0)[0] == Vec3f{1, 2, 3});
   CHECK(odd.mesh.corners(0)[2] == Vec3f{7, 9, 9});
+}
+
+TEST_CASE("PLY: faces index the first vertices, whatever other elements of that name promise") {
+  const Folder folder;
+  const std::string head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n",
+                    tail = "element face 1\nproperty list uchar int vertex_indices\nelement vertex 9\nproperty float x\nend_header\n0 0 0\n1 0 0\n0 1 0\n",
+                    rest = "\n0\n0\n0\n0\n0\n0\n0\n0\n0\n";
+  CHECK(load_file(folder.write("right.ply", head + tail + "3 0 1 2" + rest)).mesh.size() == 1);
+  CHECK_THROWS_WITH(load_file(folder.write("wrong.ply", head + tail + "3 0 1 8" + rest)), Catch::Contains("vertex index 8 is out of range: there are 3 vertices"));
+}
+
+TEST_CASE("numbers beyond float's range are read alike in every locale") {
+  const auto parsed = [](std::string_view text) {
+    float value = 1.0f;
+    CHECK(parse_float(text.data(), text.data() + text.size(), value) == text.data() + text.size());
+    return value;
+  };
+  const char* names[] = {"C", "de_DE.UTF-8", "fr_FR.UTF-8", "C.UTF-8"};  // those that the machine lacks change nothing
+  for (const char* name : names) {
+    const std::string before = std::setlocale(LC_ALL, nullptr);
+    std::setlocale(LC_ALL, name);
+    CHECK(std::isinf(parsed("1.5e400")));
+    CHECK(parsed("1.5e-400") == 0.0f);
+    CHECK(parsed("1.5e-40") == 1.5e-40f);
+    std::setlocale(LC_ALL, before.c_str());
+  }
 }
 
 TEST_CASE("bad files: one clear line each, that says what and where") {

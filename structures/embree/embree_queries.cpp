@@ -28,7 +28,7 @@ constexpr float kLargest = 1.844e18f;
 /// on tnear < 0 (what hands it over raises it to 0). False with a NaN anywhere.
 inline bool accepts(const Ray& ray) noexcept {
   const auto in_range = [](Vec3f a) {
-    return (std::abs(a.x) <= kLargest) & (std::abs(a.y) <= kLargest) & (std::abs(a.z) <= kLargest);
+    return (unsigned(std::abs(a.x) <= kLargest) & unsigned(std::abs(a.y) <= kLargest) & unsigned(std::abs(a.z) <= kLargest)) != 0;
   };
   const Vec3f d = ray.direction;
   return in_range(ray.origin) & in_range(d) & ((d.x != 0.0f) | (d.y != 0.0f) | (d.z != 0.0f)) &
