@@ -14,8 +14,6 @@ LARGEST_SVG = 1_500_000  # bytes; a drawing of more goes into the page as PNG
 
 def write(results, drawn):
     """`drawn`: (name, module, why left out or None). Returns the page's path."""
-    metric, _ = results.throughput()
-    wrong = sum(max(c.values("wrong_answers"), default=0) for c in results.traces)
     parts = [f"<h1>{escape(results.name)}</h1>", f'<p class="soft">{escape(subtitle(results))}</p>']
     parts.append('<nav><a href="#fastest-structures">Fastest</a><a href="#figures">Figures</a>'
                  '<a href="#all-cells">All cells</a><a href="#built">Structures</a><a href="#skipped">Skipped</a>'
@@ -24,8 +22,7 @@ def write(results, drawn):
         parts.append('<p class="bad">The run was cut off: these are the cells that had ended. '
                      "<code>--resume</code> measures the rest.</p>")
     parts += [f'<p class="bad">Warning: {escape(text)}</p>' for text in warnings(results.context)]
-    parts.append(f"<p>{len(results.traces)} cells measured, {len(results.skipped)} skipped, "
-                 f"{'no wrong answer' if wrong == 0 else f'{wrong:,.0f} wrong answers, counted cell by cell below'}.</p>")
+    parts.append(f"<p>{measured(results)} {answers(results)}</p>")
     parts.append('<h2 id="fastest-structures">Fastest structure</h2>' + tables.best_table(results))
     parts.append('<h2 id="figures">Figures</h2>' + "\n".join(figure(results.folder, *each) for each in drawn))
     parts.append('<h2 id="all-cells">All cells</h2>' + tables.throughput_table(results))
@@ -38,6 +35,31 @@ def write(results, drawn):
     path = results.folder / "report.html"
     path.write_text(page, encoding="utf-8")
     return path
+
+
+def measured(results):
+    """How many cells, counted as `run` does in its last line."""
+    others = results.cells - len(results.traces)
+    of_these = f" ({len(results.traces)} of rays, {others} of builds)" if others > 0 and results.traces else ""
+    return f"{counted(results.cells, 'cell')} measured{of_these}, {len(results.skipped)} skipped."
+
+
+def answers(results):
+    """What was compared with exact arithmetic and came out how, and what was not."""
+    checked, traced = results.checked(), len(results.traces)
+    if not traced:
+        return "No rays were traced."
+    if not checked:
+        return "<strong>Answers were not checked.</strong>"
+    counts = [max(cell.values("wrong_answers")) for cell in checked]
+    wrong = sum(count > 0 for count in counts)
+    text = f"{counted(round(sum(counts)), 'wrong answer')}, in {wrong} of {counted(len(checked), 'checked cell')}: cell by cell below." if wrong else (
+        f"No wrong answer in {counted(len(checked), 'checked cell')}.")
+    return text + (f" <strong>The answers of {counted(traced - len(checked), 'cell')} were not checked.</strong>" if traced > len(checked) else "")
+
+
+def counted(number, noun):
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def subtitle(results):

@@ -87,6 +87,7 @@ class Results:
     skipped: list     # (cell name, reason)
     effective_yaml: str
     complete: bool    # False: read from cells.jsonl
+    cells: int        # measured, builds among them, as `run` counts them
     _structure_index: dict = field(default_factory=dict)
 
     @property
@@ -99,6 +100,10 @@ class Results:
         if self.traces and single:
             return "rays_per_cpu_second", "Mray/s, thread CPU time"
         return "rays_per_second", "Mray/s, wall time"
+
+    def checked(self):
+        """The cells whose answers were compared with exact arithmetic."""
+        return [cell for cell in self.traces if cell.values("wrong_answers")]
 
     def structure_value(self, cell, name):
         """A figure of the structure that `cell` traces: the cell's own, else that of the build it shares."""
@@ -186,7 +191,8 @@ def load(folder):
     yaml_file = folder / "effective.yaml"
     effective = yaml_file.read_text(encoding="utf-8", errors="replace") if yaml_file.is_file() else ""
     traces, structures = gather(rows)
-    return Results(folder, context, traces, structures, skipped, effective, complete)
+    names = {row.get("run_name") or row.get("name") for row in rows}
+    return Results(folder, context, traces, structures, skipped, effective, complete, len(names - {None}))
 
 
 def read_rows(folder):

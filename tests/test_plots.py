@@ -12,6 +12,7 @@ PLOTS = Path(__file__).resolve().parent.parent / "plots"
 sys.path.insert(0, str(PLOTS))
 sys.dont_write_bytecode = True
 
+import report  # noqa: E402
 from figures import ALL, published_ratios, squares, traversal_ratios  # noqa: E402
 from figures.accuracy_vs_time import hard_points, pareto_front  # noqa: E402
 from figures.leak_lines import without  # noqa: E402
@@ -335,6 +336,22 @@ class Drawing(unittest.TestCase):
         for words in ("25 50 25 0 0", "(2 cells)", "git checkout abc", "wrong per million", "× embree"):
             self.assertIn(words, shown)
         self.assertNotIn("http", page.replace("http://www.w3.org", ""))
+
+    def test_report_says_what_was_checked(self):
+        unchecked = {k: v for k, v in other("primary").items() if k != "wrong_answers"}
+        right = other("shadow", wrong_answers=0)
+        for rows, cells, said in (
+                ([unchecked, build()], "2 cells measured (1 of rays, 1 of builds)", "Answers were not checked."),
+                ([right, right, build()], "2 cells measured (1 of rays, 1 of builds)", "No wrong answer in 1 checked cell."),
+                ([right, unchecked], "2 cells measured,", "No wrong answer in 1 checked cell. <strong>The answers of 1 cell were not checked.</strong>"),
+                ([right, unchecked, trace()], "3 cells measured,", "1 wrong answer, in 1 of 2 checked cells"),
+                ([build()], "1 cell measured,", "No rays were traced.")):
+            with self.subTest(said):
+                results = load(Folder(rows).path)
+                self.assertIn(cells, report.measured(results))
+                self.assertIn(said, report.answers(results))
+        self.assertNotIn("rong answer", report.answers(load(Folder([unchecked, build()]).path)))
+        self.assertNotIn("not checked", report.answers(load(Folder([right]).path)))
 
     def test_only_some(self):
         folder = Folder(whole())
