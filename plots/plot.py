@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Draws the figures and the report of a result folder: plot.py RESULTS [--only name,...]. Measures nothing.
 
+The report holds at least the figures that the configuration names: where --only leaves out one of them, it stays as it is.
+
 Exit status: 0 done, 2 the folder cannot be read or a figure is unknown.
 """
 
@@ -32,10 +34,15 @@ def fail(message):
     sys.exit(2)
 
 
-def chosen(only, known, configured):
-    """The figures that --only names, else those of the configuration, else all."""
+def configured(known, plots):
+    """The figures that the configuration names, else all."""
+    return [name for name in known if name in plots] if isinstance(plots, list) else list(known)
+
+
+def chosen(only, known, default):
+    """The figures that --only names, else the default."""
     if not only:
-        return [name for name in known if name in configured] if isinstance(configured, list) else list(known)
+        return default
     names = [name.strip() for name in only.split(",") if name.strip()]
     for name in names:
         if name not in known:
@@ -59,8 +66,9 @@ def main():
 
     try:
         results = load(arguments.results)
-        drawn = []
-        for name in chosen(arguments.only, figures.ALL, results.context.get("plots")):
+        drawn, default = [], configured(figures.ALL, results.context.get("plots"))
+        names = chosen(arguments.only, figures.ALL, default)
+        for name in names:
             module = importlib.import_module(f"figures.{name}")
             try:
                 style.save(module.draw(results), results.folder, name)
@@ -70,8 +78,10 @@ def main():
                 continue
             print(f"{results.folder / name}.png .svg")
             drawn.append((name, module, None))
-        if not arguments.no_report:
+        if set(default) <= set(names) and not arguments.no_report:
             print(report.write(results, drawn))
+        elif not arguments.no_report:
+            print("report.html: left as it is; it is written with all figures, without --only")
     except ResultError as error:
         fail(str(error))
     except OSError as error:

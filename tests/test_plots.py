@@ -358,9 +358,16 @@ class Drawing(unittest.TestCase):
         self.assertEqual(folder.plot("--only", "sah_cost").returncode, 0)
         self.assertTrue((folder.path / "sah_cost.png").is_file())
         self.assertFalse((folder.path / "build_time.png").exists())
+        self.assertFalse((folder.path / "report.html").exists())
         folder = Folder(whole(), {"plots": ["sah_vs_time"]})
         self.assertEqual(folder.plot().returncode, 0)
         self.assertEqual([p.stem for p in folder.path.glob("*.png")], ["sah_vs_time"])
+        page = (folder.path / "report.html").read_text()
+        for other_figure in ("sah_cost", "leak_picture"):  # one with data, one without
+            self.assertIn("report.html: left as it is", folder.plot("--only", other_figure).stdout)
+            self.assertEqual((folder.path / "report.html").read_text(), page)
+        folder.plot("--only", "sah_cost,sah_vs_time")
+        self.assertEqual((folder.path / "report.html").read_text().count("<img"), 2)
 
     def test_errors_are_one_line(self):
         cases = ((Folder(whole()), ["--only", "sah_costs"], "the nearest is 'sah_cost'"), (Folder(), [], "neither results.json"),
