@@ -13,7 +13,7 @@ sys.path.insert(0, str(PLOTS))
 sys.dont_write_bytecode = True
 
 import report  # noqa: E402
-from figures import ALL, published_ratios, squares, traversal_ratios  # noqa: E402
+from figures import ALL, build_time, published_ratios, squares, traversal_ratios  # noqa: E402
 from figures.accuracy_vs_time import hard_points, pareto_front  # noqa: E402
 from figures.leak_lines import without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
@@ -191,6 +191,16 @@ class Numbers(unittest.TestCase):
         shade = squares.shades([0.0, 1e-9, 10.0, 100.0], higher_is_better=False)  # what is next to nothing does not take the colours from the others
         self.assertEqual([round(shade(v), 3) for v in (0, 1e-9, 10, 100)], [1, 1, 0.5, 0])
         self.assertEqual(squares.shades([0.0, 0.0], higher_is_better=False)(0.0), 0)
+
+    def test_phases_of_a_build_make_up_the_median(self):
+        # One disturbed repetition: the means add up to 44, the median is 20.
+        repetitions = [(0.02, 0.015, 0.005), (0.02, 0.01, 0.01), (0.092, 0.059, 0.033)]
+        cell = Cell({}, [{"build_seconds": total, "phase_seconds": {"splits": a, "leaves": b}} for total, a, b in repetitions])
+        found = dict(build_time.phases(cell))
+        self.assertAlmostEqual(sum(found.values()), 20.0)
+        self.assertAlmostEqual(found["splits"], 20.0 * 84 / 132)
+        self.assertEqual(build_time.phases(Cell({}, [{"build_seconds": 0.0, "phase_seconds": {"splits": 0.0}}])), [])
+        self.assertEqual(build_time.phases(Cell({}, [{"build_seconds": 1.0}])), [])
 
     def test_order(self):
         self.assertEqual(ordered(["bvh16", "embree", "bvh4", "octree"], "structure"), ["bvh4", "bvh16", "octree", "embree"])

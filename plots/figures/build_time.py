@@ -2,10 +2,12 @@
 
 from figures import squares
 from figures.bars import bar_panels, digits
+from results import is_number
 
 TITLE = "Build time"
 CAPTION = ("Wall time from mesh to a structure ready for rays, with the 95 % confidence interval of the median where a build "
-           "was repeated; beside it, triangles a second. The parts are the build's own phases, grey what none of them covers. "
+           "was repeated; beside it, triangles a second. The parts are the build's own phases, each with its share of the repetitions' time "
+           "together, drawn to the length of the median; grey is what none of them covers. "
            "Lower is better."
            + squares.CAPTION)
 
@@ -19,10 +21,16 @@ def draw(results):
         rate = cell.value("triangles_per_second")
         return f"{digits(value(cell)[0])} ms" + (f", {rate / 1e6:.2f} Mtri/s" if rate else "")
 
-    def phases(cell):
-        """The mean of each phase over the repetitions, in ms, in the order of the build."""
-        rows = [row["phase_seconds"] for row in cell.rows if isinstance(row.get("phase_seconds"), dict)]
-        names = dict.fromkeys(name for row in rows for name in row)
-        return [(name, 1e3 * sum(row.get(name, 0.0) for row in rows) / len(rows)) for name in names]
-
     return bar_panels(results, value, "build time, ms", note, ("builder", "threads", "isa", "leaf"), phases)
+
+
+def phases(cell):
+    """(name, ms) in the order of the build: each phase's share of all repetitions' time, of the median. Medians of phases would not add up
+    to the median of their sums, and means would add up to another bar than that of the median."""
+    rows = [row for row in cell.rows if isinstance(row.get("phase_seconds"), dict) and is_number(row.get("build_seconds"))]
+    total = sum(row["build_seconds"] for row in rows)
+    if total <= 0:
+        return []
+    names = dict.fromkeys(name for row in rows for name in row["phase_seconds"])
+    scale = 1e3 * cell.value("build_seconds") / total
+    return [(name, scale * sum(row["phase_seconds"].get(name, 0.0) for row in rows)) for name in names]
