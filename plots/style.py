@@ -68,16 +68,18 @@ def log_with_zero(axis, which, values):
     set_limits(-0.25 * low, 2.5 * largest)
     first, last = round(math.log10(low)), math.floor(math.log10(2.5 * largest))
     step = max(1, -(-(last - first + 1) // 6))
-    ticks.set_major_locator(FixedLocator([0] + [10.0**k for k in range(first, last + 1, step)]))
+    digits = (1, 2, 5) if last - first < 2 else (1,)  # powers of ten alone would leave few values a tick near them
+    ticks.set_major_locator(FixedLocator([0] + [d * 10.0**k for k in range(first, last + 1, step) for d in digits if d * 10.0**k <= 2.5 * largest]))
     ticks.set_minor_locator(NullLocator())
     ticks.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
 
 
 def plain(value):
-    """0, 0.01, 1, 1000, 10⁵: as a person writes a power of ten."""
+    """0, 0.01, 1, 1000, 10⁵, 2·10⁵: as a person writes a power of ten or a multiple of one."""
     if value == 0 or 1e-3 < value < 1e4:
         return f"{value:g}"
-    return f"$10^{{{round(math.log10(value))}}}$"
+    digit, power = f"{value:.0e}".split("e")
+    return f"$10^{{{int(power)}}}$" if digit == "1" else f"${digit}\\cdot10^{{{int(power)}}}$"
 
 
 def hatch(structure):

@@ -14,7 +14,7 @@ sys.dont_write_bytecode = True
 
 import report  # noqa: E402
 from figures import ALL, build_time, published_ratios, squares, traversal_ratios  # noqa: E402
-from figures.accuracy_vs_time import hard_points, pareto_front  # noqa: E402
+from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of, pareto_front  # noqa: E402
 from figures.leak_lines import without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
 from figures.modes import Modes  # noqa: E402
@@ -254,6 +254,24 @@ class Hard(unittest.TestCase):
         self.assertEqual(watertight[2].per_million("wrong_answers"), 10000)
         self.assertAlmostEqual(watertight[1], 1e9 / watertight[0].value("rays_per_cpu_second"))
 
+    def test_accuracy_of_ordinary_rays_by_instruction_set(self):
+        import matplotlib.pyplot as plt
+
+        def points(wrong, error):
+            rows = [other("primary", isa=i, structure=s, wrong_answers=wrong, t_error_ulp_p99=error) for i in ("sse", "avx2") for s in ("bvh4", "bvh8")]
+            return [(c, 100.0) for c in load(Folder(rows).path).traces]
+
+        for wrong, error, measure, said in ((3, 2.0, "wrong_answers", ""), (0, 2.0, "t_error_ulp_p99", "No wrong answer in 4 checked cells; upwards: the error of t"),
+                                            (0, None, "wrong_answers", "No wrong answer in 4 checked cells")):
+            with self.subTest(measure=measure, error=error):
+                name, label, told = measure_of([c for c, _ in points(wrong, error)])
+                self.assertEqual((name, told), (measure, said))
+                figure = draw_workloads(points(wrong, error))
+                self.assertEqual([a.get_title() for a in figure.axes], ["bunny, primary, sse", "bunny, primary, avx2"])
+                self.assertEqual("".join(t.get_text() for t in figure.texts), said)
+                self.assertEqual({a.get_ylabel() for a in figure.axes}, {label})
+                plt.close(figure)
+
     def test_scenes_without_a_part_of_their_placing(self):
         self.assertEqual(without("ball:size=100:offset=1e4", "offset"), ("ball:size=100", True))
         self.assertEqual(without("ball:size=100", "offset"), ("ball:size=100", False))
@@ -276,8 +294,10 @@ class Hard(unittest.TestCase):
         figure.canvas.draw()
         self.assertEqual([t.get_text() for t in axis.get_yticklabels()][:2], ["0", "10"])
         log_with_zero(axis, "x", [0, 0])
+        log_with_zero(axis, "y", [0, 1.9e5, 2.3e5])  # within a decade: ticks between the powers of ten
+        self.assertEqual(list(axis.get_yticks()), [0, 1e5, 2e5, 5e5])
         plt.close(figure)
-        self.assertEqual([plain(v) for v in (0, 0.01, 1, 1000, 1e5)], ["0", "0.01", "1", "1000", "$10^{5}$"])
+        self.assertEqual([plain(v) for v in (0, 0.01, 1, 1000, 1e5, 2e5)], ["0", "0.01", "1", "1000", "$10^{5}$", r"$2\cdot10^{5}$"])
 
 
 class Drawing(unittest.TestCase):

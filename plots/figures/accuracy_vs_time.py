@@ -1,17 +1,18 @@
 """What accuracy costs in time, the Pareto front drawn. Accuracy is that of hard rays where the run has them: a row of panels for wrong
-answers, one for the error of t, a column an instruction set. Otherwise that of each workload's own rays, a panel a scene and workload."""
+answers, one for the error of t, a column an instruction set. Otherwise that of each workload's own rays, a panel a scene, workload and
+instruction set."""
 
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from results import HARD_PREFIX, NoData, ordered
-from style import (colour, intersector_colour, intersector_legend, legends_right, log_with_zero, marker_legend, marker_map, panel_grid, panels,
-                   short, structure_legend)
+from style import intersector_colour, intersector_legend, legends_right, log_with_zero, marker_legend, marker_map, panel_grid, panels, short
 
 TITLE = "Accuracy against time"
 CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hits, false hits and wrong surfaces against exact "
            "arithmetic; the error of t is that of right answers. Where the run has the workload `hard`, accuracy is that of its rays, which are aimed at "
-           "what goes wrong, and time that of ordinary rays of the same cell. The grey steps join the cells that no other beats in both. "
-           "Zero stands on the lowest line.")
+           "what goes wrong, and time that of ordinary rays of the same cell. Where no cell of ordinary rays has a wrong answer, the figure says so and shows the "
+           "error of t. The grey steps join the cells that no other beats in both. "
+           "Zero stands on the lowest line. Cells that differ in builder or way of traversal alone have the same sign.")
 
 MEASURES = (("wrong_answers", "wrong answers per million"), ("t_error_ulp_p99", "error of t, 99th percentile, ulp"))
 COMBINATION = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads")
@@ -22,8 +23,7 @@ def draw(results):
     paired = hard_points(results, metric)
     if paired:
         return draw_hard(paired)
-    points = [(c, 1e9 / c.value(metric), c.per_million("wrong_answers")) for c in results.traces
-              if c.value(metric) and c.per_million("wrong_answers") is not None]
+    points = [(c, 1e9 / c.value(metric)) for c in results.traces if c.value(metric) and c.per_million("wrong_answers") is not None]
     if not points:
         raise NoData("no cell has both a throughput and checked answers")
     return draw_workloads(points)
@@ -41,9 +41,7 @@ def hard_points(results, metric):
 
 def draw_hard(points):
     scenes, isas = ordered((c["scene"] for c, _, _ in points), "scene"), ordered((c["isa"] for c, _, _ in points), "isa")
-    structures = ordered((c["structure"] for c, _, _ in points), "structure")
-    intersectors = sorted({c["intersector"] for c, _, _ in points})
-    markers = marker_map(structures)
+    markers = marker_map(ordered((c["structure"] for c, _, _ in points), "structure"))
     measures = [(name, label) for name, label in MEASURES if any(value_of(hard, name) is not None for _, _, hard in points)]
     figure, axes = panels(len(scenes) * len(measures), len(isas), 4.2, 3.1)
     rows = [(scene, *measure) for scene in scenes for measure in measures]
@@ -52,25 +50,35 @@ def draw_hard(points):
         for column, isa in enumerate(isas):
             axis = axes[row][column]
             here = [(c, t, value_of(h, name)) for c, t, h in points if c["scene"] == scene and c["isa"] == isa and value_of(h, name) is not None]
-            for cell, time, value in sorted(here, key=lambda p: p[0]["box"] == "padded"):  # filled ones above
-                own = intersector_colour(cell["intersector"])
-                axis.plot(time, value, markers[cell["structure"]], markersize=6.5, color=own, markeredgewidth=1.3,
-                          fillstyle="left" if cell["box"] == "ize" else "full", markerfacecoloralt="white",
-                          markerfacecolor="white" if cell["box"] == "fast" else own, markeredgecolor=own, clip_on=False)
-            step_front(axis, [(t, v) for _, t, v in here])
-            log_with_zero(axis, "y", [v for v in everywhere if v is not None])
-            log_time(axis, [t for c, t, _ in points if c["scene"] == scene])
+            panel(axis, here, everywhere, [t for c, t, _ in points if c["scene"] == scene], markers)
             axis.set_title(f"{short(scene)}, {isa}")
             axis.set_xlabel(f"time of {points[0][0]['workload'].replace('_', ' ')} rays, ns a ray")
             axis.set_ylabel(label + ("\nhard rays" if name == "wrong_answers" else "\nhard rays answered right"))
+    add_legends(figure, [c for c, _, _ in points], markers)
+    return figure
+
+
+def panel(axis, points, values, times, markers):
+    """`points`: (cell, ns a ray, how wrong); `values` and `times`: what the axes must hold."""
+    for cell, time, value in sorted(points, key=lambda p: p[0]["box"] == "padded"):  # filled ones above
+        own = intersector_colour(cell["intersector"])
+        axis.plot(time, value, markers[cell["structure"]], markersize=6.5, color=own, markeredgewidth=1.3,
+                  fillstyle="left" if cell["box"] == "ize" else "full", markerfacecoloralt="white",
+                  markerfacecolor="white" if cell["box"] == "fast" else own, markeredgecolor=own, clip_on=False)
+    step_front(axis, [(t, v) for _, t, v in points])
+    log_with_zero(axis, "y", [v for v in values if v is not None])
+    log_time(axis, times)
+
+
+def add_legends(figure, cells, markers):
     boxes = marker_legend({"fast boxes: hollow": "o", "padded boxes: filled": "o"})
     boxes[1].set_markerfacecolor("#333333")
-    if any(c["box"] == "ize" for c, _, _ in points):
+    if any(c["box"] == "ize" for c in cells):
         boxes += marker_legend({"Ize's boxes: half": "o"})
         boxes[2].set_fillstyle("left")
         boxes[2].set_markerfacecolor("#333333")
+    intersectors = sorted({c["intersector"] for c in cells})
     legends_right(figure, [("intersector", intersector_legend(intersectors)), ("structure", marker_legend(markers)), ("", boxes)])
-    return figure
 
 
 def value_of(cell, name):
@@ -78,24 +86,35 @@ def value_of(cell, name):
 
 
 def draw_workloads(points):
-    scenes = ordered((c["scene"] for c, _, _ in points), "scene")
-    workloads = ordered((c["workload"] for c, _, _ in points), "workload")
-    structures = ordered((c["structure"] for c, _, _ in points), "structure")
-    markers = marker_map(sorted({test(c) for c, _, _ in points}))
-
-    figure, axes = panel_grid(scenes, workloads, 3.9, 3.0, 3)
-    for (scene, workload), axis in axes.items():
-        here = [p for p in points if p[0]["scene"] == scene and p[0]["workload"] == workload]
-        for cell, nanoseconds, wrong in here:
-            axis.plot(nanoseconds, wrong, markers[test(cell)], color=colour(cell["structure"]), markersize=6,
-                      markeredgecolor="white", markeredgewidth=0.6, clip_on=False)
-        step_front(axis, [(t, w) for _, t, w in here])
-        log_with_zero(axis, "y", [wrong for _, _, wrong in points])
-        log_time(axis, [t for _, t, _ in here])
+    """`points`: (cell, ns a ray). What is drawn is the first measure that is not 0 everywhere."""
+    scenes, isas = ordered((c["scene"] for c, _ in points), "scene"), ordered((c["isa"] for c, _ in points), "isa")
+    places = {f"{w}, {i}": (w, i) for w in ordered((c["workload"] for c, _ in points), "workload") for i in isas}
+    markers = marker_map(ordered((c["structure"] for c, _ in points), "structure"))
+    name, label, said = measure_of([c for c, _ in points])
+    figure, axes = panel_grid(scenes, list(places), 4.2, 3.1, len(isas) * max(1, 4 // len(isas)))
+    for (scene, place), axis in axes.items():
+        here = [p for p in points if (p[0]["scene"], (p[0]["workload"], p[0]["isa"])) == (scene, places[place])]
+        panel(axis, [(c, t, v) for c, t in here if (v := value_of(c, name)) is not None], [value_of(c, name) for c, _ in points], [t for _, t in here], markers)
         axis.set_xlabel("time, ns a ray")
-        axis.set_ylabel("wrong answers per million")
-    legends_right(figure, [("structure", structure_legend(structures)), ("intersector, box", marker_legend(markers))])
+        axis.set_ylabel(label)
+        if not here:
+            axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
+    if said:
+        figure.suptitle(said, fontsize=11)
+    add_legends(figure, [c for c, _ in points], markers)
     return figure
+
+
+def measure_of(cells):
+    """(name, label, what must be said) of the first measure that tells the cells apart."""
+    (wrong, wrong_label), *others = MEASURES
+    if any(value_of(c, wrong) > 0 for c in cells):
+        return wrong, wrong_label, ""
+    said = f"No wrong answer in {len(cells)} checked cell{'s' if len(cells) > 1 else ''}"
+    for name, label in others:
+        if any((value_of(c, name) or 0) > 0 for c in cells):
+            return name, label, said + "; upwards: the error of t"
+    return wrong, wrong_label, said
 
 
 def log_time(axis, times):
@@ -112,10 +131,6 @@ def log_time(axis, times):
 def step_front(axis, points):
     front = pareto_front(points)
     axis.step([t for t, _ in front], [w for _, w in front], where="post", color="#777777", linewidth=1, zorder=1)
-
-
-def test(cell):
-    return ", ".join(cell[a] for a in ("intersector", "box") if cell[a])
 
 
 def pareto_front(points):
