@@ -106,6 +106,43 @@ def structure_legend(structures):
             for s in ordered(structures, "structure")]
 
 
+WRONG = "#CC1111"  # edges and numbers where answers are wrong
+
+
+def is_wrong(cell):
+    """Whether some of the cell's answers were found wrong."""
+    return bool(cell.per_million("wrong_answers"))
+
+
+def edge(cell):
+    """The edge of a cell's marker."""
+    return WRONG if is_wrong(cell) else "#222222"
+
+
+def wrong_text(cell):
+    """The cell's wrong answers per million, to three digits."""
+    rate = cell.per_million("wrong_answers") or 0.0
+    return f"{float(f'{rate:.3g}'):,.0f}" if rate >= 10 else f"{rate:.2g}"
+
+
+def most_wrong(cells):
+    """The text of the cell that has the most wrong answers for its rays."""
+    return wrong_text(max(cells, key=lambda cell: cell.per_million("wrong_answers") or 0.0))
+
+
+def wrong_legend(cells, handle=None):
+    """[(title, handles)]: `handle`, which says what red is, where some of `cells` have wrong answers, and how many were not checked; empty where neither is."""
+    handles = [handle] if handle and any(map(is_wrong, cells)) else []
+    unchecked = sum(cell.per_million("wrong_answers") is None for cell in cells)
+    if unchecked:
+        handles.append(Line2D([], [], linestyle="", label="not checked" if unchecked == len(cells) else f"{unchecked} of {len(cells)} cells not checked"))
+    return [("answers", handles)] if handles else []
+
+
+def wrong_marker(label):
+    return Line2D([], [], linestyle="", marker="o", color=WRONG, markerfacecolor="white", markersize=5, label=label)
+
+
 def marker_map(keys):
     """A marker for each key, in the order given; they repeat after the tenth."""
     return {key: MARKERS[i % len(MARKERS)] for i, key in enumerate(keys)}

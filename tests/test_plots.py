@@ -13,13 +13,14 @@ sys.path.insert(0, str(PLOTS))
 sys.dont_write_bytecode = True
 
 import report  # noqa: E402
-from figures import ALL, build_time, published_ratios, squares, traversal_ratios  # noqa: E402
+import style  # noqa: E402
+from figures import ALL, build_time, published_ratios, rays_by_builder, rays_per_second, squares, traversal_ratios  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of, pareto_front  # noqa: E402
 from figures.leak_lines import without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import linear_fit  # noqa: E402
-from results import Cell, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
+from results import Cell, Results, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
 
 AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
 
@@ -166,6 +167,8 @@ class Numbers(unittest.TestCase):
         table = traversal_ratios.ratios(cells, modes, "rays_per_second")
         self.assertEqual(table["bvh8", "packet8"], {("diffuse", "bunny"): 1.5, ("diffuse", "city"): 2.0})  # Embree's best; without Embree, single rays
         self.assertEqual(table["embree", "single"], {("diffuse", "bunny"): 0.75})
+        fastest = traversal_ratios.fastest_cells([*cells, Cell(cells[0].axes, [{"rays_per_second": 1e6}])], modes, "rays_per_second")
+        self.assertIs(fastest["bvh8", "single"]["diffuse", "bunny"], cells[0])
         self.assertAlmostEqual(traversal_ratios.value_at(table["bvh8", "packet8"], "diffuse", traversal_ratios.MEAN), 3 ** 0.5)
         self.assertIsNone(traversal_ratios.value_at(table["embree", "single"], "primary", traversal_ratios.MEAN))
         self.assertEqual(traversal_ratios.columns_of(cells), [("diffuse", "bunny"), ("diffuse", "city"), ("diffuse", "mean")])
@@ -183,6 +186,42 @@ class Numbers(unittest.TestCase):
         self.assertEqual([t.get_text() for t in first.get_yticklabels()], ["bih", "bvh2", "bvh4", "bvh8", "bvh16"])
         self.assertEqual([len(first.texts), len(second.texts)], [45, 12])
         self.assertEqual([t.get_text() for t in first.texts if t.get_fontweight() == "bold"], ["10.0"])
+        plt.close(figure)
+
+    def test_wrong_answers_are_marked(self):
+        import matplotlib.pyplot as plt
+        from matplotlib.colors import to_hex
+
+        def of(structure, builder, wrong, **more):
+            axes = {"scene": "bunny", "workload": "diffuse", "isa": "avx2", "structure": structure, "builder": builder, "threads": "1", **more}
+            return Cell(axes, [{"rays_per_second": 1e6 + len(builder), "rays": 1000, **({} if wrong is None else {"wrong_answers": wrong})}])
+
+        def red(figure):
+            return [t.get_text() for a in figure.axes for t in a.texts if to_hex(t.get_color()) == style.WRONG.lower()]
+
+        def legend(figure):
+            return [t.get_text() for each in figure.legends for t in each.get_texts()]
+
+        self.assertEqual([style.wrong_text(of("bvh8", "x", n)) for n in (1, 190, 1000)], ["1,000", "190,000", "1,000,000"])
+        self.assertEqual(style.wrong_text(Cell({}, [{"wrong_answers": 1, "rays": 2_500_000}])), "0.4")
+        cells = [of("bvh8", "x", 0), of("bvh8", "long", 190), of("bvh4", "x", 0), of("grid", "x", None)]
+        results = Results(Path(), {}, cells, [], [], "", True, 4)
+        for module in (rays_per_second, rays_by_builder):
+            figure = module.draw(results)
+            self.assertEqual(red(figure)[:1], ["190,000"], module.TITLE)
+            self.assertTrue(any("some wrong" in t for t in legend(figure)))
+            self.assertIn("1 of 4 cells not checked", legend(figure))
+            plt.close(figure)
+        right = Results(Path(), {}, [cells[0], cells[2], of("bvh8", "long", 0)], [], [], "", True, 3)
+        for module in (rays_per_second, rays_by_builder):
+            figure = module.draw(right)
+            self.assertEqual([t for t in legend(figure) if "wrong" in t or "checked" in t] + red(figure), [])
+            plt.close(figure)
+        many = [of(f"bvh{s}", f"b{b}", 7 if (s, b) == (2, 3) else 0) for s in range(5) for b in range(9)]
+        figure = rays_by_builder.draw(Results(Path(), {}, many, [], [], "", True, 45))
+        (axis,) = figure.axes
+        self.assertEqual([(round(p.get_x() + p.get_width() / 2), round(p.get_y() + p.get_height() / 2)) for p in axis.patches], [(3, 2)])
+        self.assertEqual(axis.get_xlabel(), "framed: up to 7,000\nwrong answers per million")
         plt.close(figure)
 
     def test_shades_of_squares(self):
@@ -322,6 +361,7 @@ class Drawing(unittest.TestCase):
         self.assertAlmostEqual(published, 41.5 / 32.0)
         self.assertAlmostEqual(ours["bvh4"][0], 2.5, places=5)
         self.assertLessEqual(ours["bvh4"][1], 2.5)
+        self.assertTrue(ours["bvh4"][3])  # each of these cells has a wrong answer
         self.assertIn("nothing published", Folder(whole()).plot("--no-report", "--only", "published_ratios").stdout)
 
     def test_thin_results_never_crash(self):

@@ -6,11 +6,12 @@ from pathlib import Path
 from matplotlib.lines import Line2D
 
 from results import NoData
-from style import colour, hatch, legends_right, panels, short, structure_legend
+from style import WRONG, colour, hatch, is_wrong, legends_right, panels, short, structure_legend
 
 TITLE = "Speed-ups beside published ones"
 CAPTION = ("Bars: ratios of the medians of this run, with what the 95 % confidence intervals of both leave. Diamonds: the ratio of the published "
-           "figures, from another machine and with another share of shading (the source stands below the figure). The line is 1: no gain.")
+           "figures, from another machine and with another share of shading (the source stands below the figure). The line is 1: no gain. A red ratio: some of the answers "
+           "of its cells are wrong (the table has how many).")
 PUBLISHED = Path(__file__).resolve().parent.parent / "published"
 
 
@@ -43,7 +44,7 @@ def wrapped(text, width=105):
 
 
 def rows_of(results, comparison, metric):
-    """(place's name, published ratio, {structure: (ratio, low, high)}) for each place where one of ours was measured."""
+    """(place's name, published ratio, {structure: (ratio, low, high, whether answers are wrong)}) for each place where one of ours was measured."""
     rows = []
     for place in comparison["published"]:
         ours = {}
@@ -51,7 +52,8 @@ def rows_of(results, comparison, metric):
             of, to = (one(results, {**comparison[part], "structure": structure, "scene": place["scene"], "workload": place["workload"]}, metric)
                       for part in ("of", "to"))
             if of and to:
-                ours[structure] = (of.median / to.median, of.low / to.high, of.high / to.low)
+                upper, lower = of.estimate(metric), to.estimate(metric)
+                ours[structure] = (upper.median / lower.median, upper.low / lower.high, upper.high / lower.low, is_wrong(of) or is_wrong(to))
         if ours:
             rows.append((f"{short(place['scene'])}\n{place['workload']}", place["of"] / place["to"], ours))
     return rows
@@ -59,8 +61,8 @@ def rows_of(results, comparison, metric):
 
 def one(results, wanted, metric):
     """The fastest cell of those wanted."""
-    found = [c.estimate(metric) for c in results.traces if all(c[a] == v for a, v in wanted.items()) and c.estimate(metric)]
-    return max(found, key=lambda e: e.median, default=None)
+    found = [c for c in results.traces if all(c[a] == v for a, v in wanted.items()) and c.estimate(metric)]
+    return max(found, key=lambda c: c.estimate(metric).median, default=None)
 
 
 def draw_panel(axis, structures, rows):
@@ -72,10 +74,10 @@ def draw_panel(axis, structures, rows):
             if structure not in ours:
                 continue
             x = place + (slot - (len(structures) - 1) / 2) * step
-            ratio, low, high = ours[structure]
+            ratio, low, high, wrong = ours[structure]
             axis.bar(x, ratio, 0.9 * step, color=colour(structure), alpha=0.7, hatch=hatch(structure), edgecolor="white", linewidth=0.5,
                      yerr=[[ratio - low], [high - ratio]], error_kw={"elinewidth": 0.9, "ecolor": "#222222"})
-            axis.annotate(f"{ratio:.2f}", (x, 0.04 * top), ha="center", va="bottom", fontsize=8.5,
+            axis.annotate(f"{ratio:.2f}", (x, 0.04 * top), ha="center", va="bottom", fontsize=8.5, color=WRONG if wrong else "black",
                           bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85})
         axis.plot(place, published, "D", color="#222222", markerfacecolor="white", markersize=6, zorder=4)
         axis.annotate(f"{published:.2f}", (place, published), (8, 0), textcoords="offset points", va="center", fontsize=8.5,

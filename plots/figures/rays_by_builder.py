@@ -4,11 +4,12 @@ from figures import squares
 from figures.bars import digits, draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import MARKERS, legends_right, marker_legend, marker_map, panels, short
+from style import MARKERS, WRONG, edge, is_wrong, legends_right, marker_legend, marker_map, panels, short, wrong_legend, wrong_marker, wrong_text
 
 TITLE = "Rays per second by structure and builder"
 CAPTION = ("A bar reaches the fastest mode of a structure as built, with the 95 % confidence interval of the median; markers "
-           "show its other modes. Higher is better. The wrong answers of each cell stand in the table."
+           "show its other modes. Higher is better. A red marker is a mode with wrong answers; the red number behind a bar's own counts those of the mode "
+           "that the bar reaches, per million rays; a square of such a mode is framed red. Those of each cell stand in the table."
            + squares.CAPTION)
 BUILT = ("scene", "workload", "isa", "structure", "builder", "threads")
 
@@ -39,7 +40,11 @@ def draw(results):
 
     titles = {key: f"{short(key[0])}, {key[1].replace('_', ' ')}, {key[2]}" for key in keys}
     if squares.are_due(shown.values(), varied):
-        return squares.square_panels([(titles[key], shown[key]) for key in keys], value, digits, unit, higher_is_better=True)
+        figure = squares.square_panels([(titles[key], shown[key]) for key in keys], value, digits, unit, higher_is_better=True)
+        for key, axis in zip(keys, figure.axes):
+            squares.mark_wrong(axis, squares.by_place(axis, shown[key]))
+        legends_right(figure, wrong_legend(best))
+        return figure
     columns = min(2, len(keys))
     figure, axes = panels(-(-len(keys) // columns), columns, 5.6, 0.9 + 0.26 * max(map(len, shown.values())))
     figure.get_layout_engine().set(w_pad=0.15)
@@ -52,10 +57,13 @@ def draw(results):
         draw_panel(axis, bars, value, lambda c: digits(value(c)[0]), varied)
         for place, bar in enumerate(bars):
             for cell in groups[tuple(bar[a] for a in BUILT)] if markers else ():
-                axis.plot(cell.estimate(metric).median / 1e6, place, markers[modes.label(cell)], color="#222222", markersize=4,
+                axis.plot(cell.estimate(metric).median / 1e6, place, markers[modes.label(cell)], color=edge(cell), markersize=4,
                           markerfacecolor="white", markeredgewidth=0.8)
+            if is_wrong(bar):
+                axis.annotate(wrong_text(bar), (value(bar)[2], place), (5 + 6 * len(digits(value(bar)[0])) + 6, 0), textcoords="offset points", va="center", fontsize=8,
+                              color=WRONG)
         axis.set_title(titles[keys[index]])
         axis.set_xlabel(unit)
-    if markers:
-        legends_right(figure, [("mode", marker_legend(markers))])
+    legends = [("mode", marker_legend(markers))] if markers else []
+    legends_right(figure, legends + wrong_legend(cells, wrong_marker("some wrong; the number:\nof the bar's, per million")))
     return figure

@@ -2,11 +2,13 @@
 
 from figures.modes import Modes
 from results import NoData, ordered
-from style import MARKERS, colour, hatch, legends_right, marker_legend, marker_map, panel_grid, structure_legend
+from style import (MARKERS, WRONG, colour, edge, hatch, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend, wrong_legend,
+                   wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
 CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with its 95 % confidence interval of the "
-           "median. Higher is better. The wrong answers of each cell stand in the table.")
+           "median. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
+           "reaches, per million rays. Those of each cell stand in the table.")
 
 
 def draw(results):
@@ -26,7 +28,8 @@ def draw(results):
         panel(axis, here, metric, isas, structures, modes, markers)
         axis.set_ylabel(unit)
     legends = [("structure", structure_legend(structures))]
-    legends_right(figure, legends + ([("mode", marker_legend(markers))] if len(markers) > 1 else []))
+    legends += [("mode", marker_legend(markers))] if len(markers) > 1 else []
+    legends_right(figure, legends + wrong_legend(cells, wrong_marker("some wrong; the number:\nof the bar's, per million")))
     return figure
 
 
@@ -39,11 +42,15 @@ def panel(axis, cells, metric, isas, structures, modes, markers):
             if not here:
                 continue
             x = group + (slot - (len(structures) - 1) / 2) * step
-            best = max(e.median for _, e in here) / 1e6
-            axis.bar(x, best, bar, color=colour(structure), alpha=0.55, hatch=hatch(structure), edgecolor="white",
+            fastest, best = max(here, key=lambda pair: pair[1].median)
+            axis.bar(x, best.median / 1e6, bar, color=colour(structure), alpha=0.55, hatch=hatch(structure), edgecolor="white",
                      linewidth=0.5)
+            if is_wrong(fastest):
+                top = max(e.high if markers else e.median for _, e in here) / 1e6
+                axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom", fontsize=7.5, color=WRONG)
             if not markers:  # too many modes to tell apart: where they lie is still seen
-                axis.plot([x] * len(here), [e.median / 1e6 for _, e in here], ".", color="#222222", markersize=2.5)
+                for cell, value in here:
+                    axis.plot(x, value.median / 1e6, ".", color=edge(cell), markersize=2.5)
                 continue
             for cell, value in here:
                 label = modes.label(cell)
@@ -52,11 +59,11 @@ def panel(axis, cells, metric, isas, structures, modes, markers):
                     at += (modes.labels.index(label) / (len(markers) - 1) - 0.5) * 0.55 * bar
                 axis.errorbar(at, value.median / 1e6,
                               [[(value.median - value.low) / 1e6], [(value.high - value.median) / 1e6]],
-                              fmt=markers[label], color="#222222", markersize=4, markerfacecolor="white",
+                              fmt=markers[label], color=edge(cell), markersize=4, markerfacecolor="white",
                               markeredgewidth=0.9, elinewidth=0.9)
     axis.set_xticks(range(len(isas)), isas)
     axis.set_xlim(-0.55, len(isas) - 0.45)
-    axis.set_ylim(bottom=0)
+    axis.set_ylim(0, axis.get_ylim()[1] * (1.2 if any(is_wrong(c) for c in cells) else 1.0))
     axis.grid(axis="x", visible=False)
     if not cells:
         axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")

@@ -3,11 +3,11 @@
 import numpy as np
 
 from results import NoData, ordered
-from style import colour, legends_right, marker_legend, marker_map, panels, structure_legend
+from style import WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panels, structure_legend, wrong_legend, wrong_marker
 
 TITLE = "SAH cost against measured time"
 CAPTION = ("A point is a structure on a scene, traced in its fastest mode. The line is the least-squares fit through a panel's "
-           "points, R² its share of the variance explained. Structures of different branching factor differ in what a "
+           "points, R² its share of the variance explained. A red edge: the mode has wrong answers. Structures of different branching factor differ in what a "
            "step costs, so a low R² across structures is a finding, not a fault.")
 
 
@@ -32,7 +32,8 @@ def draw(results):
     axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))
     for axis in axes[-1]:
         axis.set_xlabel("SAH cost")
-    legends_right(figure, [("structure", structure_legend(structures)), ("scene", marker_legend(markers))])
+    answers = wrong_legend([c for c, _, _ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, _, _ in points])} per million"))
+    legends_right(figure, [("structure", structure_legend(structures)), ("scene", marker_legend(markers)), *answers])
     return figure
 
 
@@ -52,7 +53,7 @@ def fastest_points(results, metric):
 def panel(axis, points, markers, title):
     for cell, cost, nanoseconds in points:
         axis.plot(cost, nanoseconds, markers[cell["scene"]], color=colour(cell["structure"]), markersize=7,
-                  markeredgecolor="white", markeredgewidth=0.7)
+                  markeredgecolor=WRONG if is_wrong(cell) else "white", markeredgewidth=1.2 if is_wrong(cell) else 0.7)
     fit = linear_fit([p[1] for p in points], [p[2] for p in points])
     if fit:
         slope, offset, r2 = fit

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.patches import Rectangle
 
 from results import ordered
-from style import panels
+from style import WRONG, is_wrong, most_wrong, panels
 
 MOST_BARS = 40
 CAPTION = (f" Where a scene has more than {MOST_BARS} bars there is a square for each structure and builder instead: the median alone, the darker the better, "
@@ -31,6 +32,21 @@ def square_panels(cells_of, value_of, text_of, quantity, higher_is_better):
         panel(axis, {(c["structure"], c["builder"]): value_of(c)[0] for c in cells}, used, text_of, higher_is_better)
         axis.set_title(f"{title}: {quantity}", loc="left")
     return figure
+
+
+def by_place(axis, cells):
+    """{(x, y): cell} of a panel's squares, by the labels of its axes."""
+    columns, rows = ([t.get_text() for t in labels] for labels in (axis.get_xticklabels(), axis.get_yticklabels()))
+    return {(columns.index(c["builder"]), rows.index(c["structure"])): c for c in cells}
+
+
+def mark_wrong(axis, cells):
+    """Frames those squares of `cells`, {(x, y): cell}, that have wrong answers, and says how many these are."""
+    wrong = {place: cell for place, cell in cells.items() if is_wrong(cell)}
+    for x, y in wrong:
+        axis.add_patch(Rectangle((x - 0.44, y - 0.38), 0.88, 0.76, fill=False, edgecolor=WRONG, linewidth=1.2, zorder=3))
+    if wrong:
+        axis.set_xlabel(f"framed: up to {most_wrong(wrong.values())}\nwrong answers per million", loc="left", color=WRONG, fontsize=9)
 
 
 def panel(axis, values, builders, text_of, higher_is_better):

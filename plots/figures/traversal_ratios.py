@@ -6,12 +6,14 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 
 from figures.modes import Modes
+from figures.squares import mark_wrong
 from results import NoData, ordered
 from style import panels, short
 
 TITLE = "Ways of traversal"
 CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set (where the sweep has no Embree: of the structure's "
-           "own single rays). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes.")
+           "own single rays). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes. "
+           "Framed red: ways with wrong answers.")
 # Blue to orange by way of white: readers with any colour vision can tell the ends apart.
 COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FEE9CF", "#FFFFFF", "#D3E4F3", "#5C9BCF", "#1F5A96"])
 MEAN = "mean"
@@ -32,24 +34,33 @@ def draw(results):
     figure, axes = panels(len(tables), 1, max(5.0, 1.9 + 0.52 * len(columns)), 1.6 + 0.26 * longest)
     for (isa, table), axis in zip(tables.items(), axes.flat):
         panel(axis, table, rows[isa], columns)
+        fastest = fastest_cells([c for c in cells if c["isa"] == isa], modes, metric)
+        mark_wrong(axis, {(x, y): fastest[row][place] for y, row in enumerate(rows[isa]) for x, place in enumerate(columns) if place in fastest[row]})
         axis.set_title(isa, loc="left", pad=36)
     return figure
 
 
+def fastest_cells(cells, modes, metric):
+    """{(structure, mode): {(workload, scene): cell}}: the fastest cell stands for those of a kind."""
+    fastest = {}
+    for cell in cells:
+        row, place = fastest.setdefault((cell["structure"], modes.label(cell)), {}), (cell["workload"], cell["scene"])
+        row[place] = max(row.get(place, cell), cell, key=lambda c: c.estimate(metric).median)
+    return fastest
+
+
 def ratios(cells, modes, metric):
-    """{(structure, mode): {(workload, scene): ratio}} of one instruction set; the fastest cell stands for those of a kind."""
-    fastest, base = {}, {}
+    """{(structure, mode): {(workload, scene): ratio}} of one instruction set."""
+    base = {}
     for cell in cells:
         rate = cell.estimate(metric).median
         place = (cell["workload"], cell["scene"])
-        row = fastest.setdefault((cell["structure"], modes.label(cell)), {})
-        row[place] = max(row.get(place, 0.0), rate)
         for owner, wanted in (("embree", cell["structure"] == "embree"), (cell["structure"], cell["traversal"] == "single")):
             if wanted:
                 base[owner, place] = max(base.get((owner, place), 0.0), rate)
     table = {}
-    for (structure, mode), row in fastest.items():
-        compared = {p: v / b for p, v in row.items() if (b := base.get(("embree", p)) or base.get((structure, p)))}
+    for (structure, mode), row in fastest_cells(cells, modes, metric).items():
+        compared = {p: c.estimate(metric).median / b for p, c in row.items() if (b := base.get(("embree", p)) or base.get((structure, p)))}
         if compared:
             table[structure, mode] = compared
     return table
@@ -93,7 +104,7 @@ def panel(axis, table, rows, columns):
         spine.set_visible(False)
     starts = [k for k in range(len(columns)) if k == 0 or columns[k][0] != columns[k - 1][0]]
     for first, after in zip(starts, [*starts[1:], len(columns)]):
-        axis.text((first + after - 1) / 2, -0.75, columns[first][0].replace("_", " "), ha="center", va="bottom", fontsize=9.5)
+        axis.text((first + after - 1) / 2, -0.75, columns[first][0].replace("_", "\n" if after - first == 1 else " "), ha="center", va="bottom", fontsize=9.5)
         if first:
             axis.axvline(first - 0.5, color="white", linewidth=4)
     for y in range(1, len(rows)):
