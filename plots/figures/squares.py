@@ -11,10 +11,10 @@ from style import WRONG, is_wrong, most_wrong, panels
 
 MOST_BARS = 40
 CAPTION = (f" Where a scene has more than {MOST_BARS} bars there is a square for each structure and builder instead: the median alone, the darker the better, "
-           "the best of a panel in bold.")
+           "the best of a panel in bold; a white place with a dash was not measured.")
 SPAN = 100  # of the colours
 NOTHING = 1e-6  # of the largest: written as 0
-SHADES = LinearSegmentedColormap.from_list("better", ["#FFFFFF", "#D3E4F3", "#8FBCE6", "#4A8FC9", "#1F5A96"])
+SHADES = LinearSegmentedColormap.from_list("better", ["#E4EEF8", "#C6DCF1", "#8FBCE6", "#4A8FC9", "#1F5A96"])  # none is white: that is where nothing was measured
 
 
 def are_due(bars_of_panels, varied):
@@ -58,7 +58,10 @@ def panel(axis, values, builders, text_of, higher_is_better):
     axis.imshow(grid, cmap=SHADES, vmin=0.0, vmax=1.0, aspect="auto")
     for y, structure in enumerate(structures):
         for x, builder in enumerate(builders):
-            if (value := values.get((structure, builder))) is not None:
+            value = values.get((structure, builder))
+            if value is None:
+                axis.text(x, y, "–", ha="center", va="center", fontsize=8, color="#BBBBBB")
+            else:
                 axis.text(x, y, text_of(value) if value > nothing else "0", ha="center", va="center", fontsize=8, color="white" if grid[y, x] > 0.7 else "#222222",
                           fontweight="bold" if value == best else "normal")
     axis.set_yticks(range(len(structures)), structures, fontsize=8.5)
