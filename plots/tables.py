@@ -7,6 +7,9 @@ from results import STRUCTURE_AXES, axis_sort_key, ordered
 PER_MILLION = (("wrong_answers", "wrong"), ("missed_hits", "missed"), ("false_hits", "false"),
                ("wrong_surface", "wrong surface"), ("wrong_primitive", "wrong primitive"), ("cracks", "cracks"))
 
+SAH_STEP = ("A visit of a node counts as one step whatever the number of its children (of a grid, each cell crossed), and a leaf block as one test whatever the number of its triangles: "
+            "a lower cost of wider nodes or blocks is not less work by as much.")
+
 
 def number(value, form="{:.3g}"):
     """A table cell that sorts by the value itself; empty where there is none."""
@@ -136,7 +139,8 @@ def structure_table(results):
         values = [(cell.value(name), scale) for name, _, scale in columns]
         numbers = [figure(None if v is None else v * scale) for v, scale in values]
         rows.append(([text(cell[a], key=a == "structure") for a in axes] + numbers, ""))
-    return table("structures", heads, rows)
+    note = f"SAH cost: {SAH_STEP[0].lower()}{SAH_STEP[1:]} With child boxes: a node counts a step for each box of its children."
+    return (f'<p class="soft">{escape(note)}</p>' if any(name == "sah_cost" for name, _, _ in columns) else "") + table("structures", heads, rows)
 
 
 def best_table(results):

@@ -14,6 +14,7 @@ sys.dont_write_bytecode = True
 
 import report  # noqa: E402
 import style  # noqa: E402
+import tables  # noqa: E402
 from figures import ALL, build_time, published_ratios, rays_by_builder, rays_per_second, squares, traversal_ratios  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of, pareto_front  # noqa: E402
 from figures.leak_lines import without  # noqa: E402
@@ -406,7 +407,8 @@ class Drawing(unittest.TestCase):
         self.assertEqual(reader.tags.count("img"), len(ALL) - len(HARD))
         shown = "".join(reader.text)
         self.assertGreaterEqual(shown.count(evil), 6)
-        for words in ("25 50 25 0 0", "(2 cells)", "git checkout abc", "wrong per million", "× embree"):
+        self.assertEqual(shown.count(tables.SAH_STEP), 2)  # below both figures that set SAH costs side by side
+        for words in ("25 50 25 0 0", "(2 cells)", "git checkout abc", "wrong per million", "× embree", "SAH cost: a visit of a node counts as one step whatever the number of its children"):
             self.assertIn(words, shown)
         self.assertNotIn("http", page.replace("http://www.w3.org", ""))
 

@@ -4,11 +4,12 @@ import numpy as np
 
 from results import NoData, ordered
 from style import WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panels, structure_legend, wrong_legend, wrong_marker
+from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
 CAPTION = ("A point is a structure on a scene, traced in its fastest mode. The line is the least-squares fit through a panel's "
-           "points, R² its share of the variance explained. A red edge: the mode has wrong answers. Structures of different branching factor differ in what a "
-           "step costs, so a low R² across structures is a finding, not a fault.")
+           "points, R² its share of the variance explained. A red edge: the mode has wrong answers. "
+           + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
 
 
 def draw(results):
@@ -22,7 +23,7 @@ def draw(results):
     structures = ordered((c["structure"] for c, _, _ in points), "structure")
     markers = marker_map(scenes)
 
-    figure, axes = panels(len(workloads), len(isas), 3.3, 2.9, sharex=True, sharey="row")
+    figure, axes = panels(len(workloads), len(isas), 3.3, 3.05, sharex=True, sharey="row")
     for row, workload in enumerate(workloads):
         for column, isa in enumerate(isas):
             here = [p for p in points if p[0]["workload"] == workload and p[0]["isa"] == isa]
@@ -59,9 +60,9 @@ def panel(axis, points, markers, title):
         slope, offset, r2 = fit
         ends = np.array([min(p[1] for p in points), max(p[1] for p in points)])
         axis.plot(ends, slope * ends + offset, "-", color="#777777", linewidth=1, zorder=1)
-        title += f"   R² = {r2:.2f} (n = {len(points)})"
+        title += f"\nR² = {r2:.2f} (n = {len(points)})"
     elif points:
-        title += f"   (n = {len(points)}, no fit)"
+        title += f"\n(n = {len(points)}, no fit)"
     else:
         axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
     axis.set_title(title)
