@@ -46,6 +46,7 @@ struct CellChoice {
 struct MeasureSettings {
   unsigned repetitions = 7;
   unsigned warmup = 1;    ///< untimed passes over all rays before the first repetition
+  double min_warmup_time = 0.0;  ///< seconds that the untimed passes last at least
   double min_time = 0.2;  ///< seconds that one repetition lasts at least
   unsigned width = 512, height = 512;
   std::size_t memory = std::size_t{8} << 30;  ///< bytes of structures held at once
@@ -83,7 +84,7 @@ struct Overrides {
   std::vector<std::string> axes;  ///< `isa=avx2,avx512`, as typed
   std::optional<unsigned> repetitions = {}, threads = {};
   std::optional<std::uint64_t> seed = {};
-  std::optional<double> min_time = {};
+  std::optional<double> min_time = {}, min_warmup_time = {};
 };
 
 /// Whether a workload of the sweep starts on surfaces, so that RaySettings mean something.

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The command line from outside: test_cli.py ARBORETUM. Exit statuses, one-line errors, kill and resume, full disks."""
 
+import csv
 import json
 import os
 import resource
@@ -132,6 +133,40 @@ class CommandLine(CommandLineCase):
         self.assertFalse((self.folder / "results").exists())
         nothing = self.run_small("--filter", "nothing-has-this-name")
         self.assert_error(nothing, "nothing to measure", status=4)
+
+    def test_flags_of_google_benchmark(self):
+        few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build", "--out", "out")
+        every = self.cells()
+        self.assertEqual(self.cells("--benchmark_filter=all"), every)
+        self.assertEqual(self.cells("--benchmark_filter=-bvh4"), [n for n in every if "bvh4" not in n])
+        self.assertEqual(self.cells("--benchmark_filter=bvh4", "--filter", "sse", "--skip", "^build"),
+                         [n for n in every if "bvh4" in n and "/sse/" in n and not n.startswith("build")])
+        result = self.run_small(*few, "--benchmark_min_warmup_time=0.05", "--benchmark_context=foo=bar,note=two words", "--benchmark_out=copy.json",
+                                "--benchmark_time_unit=us", "--benchmark_report_aggregates_only=true")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        document = json.loads((self.folder / "out/results.json").read_text())
+        self.assertEqual((document["context"]["foo"], document["context"]["note"]), ("bar", "two words"))
+        cells = read_jsonl(self.folder / "out/cells.jsonl")
+        self.assertTrue(all([r["repetition_index"] for r in c["repetitions"]] == [0, 1, 2] for c in cells))
+        self.assertIn("min_warmup_time: 0.05", (self.folder / "out/effective.yaml").read_text())
+        copy = json.loads((self.folder / "copy.json").read_text())
+        self.assertEqual({b["run_type"] for b in copy["benchmarks"]}, {"aggregate"})
+        medians = [{b["name"]: b for b in d["benchmarks"] if b.get("aggregate_name") == "median"} for d in (document, copy)]
+        self.assertEqual(medians[0].keys(), medians[1].keys())
+        for name, entry in medians[0].items():
+            self.assertAlmostEqual(medians[1][name]["real_time"] / entry["real_time"], 1000, places=3)
+            self.assertEqual(medians[1][name]["time_unit"], "us")
+        shown = self.run_small(*few, "--benchmark_format=csv", "--benchmark_display_aggregates_only")
+        rows = list(csv.DictReader(shown.stdout.splitlines()))
+        self.assertEqual({row["aggregate_name"] for row in rows}, {"mean", "median", "stddev", "cv"})
+
+        (self.folder / "out").rename(self.folder / "kept")
+        self.assert_error(self.run_small(*few, "--benchmark_context=cpu=mine"), "has a 'cpu' of its own")
+        self.assert_error(self.run_small(*few, "--benchmark_repetitions=3", "--repetitions", "3"), "keep one")
+        self.assert_error(self.run_small(*few, "--benchmark_color=true"), "no effect")
+        self.assertFalse((self.folder / "out").exists())
+        lasting = {**os.environ, "BENCHMARK_MIN_WARMUP_TIME": "0.1"}
+        self.assertEqual(self.run_small(*few, env=lasting).returncode, 0)
 
     def test_an_isa_that_is_lacking_is_skipped_by_name(self):
         result = self.run_small("isa=scalar,sse", "workload=primary", env={**os.environ, "ARBORETUM_ISA": "scalar"})
