@@ -268,8 +268,11 @@ class ConfigReader {
   }
 
   void apply(const Overrides& overrides) {
+    refuse_repeated_axes(overrides.axes);
     for (const std::string& word : overrides.axes) apply_axis(word);
     if (overrides.threads) {
+      if (std::ranges::any_of(overrides.axes, [](const std::string& word) { return word.starts_with("threads="); }))
+        throw UserError("command line: --threads and threads= say the same; keep one");
       if (*overrides.threads < 1 || *overrides.threads > kMaxThreads) {
         throw UserError(
             fmt::format("--threads: an integer from 1 to {}, not {}", kMaxThreads, *overrides.threads));
