@@ -31,6 +31,7 @@ struct SceneChoice {
   bool moves = false;        ///< it has key frames, and its shutter opens
   std::string missing = {};  ///< why an optional scene is not here: its cells are skipped with this reason
   Placing placing = {};
+  std::string where = {};    ///< file:line, or `command line`
   /// The name without the placing: include, exclude and the command line may name all placings of a scene by it.
   [[nodiscard]] std::string family() const { return name.substr(0, name.size() - placing.label.size()); }
   [[nodiscard]] bool is_called(std::string_view word) const { return word == name || word == family(); }
