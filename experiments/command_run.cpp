@@ -17,13 +17,14 @@
 #include "experiments/name_filter.h"
 #include "experiments/plan.h"
 #include "experiments/plan_record.h"
+#include "experiments/plotting.h"
 #include "experiments/progress.h"
 #include "experiments/result_folder.h"
 #include "experiments/results_writer.h"
 #include "experiments/runner.h"
+#include "experiments/scene_data.h"
 #include "experiments/shard.h"
 #include "experiments/summary.h"
-#include "scenes/catalogue.h"
 
 namespace arboretum {
 namespace {
@@ -48,12 +49,17 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
   return ExitStatus::kDone;
 }
 
-/// A catalogue model that is not on this machine stops the run before anything is measured.
-void require_scenes(const Experiment& experiment) {
-  for (const SceneChoice& scene : experiment.scenes) {
-    if (scene.spec.catalogue.empty()) continue;
-    const CatalogueEntry entry = find_catalogue_entry(scene.spec.catalogue);
-    if (!entry.is_present()) (void)load_catalogue_scene(entry);  // throws, naming the command that brings it
+/// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each is loaded
+/// for this alone, and again when its turn comes: a long sweep does not hold all of them.
+void require_scenes(const Experiment& experiment, const Plan& plan) {
+  for (std::size_t i = 0; i < experiment.scenes.size(); ++i) {
+    const SceneChoice& scene = experiment.scenes[i];
+    if (std::ranges::none_of(plan.cells, [i](const Cell& cell) { return cell.scene_index == i; })) continue;
+    try {
+      static_cast<void>(SceneData(scene, experiment.measure, [](const std::string&) {}));
+    } catch (const UserError& e) {
+      throw UserError(fmt::format("{}: {}", scene.where, e.what()));
+    }
   }
 }
 
@@ -105,6 +111,17 @@ void write_results(const std::filesystem::path& folder, const RunOutcome& outcom
   if (flags.format != "console") fmt::print("{}", text(flags.format, flags.report_aggregates_only || flags.display_aggregates_only));
 }
 
+/// What an earlier run concluded with, its figures among it. Other files are not ours.
+void remove_stale(const std::filesystem::path& folder) {
+  std::vector<std::string> names{"results.json", "results.csv", "report.html"};
+  for (std::string_view plot : plot_names())
+    for (const char* extension : {".png", ".svg"}) names.push_back(std::string(plot) + extension);
+  for (const std::string& name : names) {
+    std::error_code ignored;
+    if (!std::filesystem::is_directory(folder / name, ignored)) std::filesystem::remove(folder / name, ignored);
+  }
+}
+
 /// What --benchmark_context says of the run goes into the context, beside what is there already and will be.
 void add_custom_context(Json& context, const BenchmarkFlags& flags) {
   for (const auto& [key, value] : flags.context) {
@@ -123,7 +140,8 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   initialize_benchmark(command.benchmark.others);
   Json context = machine_context(experiment, hash, command.command_line);
   add_custom_context(context, command.benchmark);
-  require_scenes(experiment);
+  if (!command.no_plots && !experiment.plots.empty() && command.benchmark.format == "console") require_chosen_python();
+  require_scenes(experiment, plan);
   make_output_folder(folder);
   if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
   if (!command.benchmark.out.empty())
@@ -131,10 +149,7 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   const bool replaces = !command.resume && std::filesystem::exists(folder / "cells.jsonl");
   Journal journal(folder, hash, plan, command.resume);
   if (replaces) fmt::print(stderr, "{}: the results of an earlier run are replaced\n", folder.string());
-  for (const char* stale : {"results.json", "results.csv", "report.html"}) {
-    std::error_code ignored;
-    std::filesystem::remove(folder / stale, ignored);
-  }
+  remove_stale(folder);
   write_whole(folder / "effective.yaml",
               fmt::format("# configuration hash: {}\n{}{}", hash, shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
   if (!shard.is_whole()) context["shard"] = shard.text();
