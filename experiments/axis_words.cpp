@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <set>
 
 #include "core/error.h"
 #include "core/names.h"
@@ -26,6 +27,14 @@ std::string check_axis_value(Axis axis, std::string& value, const Registry& regi
   const std::vector<std::string> known = known_values(axis, registry);
   if (std::ranges::find(known, value) != known.end()) return {};
   return unknown_name_message(to_string(axis), value, known);
+}
+
+void refuse_repeated_axes(const std::vector<std::string>& words) {
+  std::set<std::string> seen;
+  for (const std::string& word : words) {
+    const std::string key = word.substr(0, word.find('='));
+    if (!seen.insert(key).second) throw UserError(fmt::format("command line: {} is given twice; name its values together, as in {}=value,value", key, key));
+  }
 }
 
 AxisWord read_axis_word(const std::string& word, const Registry& registry, const std::vector<std::string>& further) {

@@ -43,6 +43,7 @@ void write(const std::string& path, const std::string& text) {
 ExitStatus command_compare(const CompareCommand& command) {
   if (command.json == "-" && command.csv == "-") throw UserError("compare: --json and --csv cannot both go to stdout; give one of them a file");
   refuse_unknown_format(command.plot);
+  if (!command.plot.empty()) require_chosen_python();
   for (const std::filesystem::path& file : {std::filesystem::path(command.json), std::filesystem::path(command.csv), command.plot})
     if (!file.empty() && file != "-") require_writable(file);
   ResultFolder a = read_result_folder(command.a), b = read_result_folder(command.b);

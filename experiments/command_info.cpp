@@ -24,6 +24,7 @@ Json as_json(const std::string& name, const SceneInfo& info) {
   json["shutter"] = {info.shutter.open, info.shutter.close};
   json["instances"] = info.instances, json["prototypes"] = info.prototypes;
   json["prototype_triangles"] = info.prototype_triangles;
+  json["instances_in_scene_file"] = info.named_instances;
   json["lights"] = info.lights, json["warnings"] = info.report.warnings;
   Json& effects = json["effects"] = Json::array();
   for (const Effect& e : info.effects)
@@ -59,8 +60,10 @@ ExitStatus command_info(const std::string& word, bool json) {
   else
     fmt::print("motion        nothing moves\n");
   if (info.instances > 0)
-    fmt::print("instances     {} of {} meshes with {} triangles\n", info.instances, info.prototypes,
-               info.prototype_triangles);
+    fmt::print("instances     {} of {} meshes with {} triangles; {} named by the scene\n", info.instances, info.prototypes,
+               info.prototype_triangles, info.named_instances);
+  else if (info.named_instances > 0)
+    fmt::print("instances     {} named by the scene, laid out in one mesh{}\n", info.named_instances, info.key_frames > 1 ? " because it moves" : "");
   else
     fmt::print("instances     none\n");
   for (const std::string& warning : info.report.warnings) fmt::print("warning       {}\n", warning);

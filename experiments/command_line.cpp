@@ -61,7 +61,7 @@ void declare_run(CLI::App& app, RunCommand& run) {
   c->add_option("--seed", run.overrides.seed, "Seed of the workloads' random numbers")->check(refuse_no_count);
   c->add_flag("--fail-fast", run.fail_fast, "Stop at the first wrong answer");
   c->add_flag("--no-plots", run.no_plots, "Draw no plots and write no report");
-  c->footer("Google Benchmark's --benchmark_* flags pass through.");
+  c->footer("Google Benchmark's --benchmark_* flags have its meaning; those that would change nothing are refused.");
 }
 
 void declare_merge(CLI::App& app, MergeCommand& merge) {

@@ -9,6 +9,7 @@
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
 #include "experiments/conclusion.h"
+#include "experiments/plotting.h"
 #include "experiments/results_writer.h"
 
 namespace arboretum {
@@ -79,6 +80,7 @@ ExitStatus command_merge(const MergeCommand& command) {
     if (command.require_all) throw UserError(missing + "; give the folders that hold them too, or leave out --require-all");
     merged.outcome.warnings.insert(merged.outcome.warnings.begin(), missing);
   }
+  if (!command.no_plots && !plots_of(merged.context).empty()) require_chosen_python();
   make_output_folder(command.out);
   write_beside(command.out, parts, merged);
   std::string cells;

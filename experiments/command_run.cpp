@@ -14,15 +14,17 @@
 #include "experiments/estimate.h"
 #include "experiments/interleave.h"
 #include "experiments/machine_info.h"
+#include "experiments/name_filter.h"
 #include "experiments/plan.h"
 #include "experiments/plan_record.h"
+#include "experiments/plotting.h"
 #include "experiments/progress.h"
 #include "experiments/result_folder.h"
 #include "experiments/results_writer.h"
 #include "experiments/runner.h"
+#include "experiments/scene_data.h"
 #include "experiments/shard.h"
 #include "experiments/summary.h"
-#include "scenes/catalogue.h"
 
 namespace arboretum {
 namespace {
@@ -47,12 +49,17 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
   return ExitStatus::kDone;
 }
 
-/// A catalogue model that is not on this machine stops the run before anything is measured.
-void require_scenes(const Experiment& experiment) {
-  for (const SceneChoice& scene : experiment.scenes) {
-    if (scene.spec.catalogue.empty()) continue;
-    const CatalogueEntry entry = find_catalogue_entry(scene.spec.catalogue);
-    if (!entry.is_present()) (void)load_catalogue_scene(entry);  // throws, naming the command that brings it
+/// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each is loaded
+/// for this alone, and again when its turn comes: a long sweep does not hold all of them.
+void require_scenes(const Experiment& experiment, const Plan& plan) {
+  for (std::size_t i = 0; i < experiment.scenes.size(); ++i) {
+    const SceneChoice& scene = experiment.scenes[i];
+    if (std::ranges::none_of(plan.cells, [i](const Cell& cell) { return cell.scene_index == i; })) continue;
+    try {
+      static_cast<void>(SceneData(scene, experiment.measure, [](const std::string&) {}));
+    } catch (const UserError& e) {
+      throw UserError(fmt::format("{}: {}", scene.where, e.what()));
+    }
   }
 }
 
@@ -94,12 +101,35 @@ std::filesystem::path default_folder(const Experiment& experiment, const Shard& 
 
 void write_results(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan,
                    const Json& context, const BenchmarkFlags& flags) {
-  const std::string json = results_json(outcome, plan, context), csv = results_csv(outcome);
-  write_whole(folder / "results.json", json);
-  write_whole(folder / "results.csv", csv);
-  if (!flags.out.empty()) write_whole(flags.out, flags.out_format == "csv" ? csv : json);
-  if (flags.format == "json") fmt::print("{}", json);
-  if (flags.format == "csv") fmt::print("{}", csv);
+  write_whole(folder / "results.json", results_json(outcome, plan, context));
+  write_whole(folder / "results.csv", results_csv(outcome));
+  const auto text = [&](const std::string& format, bool aggregates_only) {
+    const ResultForm form{.aggregates_only = aggregates_only, .time_unit = flags.time_unit};
+    return format == "csv" ? results_csv(outcome, form) : results_json(outcome, plan, context, form);
+  };
+  if (!flags.out.empty()) write_whole(flags.out, text(flags.out_format, flags.report_aggregates_only));
+  if (flags.format != "console") fmt::print("{}", text(flags.format, flags.report_aggregates_only || flags.display_aggregates_only));
+}
+
+/// What an earlier run concluded with, its figures among it. Other files are not ours.
+void remove_stale(const std::filesystem::path& folder) {
+  std::vector<std::string> names{"results.json", "results.csv", "report.html"};
+  for (std::string_view plot : plot_names())
+    for (const char* extension : {".png", ".svg"}) names.push_back(std::string(plot) + extension);
+  for (const std::string& name : names) {
+    std::error_code ignored;
+    if (!std::filesystem::is_directory(folder / name, ignored)) std::filesystem::remove(folder / name, ignored);
+  }
+}
+
+/// What --benchmark_context says of the run goes into the context, beside what is there already and will be.
+void add_custom_context(Json& context, const BenchmarkFlags& flags) {
+  for (const auto& [key, value] : flags.context) {
+    for (const char* later : {"shard", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"})
+      if (key == later) throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
+    if (context.contains(key)) throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
+    context[key] = value;
+  }
 }
 
 ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord record, const Registry& registry,
@@ -108,7 +138,10 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   const std::filesystem::path folder = command.out.empty() ? default_folder(experiment, shard) : command.out;
   const std::string hash = configuration_hash(experiment);
   initialize_benchmark(command.benchmark.others);
-  require_scenes(experiment);
+  Json context = machine_context(experiment, hash, command.command_line);
+  add_custom_context(context, command.benchmark);
+  if (!command.no_plots && !experiment.plots.empty() && command.benchmark.format == "console") require_chosen_python();
+  require_scenes(experiment, plan);
   make_output_folder(folder);
   if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
   if (!command.benchmark.out.empty())
@@ -116,13 +149,9 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   const bool replaces = !command.resume && std::filesystem::exists(folder / "cells.jsonl");
   Journal journal(folder, hash, plan, command.resume);
   if (replaces) fmt::print(stderr, "{}: the results of an earlier run are replaced\n", folder.string());
-  for (const char* stale : {"results.json", "results.csv", "report.html"}) {
-    std::error_code ignored;
-    std::filesystem::remove(folder / stale, ignored);
-  }
+  remove_stale(folder);
   write_whole(folder / "effective.yaml",
               fmt::format("# configuration hash: {}\n{}{}", hash, shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
-  Json context = machine_context(experiment, hash, command.command_line);
   if (!shard.is_whole()) context["shard"] = shard.text();
   record.context = context;
   const std::vector<std::string> changed = command.resume ? changed_conditions(folder, context) : std::vector<std::string>{};
@@ -148,21 +177,32 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   return conclude(folder, outcome, plan, !command.no_plots);
 }
 
+/// --filter, --skip and --benchmark_filter, as one expression of each kind: a plan's record, and the command that `merge` prints, have one.
+std::pair<std::string, std::string> filters_of(const RunCommand& command) {
+  const BenchmarkFlags& google = command.benchmark;
+  static_cast<void>(NameFilter(command.filter, command.skip)), static_cast<void>(NameFilter(google.filter, google.skip));
+  const auto both = [](const std::string& a, const std::string& b, auto join) { return a.empty() ? b : b.empty() ? a : join(a, b); };
+  return {both(command.filter, google.filter, [](const auto& a, const auto& b) { return fmt::format("^(?=.*(?:{}))(?=.*(?:{}))", a, b); }),
+          both(command.skip, google.skip, [](const auto& a, const auto& b) { return fmt::format("(?:{})|(?:{})", a, b); })};
+}
+
 }  // namespace
 
 ExitStatus command_run(RunCommand command) {
-  if (command.benchmark.repetitions && !command.overrides.repetitions)
-    command.overrides.repetitions = command.benchmark.repetitions;
+  if (command.benchmark.repetitions && command.overrides.repetitions)
+    throw UserError("--repetitions and --benchmark_repetitions say the same; keep one");
+  if (command.benchmark.repetitions) command.overrides.repetitions = command.benchmark.repetitions;
+  if (command.benchmark.min_warmup_time) command.overrides.min_warmup_time = command.benchmark.min_warmup_time;
   if (command.benchmark.min_time) command.overrides.min_time = command.benchmark.min_time;
   const Shard shard = command.shard ? parse_shard(*command.shard) : Shard{};
   const Registry registry = this_registry();
   const Experiment experiment = read_experiment(command.config, registry, command.overrides);
   Plan plan = make_plan(experiment, registry);
-  apply_filter(plan, command.filter, command.skip);
-  apply_filter(plan, command.benchmark.filter, "");
+  const auto [filter, skip] = filters_of(command);
+  apply_filter(plan, filter, skip);
   const std::map<std::string, unsigned> shards = split_plan(experiment, plan, shard.of);
   PlanRecord record = record_of(plan, shards, shard);
-  record.filter = command.filter.empty() ? command.benchmark.filter : command.filter, record.skip = command.skip;
+  record.filter = filter, record.skip = skip;
   if (!shard.is_whole()) keep_shard(plan, shards, shard.index);
   if (command.list || command.benchmark.list) return print_list(plan);
   if (command.dry_run) return print_dry_run(experiment, plan);

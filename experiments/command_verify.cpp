@@ -92,6 +92,7 @@ class Verify {
     Experiment experiment;
     experiment.name = "verify", experiment.scenes = {scene};
     experiment.metrics = {.trace = true, .build = false, .quality = false, .accuracy = true};
+    refuse_repeated_axes(command_.axes);
     for (const std::string& word : command_.axes) {
       // `all` of any axis; the builder has one of its own.
       const std::size_t equals = word.find('=');

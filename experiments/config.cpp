@@ -179,12 +179,13 @@ class ConfigReader {
 
   void read_measure(const YAML::Node& map) {
     yaml_.check_map(map, "measure",
-                    std::vector<std::string>{"repetitions", "warmup", "min_time", "resolution", "threads",
+                    std::vector<std::string>{"repetitions", "warmup", "min_warmup_time", "min_time", "resolution", "threads",
                                              "memory", "seed", "structure_cache"});
     MeasureSettings& m = experiment_.measure;
     if (const auto n = map["repetitions"])
       m.repetitions = static_cast<unsigned>(yaml_.integer(n, "repetitions", 1, 100000));
     if (const auto n = map["warmup"]) m.warmup = static_cast<unsigned>(yaml_.integer(n, "warmup", 0, 1000));
+    if (const auto n = map["min_warmup_time"]) m.min_warmup_time = yaml_.number(n, "min_warmup_time (seconds)", 0.0, 3600.0);
     if (const auto n = map["min_time"]) m.min_time = yaml_.number(n, "min_time (seconds)", 0.0, 3600.0);
     if (const auto n = map["threads"]) threads_ = std::to_string(yaml_.integer(n, "threads", 1, kMaxThreads));
     if (const auto n = map["memory"]) m.memory = yaml_.bytes(n, "memory");
@@ -267,8 +268,11 @@ class ConfigReader {
   }
 
   void apply(const Overrides& overrides) {
+    refuse_repeated_axes(overrides.axes);
     for (const std::string& word : overrides.axes) apply_axis(word);
     if (overrides.threads) {
+      if (std::ranges::any_of(overrides.axes, [](const std::string& word) { return word.starts_with("threads="); }))
+        throw UserError("command line: --threads and threads= say the same; keep one");
       if (*overrides.threads < 1 || *overrides.threads > kMaxThreads) {
         throw UserError(
             fmt::format("--threads: an integer from 1 to {}, not {}", kMaxThreads, *overrides.threads));
@@ -278,6 +282,7 @@ class ConfigReader {
     }
     if (overrides.repetitions) experiment_.measure.repetitions = *overrides.repetitions;
     if (overrides.seed) experiment_.measure.seed = *overrides.seed;
+    if (overrides.min_warmup_time) experiment_.measure.min_warmup_time = *overrides.min_warmup_time;
     if (overrides.min_time) experiment_.measure.min_time = *overrides.min_time;
   }
 

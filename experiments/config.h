@@ -31,6 +31,7 @@ struct SceneChoice {
   bool moves = false;        ///< it has key frames, and its shutter opens
   std::string missing = {};  ///< why an optional scene is not here: its cells are skipped with this reason
   Placing placing = {};
+  std::string where = {};    ///< file:line, or `command line`
   /// The name without the placing: include, exclude and the command line may name all placings of a scene by it.
   [[nodiscard]] std::string family() const { return name.substr(0, name.size() - placing.label.size()); }
   [[nodiscard]] bool is_called(std::string_view word) const { return word == name || word == family(); }
@@ -46,6 +47,7 @@ struct CellChoice {
 struct MeasureSettings {
   unsigned repetitions = 7;
   unsigned warmup = 1;    ///< untimed passes over all rays before the first repetition
+  double min_warmup_time = 0.0;  ///< seconds that the untimed passes last at least
   double min_time = 0.2;  ///< seconds that one repetition lasts at least
   unsigned width = 512, height = 512;
   std::size_t memory = std::size_t{8} << 30;  ///< bytes of structures held at once
@@ -83,7 +85,7 @@ struct Overrides {
   std::vector<std::string> axes;  ///< `isa=avx2,avx512`, as typed
   std::optional<unsigned> repetitions = {}, threads = {};
   std::optional<std::uint64_t> seed = {};
-  std::optional<double> min_time = {};
+  std::optional<double> min_time = {}, min_warmup_time = {};
 };
 
 /// Whether a workload of the sweep starts on surfaces, so that RaySettings mean something.

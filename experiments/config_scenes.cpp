@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "scenes/catalogue.h"
+#include "scenes/generators/generators.h"
 
 namespace arboretum {
 namespace {
@@ -51,13 +52,20 @@ std::filesystem::path find_file(const YamlReader& yaml, const YAML::Node& node, 
   return text;
 }
 
+/// What `read` throws gets file and line of the node that asked for it.
+template <class Read>
+auto with_place(const YamlReader& yaml, const YAML::Node& node, const Read& read) {
+  try {
+    return read();
+  } catch (const UserError& e) {
+    yaml.fail(node, e.what());
+  }
+}
+
 SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::filesystem::path& folder, std::string& missing) {
   if (node.IsScalar()) {
-    try {
-      return named(yaml.text(node, "scene"));
-    } catch (const UserError& e) {
-      yaml.fail(node, e.what());
-    }
+    const std::string word = yaml.text(node, "scene");
+    return with_place(yaml, node, [&] { return named(word); });
   }
   yaml.check_map(node, "a scene", std::vector<std::string>{"file", "scene", "generate", "catalogue", "triangles", "seed", "optional",
                                                            "stretch", "size", "offset"});
@@ -92,6 +100,10 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
     spec.triangles = yaml.integer(n, "triangles", 1, std::uint64_t{1} << 31);
   if (const auto n = node["seed"])
     spec.seed = yaml.integer(n, "seed", 0, std::numeric_limits<std::uint64_t>::max());
+  if (!spec.generator.empty()) {
+    const YAML::Node& at = node["triangles"] && spec.triangles > kMaxGeneratedTriangles ? node["triangles"] : node["seed"] ? node["seed"] : node;
+    with_place(yaml, at, [&] { check_generated(spec.generator, spec.triangles, spec.seed); });
+  }
   return spec;
 }
 
@@ -141,9 +153,9 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
       const std::string name = fmt::format("{}{}", cell_word(spec.name()), placing.label);
       if (std::ranges::find(scenes, name, &SceneChoice::name) != scenes.end()) {
         yaml.fail(entry,
-                  fmt::format("scene '{}' is given twice; keep one, or give the files different names", name));
+                  fmt::format("scene '{}' is given twice; keep one, or name them apart: another file name, or {{scene: FILE.yaml}}, a scene file with a `name:` of its own", name));
       }
-      scenes.push_back({spec, name, moves, missing, placing});
+      scenes.push_back({spec, name, moves, missing, placing, yaml.where(entry)});
     }
   }
   return scenes;
@@ -151,9 +163,10 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
 
 SceneChoice scene_of_word(const std::string& word) {
   SceneSpec spec = parse_scene_word(word);
+  if (!spec.generator.empty()) check_generated(spec.generator, spec.triangles, spec.seed);
   std::string name = cell_word(spec.name());
   const bool moves = scene_moves(spec);
-  return {.spec = std::move(spec), .name = std::move(name), .moves = moves};
+  return {.spec = std::move(spec), .name = std::move(name), .moves = moves, .where = "command line"};
 }
 
 }  // namespace arboretum

@@ -96,8 +96,9 @@ std::string text(const Experiment& e, bool whole) {
   emit_choices(out, "exclude", e.exclude);
   const MeasureSettings& m = e.measure;
   out << YAML::Key << "measure" << YAML::Value << YAML::BeginMap << YAML::Key << "repetitions" << YAML::Value
-      << m.repetitions << YAML::Key << "warmup" << YAML::Value << m.warmup << YAML::Key << "min_time"
-      << YAML::Value << fmt::format("{}", m.min_time) << YAML::Key << "resolution" << YAML::Value
+      << m.repetitions << YAML::Key << "warmup" << YAML::Value << m.warmup;
+  if (whole || m.min_warmup_time > 0.0) out << YAML::Key << "min_warmup_time" << YAML::Value << fmt::format("{}", m.min_warmup_time);
+  out << YAML::Key << "min_time" << YAML::Value << fmt::format("{}", m.min_time) << YAML::Key << "resolution" << YAML::Value
       << YAML::Flow << YAML::BeginSeq << m.width << m.height << YAML::EndSeq << YAML::Key << "memory"
       << YAML::Value << m.memory << YAML::Key << "seed" << YAML::Value << m.seed;
   if (whole && !m.structure_cache.empty()) {

@@ -41,9 +41,9 @@ std::vector<double> estimate_seconds(const Experiment& experiment, const std::ve
   for (const Cell& cell : cells) {
     if (cell.metric == Cell::Metric::build) {
       const double a_triangle = 1.0 / triangles_per_second(cell.builder) + (cell.builder.ends_with("_reinsertion") ? 1.0 / kReinsertedPerSecond : 0.0);
-      seconds.push_back((1.0 + m.repetitions) * triangles[cell.scene_index] * a_triangle);
+      seconds.push_back((1.0 + m.repetitions) * triangles[cell.scene_index] * a_triangle + m.min_warmup_time);
     } else {
-      seconds.push_back(m.repetitions * std::max(m.min_time, pass) + (3.0 + m.warmup) * pass);
+      seconds.push_back(m.repetitions * std::max(m.min_time, pass) + 3.0 * pass + std::max(m.warmup * pass, m.min_warmup_time));
     }
   }
   return seconds;

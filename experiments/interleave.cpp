@@ -32,7 +32,9 @@ class SilentReporter final : public benchmark::BenchmarkReporter {
 }  // namespace
 
 void initialize_benchmark(const std::vector<std::string>& flags) {
-  std::vector<std::string> words{"arboretum", "--benchmark_enable_random_interleaving=true"};
+  // Its own warm-up would call a job like a repetition, with other iterations; cells are warmed up before. This goes before
+  // the environment's BENCHMARK_MIN_WARMUP_TIME.
+  std::vector<std::string> words{"arboretum", "--benchmark_enable_random_interleaving=true", "--benchmark_min_warmup_time=0"};
   words.insert(words.end(), flags.begin(), flags.end());
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "core/data_folder.h"
+#include "core/error.h"
 #include "experiments/append_file.h"
 
 extern char** environ;
@@ -34,11 +35,22 @@ int run_program(std::vector<std::string> words, bool quiet_out, bool quiet_error
   return WEXITSTATUS(status);
 }
 
+/// ARBORETUM_PYTHON; empty: not set.
+std::string chosen_python() {
+  const char* chosen = std::getenv("ARBORETUM_PYTHON");
+  return chosen ? chosen : "";
+}
+
+std::string python_problem() {
+  return fmt::format("ARBORETUM_PYTHON is '{}', which cannot be started or has no matplotlib and numpy; name an interpreter that has them, or unset it", chosen_python());
+}
+
 /// Runs a script of plots/ with its arguments. One line that says why not, or empty.
 std::string run_script(const char* name, const std::vector<std::string>& arguments, bool quiet) {
   const std::filesystem::path script = data_folder() / "plots" / name;
   if (!std::filesystem::exists(script)) return fmt::format("no plots: {} is missing; install again", script.string());
   const std::optional<std::string> python = find_plot_python();
+  if (!python && !chosen_python().empty()) return python_problem();
   if (!python) return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the results";
   std::vector<std::string> words{*python, script.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
@@ -50,14 +62,17 @@ std::string run_script(const char* name, const std::vector<std::string>& argumen
 
 std::optional<std::string> find_plot_python() {
   std::vector<std::string> candidates{"/usr/bin/python3", "python3"};
-  if (const char* chosen = std::getenv("ARBORETUM_PYTHON"); chosen && *chosen)
-    candidates.insert(candidates.begin(), chosen);
+  if (std::string chosen = chosen_python(); !chosen.empty()) candidates = {std::move(chosen)};
   for (const std::string& python : candidates) {
     const char* kTry =
         "import sys, importlib.util as u; sys.exit(not (u.find_spec('matplotlib') and u.find_spec('numpy')))";
     if (run_program({python, "-c", kTry}, true, true) == 0) return python;
   }
   return std::nullopt;
+}
+
+void require_chosen_python() {
+  if (!chosen_python().empty() && !find_plot_python()) throw UserError(python_problem());
 }
 
 std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/timer.h"
+#include "experiments/warm_up.h"
 
 namespace arboretum {
 
@@ -47,7 +48,7 @@ void RenderJob::prepare(Json& facts, SceneData& data, const MeasureSettings& mea
   }
   if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";
 
-  for (unsigned i = 0; i < measure.warmup; ++i) static_cast<void>(render());
+  warm_up(measure.warmup, measure.min_warmup_time, [&] { static_cast<void>(render()); });
   const double begin = wall_seconds();
   const RenderStatistics statistics = render();
   const double pass = std::max(wall_seconds() - begin, 1e-9);

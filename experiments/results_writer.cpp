@@ -1,6 +1,7 @@
 #include "experiments/results_writer.h"
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 namespace arboretum {
@@ -18,6 +19,24 @@ Json flattened(const Json& entry) {
   return flat;
 }
 
+/// A coefficient of variation is a ratio and keeps its value.
+void express_in(Json& entry, const std::string& unit) {
+  if (unit == "ms") return;
+  const double factor = unit == "ns" ? 1e6 : unit == "us" ? 1e3 : 1e-3;
+  if (entry.value("aggregate_unit", "time") == "time")
+    for (const char* key : {"real_time", "cpu_time"}) entry[key] = entry[key].get<double>() * factor;
+  entry["time_unit"] = unit;
+}
+
+std::vector<Json> entries_of(const CellResult& result, const ResultForm& form, bool repetitions, bool aggregates) {
+  std::vector<Json> entries;
+  if (repetitions)
+    for (const Repetition& repetition : result.repetitions) entries.push_back(repetition_entry(result, repetition));
+  if (aggregates) std::ranges::move(aggregate_entries(result), std::back_inserter(entries));
+  for (Json& entry : entries) express_in(entry, form.time_unit);
+  return entries;
+}
+
 }  // namespace
 
 std::string plain_text(const Json& value) {
@@ -32,7 +51,7 @@ std::string csv_field(const Json& value) {
   return quoted + "\"";
 }
 
-std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context) {
+std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context, const ResultForm& form) {
   context["cells"] = outcome.results.size();
   context["excluded_cells"] = plan.excluded;
   context["filtered_cells"] = plan.filtered;
@@ -43,13 +62,10 @@ std::string results_json(const RunOutcome& outcome, const Plan& plan, Json conte
   document["context"] = std::move(context);
   Json& benchmarks = document["benchmarks"] = Json::array();
   for (std::size_t i = 0; i < outcome.results.size(); ++i) {
-    const CellResult& result = outcome.results[i];
-    const auto add = [&](Json entry) {
+    for (Json& entry : entries_of(outcome.results[i], form, !form.aggregates_only, true)) {
       entry["family_index"] = i, entry["per_family_instance_index"] = 0;
       benchmarks.push_back(std::move(entry));
-    };
-    for (const Repetition& repetition : result.repetitions) add(repetition_entry(result, repetition));
-    for (Json& entry : aggregate_entries(result)) add(std::move(entry));
+    }
   }
   Json& skipped = document["skipped"] = Json::array();
   for (const auto* list : {&plan.skipped, &outcome.failed})
@@ -58,12 +74,12 @@ std::string results_json(const RunOutcome& outcome, const Plan& plan, Json conte
   return document.dump(1) + "\n";
 }
 
-std::string results_csv(const RunOutcome& outcome) {
+std::string results_csv(const RunOutcome& outcome, const ResultForm& form) {
   std::vector<Json> rows;
   std::vector<std::string> columns;
   for (const CellResult& result : outcome.results) {
-    for (const Repetition& repetition : result.repetitions) {
-      rows.push_back(flattened(repetition_entry(result, repetition)));
+    for (const Json& entry : entries_of(result, form, !form.aggregates_only, form.aggregates_only)) {
+      rows.push_back(flattened(entry));
       for (const auto& [key, value] : rows.back().items())
         if (std::ranges::find(columns, key) == columns.end()) columns.push_back(key);
     }

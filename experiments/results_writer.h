@@ -8,11 +8,17 @@
 
 namespace arboretum {
 
+/// What a copy of the results leaves out, and the unit of its `real_time` and `cpu_time`.
+struct ResultForm {
+  bool aggregates_only = false;
+  std::string time_unit = "ms";  ///< ns, us, ms or s
+};
+
 /// `context`, `benchmarks` (every cell's repetitions, then its aggregates) `skipped` (name and reason)
 /// and, of a merge that lacks some, `missing`.
-[[nodiscard]] std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context);
-/// One row a repetition; empty where a figure does not apply.
-[[nodiscard]] std::string results_csv(const RunOutcome& outcome);
+[[nodiscard]] std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context, const ResultForm& form = {});
+/// One row a repetition (or aggregate, where `form` says so); empty where a figure does not apply.
+[[nodiscard]] std::string results_csv(const RunOutcome& outcome, const ResultForm& form = {});
 
 /// A value as people read it: strings without their quotes.
 [[nodiscard]] std::string plain_text(const Json& value);

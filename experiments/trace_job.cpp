@@ -7,6 +7,7 @@
 
 #include "core/timer.h"
 #include "experiments/exclusion.h"
+#include "experiments/warm_up.h"
 
 namespace arboretum {
 namespace {
@@ -101,7 +102,7 @@ void TraceJob::prepare(Json& facts, SceneData& data, const MeasureSettings& meas
   add_facts(facts, count());
   if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";
 
-  for (unsigned i = 0; i < measure.warmup; ++i) trace(rays);
+  warm_up(measure.warmup, measure.min_warmup_time, [&] { trace(rays); });
   const double begin = wall_seconds();
   trace(rays);
   const double pass = std::max(wall_seconds() - begin, 1e-9);

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 #include <tuple>
 
 #include <tbb/parallel_sort.h>
 
 #include "core/instances.h"
+#include "scenes/images.h"
 #include "scenes/vec3d.h"
 
 namespace arboretum {
@@ -92,7 +94,14 @@ SceneInfo inspect_scene(const Scene& scene) {
     info.instances = mesh.instancing->instances.size(), info.prototypes = mesh.instancing->prototypes.size();
     for (const TriangleMesh& prototype : mesh.instancing->prototypes) info.prototype_triangles += prototype.size();
   }
+  info.named_instances = scene.instances;
   info.effects = effects_of(scene);
+  std::set<std::string> images;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i)
+    if (used[i])
+      for (const std::string& image : {scene.materials[i].diffuse_map, scene.materials[i].opacity_map})
+        if (!image.empty() && images.insert(image).second && !value_range(image))
+          info.report.warnings.push_back(image + ": no image that can be read; its material goes without");
   return info;
 }
 

@@ -25,6 +25,19 @@ AffineMap as_map(const Transform& t) {
   return map;
 }
 
+/// Cell names are parted by '/'.
+std::string name_of(const YamlFile& file) {
+  const YAML::Node node = file.root()["name"];
+  if (!node) return file.path().stem().string();
+  for (const auto& entry : file.root())  // what is not there has the next line for its place
+    if (entry.first.IsScalar() && entry.first.Scalar() == "name" && entry.second.IsNull()) file.fail(entry.first, "name has no value; give one or take the line out");
+  const std::string name = file.text(node, "name");
+  const auto is_bad = [](unsigned char c) { return c == '/' || c < ' ' || c == 127; };
+  if (std::ranges::any_of(name, is_bad) || name.find_first_not_of(' ') == std::string::npos)
+    file.fail(node, fmt::format("name '{}' cannot be a part of a cell's name: leave out '/' and control characters, and have more than blanks", one_line(name)));
+  return name;
+}
+
 class SceneFile {
  public:
   explicit SceneFile(const std::filesystem::path& path) : file_(path) {}
@@ -33,7 +46,7 @@ class SceneFile {
     const YAML::Node& root = file_.root();
     file_.check_keys(root, "the scene",
                      {"name", "source", "meshes", "camera", "shutter", "environment", "lights", "instances"});
-    scene_.name = root["name"] ? file_.text(root["name"], "name") : file_.path().stem().string();
+    scene_.name = name_of(file_);
     if (root["source"]) static_cast<void>(file_.text(root["source"], "source"));
     if (root["camera"]) scene_.camera = file_.camera(root["camera"]);
     if (root["shutter"]) read_shutter(root["shutter"]);
@@ -56,6 +69,16 @@ class SceneFile {
     bool instanced = false;
   };
 
+  /// What `read` throws gets file and line of the node that names what is read.
+  template <class Read>
+  auto at(const YAML::Node& node, const Read& read) {
+    try {
+      return read();
+    } catch (const UserError& e) {
+      file_.fail(node, e.what());
+    }
+  }
+
   void read_shutter(const YAML::Node& node) {
     if (!node.IsSequence() || node.size() != 2) file_.fail(node, "shutter must be [open, close]");
     scene_.shutter = {float(file_.number(node[0], "shutter open")),
@@ -72,7 +95,7 @@ class SceneFile {
       return;
     }
     const std::filesystem::path image = file_.beside(file_.text(node["image"], "environment image"));
-    scene_.environment = mean_radiance(read_radiance(image));
+    scene_.environment = at(node["image"], [&] { return mean_radiance(read_radiance(image)); });
     scene_.environment_image = image.string();
   }
 
@@ -113,35 +136,36 @@ class SceneFile {
     file_.check_list(node, "meshes");
     for (const YAML::Node& entry : node) {
       std::vector<std::string> frames;
+      std::vector<YAML::Node> places;  // of the frames
       std::string name;
       if (entry.IsScalar()) {
-        frames.push_back(file_.text(entry, "a mesh"));
+        frames.push_back(file_.text(entry, "a mesh")), places.push_back(entry);
       } else {
         file_.check_keys(entry, "a mesh", {"file", "keyframes", "name"});
         if (bool(entry["file"]) == bool(entry["keyframes"]))
           file_.fail(entry, "a mesh is a path, {file: path} or {keyframes: [paths]}");
         if (entry["name"]) name = file_.text(entry["name"], "a mesh's name");
-        if (entry["file"]) frames.push_back(file_.text(entry["file"], "a mesh's file"));
+        if (entry["file"]) frames.push_back(file_.text(entry["file"], "a mesh's file")), places.push_back(entry["file"]);
         if (entry["keyframes"]) {
           file_.check_list(entry["keyframes"], "keyframes");
           for (const YAML::Node& frame : entry["keyframes"])
-            frames.push_back(file_.text(frame, "a key frame"));
+            frames.push_back(file_.text(frame, "a key frame")), places.push_back(frame);
         }
       }
       if (name.empty()) name = std::filesystem::path(frames.front()).stem().string();
       Part part{.name = name,
-                .model = read_model(file_.beside(frames.front())),
+                .model = at(places.front(), [&] { return read_model(file_.beside(frames.front())); }),
                 .first_material = 0,
                 .instanced = false};
-      read_key_frames(entry, frames, part.model);
+      read_key_frames(entry, frames, places, part.model);
       parts_.push_back(std::move(part));
     }
   }
 
   /// The later frames must have the first one's triangles, corner by corner.
-  void read_key_frames(const YAML::Node& node, const std::vector<std::string>& frames, Scene& first) {
+  void read_key_frames(const YAML::Node& node, const std::vector<std::string>& frames, const std::vector<YAML::Node>& places, Scene& first) {
     for (std::size_t i = 1; i < frames.size(); ++i) {
-      Scene frame = read_model(file_.beside(frames[i]));
+      Scene frame = at(places[i], [&] { return read_model(file_.beside(frames[i])); });
       if (frame.mesh.triangles != first.mesh.triangles ||
           frame.mesh.vertices.size() != first.mesh.vertices.size())
         file_.fail(node, fmt::format("key frame '{}' has other triangles than '{}'", frames[i], frames[0]));
@@ -275,6 +299,10 @@ class SceneFile {
 
 Scene read_scene_yaml(const std::filesystem::path& path) {
   return SceneFile(path).read();
+}
+
+std::string scene_file_name(const std::filesystem::path& path) {
+  return name_of(YamlFile(path));
 }
 
 bool scene_file_moves(const std::filesystem::path& path) {

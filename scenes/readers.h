@@ -23,6 +23,8 @@ namespace arboretum {
                                              std::vector<std::string>& warnings);
 /// A scene file of the project. Throws UserError.
 [[nodiscard]] Scene read_scene_yaml(const std::filesystem::path& path);
+/// Its `name:`, or the file's stem where it gives none; models are not read. Throws UserError for a name that cannot be part of a cell's.
+[[nodiscard]] std::string scene_file_name(const std::filesystem::path& path);
 /// Whether a mesh of the scene file has key frames and its shutter opens; models are not read.
 [[nodiscard]] bool scene_file_moves(const std::filesystem::path& path);
 

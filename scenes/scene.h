@@ -89,8 +89,8 @@ struct SceneSpec {
   std::string generator;        ///< `{generate: sphere_flake, triangles: 100000, seed: 1}`
   std::size_t triangles = 100000;
   std::uint64_t seed = 1;
-  /// What cells are named after: `bunny`, `model`, `sphere_flake-100000`, with `-seed2` when the seed is
-  /// not 1.
+  /// What cells are named after: `bunny`, `model`, a scene file's `name:` (else its stem), `sphere_flake-100000`, with
+  /// `-seed2` when the seed is not 1. Throws UserError for a scene file that cannot be read as YAML, or whose name is of no use.
   [[nodiscard]] std::string name() const;
 };
 

@@ -68,6 +68,8 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {epsilon: 1e-3}\n", ":3", "no effect without self_intersection: epsilon"},
       {"scenes: [bunny]\naxes: {workload: [primary]}\nrays: {self_intersection: [none]}\n", ":3", "rays has no effect"},
       {"scenes: [{generate: sphere, offset: [1, 1]}]\n", ":1", "given twice"},
+      {"scenes:\n  - {generate: sphere_flake, seed: 2}\n", ":2", "seed: 2 would change nothing"},
+      {"scenes:\n  - {generate: sphere_flake, triangles: 1000000000}\n", ":2", "is not within 1 to 500000000"},
       {"scenes: [{generate: sphere, offset: far}]\n", ":1", "offset must be a number"},
       {"scenes: [{generate: sphere, stretch: 0}]\n", ":1", "stretch must be a number"},
       {"scenes: [{generate: sphere, ofset: 1}]\n", ":1", "did you mean 'offset'"},
@@ -314,7 +316,7 @@ TEST_CASE("the effective configuration can be run again and means the same") {
   const Registry registry = paper_registry();
   const fs::path file = folder.write("first.yaml", R"(
 experiment: first
-scenes: [{generate: sphere, triangles: 500, seed: 3}]
+scenes: [{generate: random_triangles, triangles: 500, seed: 3}]
 axes: {structure: [tree], isa: [sse]}
 include: [{structure: list, intersector: moller_trumbore}]
 parameters: {bins: [8, 16]}

@@ -128,14 +128,40 @@ TEST_CASE("Google Benchmark's flags: ours are taken, wrong ones are named") {
                                  "a.yaml",
                                  "--benchmark_repetitions=3",
                                  "--benchmark_min_time=0.5s",
+                                 "--benchmark_min_warmup_time=0.1",
                                  "--benchmark_filter=bvh8",
-                                 "--benchmark_v=1"};
+                                 "--benchmark_context=host=a,note=x=y",
+                                 "--benchmark_enable_random_interleaving=no"};
   const BenchmarkFlags flags = take_benchmark_flags(words);
   CHECK(words == std::vector<std::string>{"run", "a.yaml"});
   CHECK(flags.repetitions == 3u);
   CHECK(flags.min_time == 0.5);
   CHECK(flags.filter == "bvh8");
-  CHECK(flags.others == std::vector<std::string>{"--benchmark_v=1"});
+  CHECK(flags.min_warmup_time == 0.1);
+  CHECK(flags.context == std::vector<std::pair<std::string, std::string>>{{"host", "a"}, {"note", "x=y"}});
+  CHECK(flags.others == std::vector<std::string>{"--benchmark_enable_random_interleaving=false"});
+  std::vector<std::string> negated{"--benchmark_filter=-bvh8"}, all{"--benchmark_filter=all"};
+  CHECK(take_benchmark_flags(negated).skip == "bvh8");
+  CHECK((take_benchmark_flags(all).filter.empty() && take_benchmark_flags(all).skip.empty()));
+  for (const auto& [flag, part] : {std::pair{"--benchmark_v=1", "unknown flag of Google Benchmark '--benchmark_v'"},
+                                   {"--benchmark_min_tim=1", "did you mean '--benchmark_min_time'"},
+                                   {"--benchmark_color=true", "no effect"},
+                                   {"--benchmark_counters_tabular=true", "no effect"},
+                                   {"--benchmark_perf_counters=CYCLES", "no effect"},
+                                   {"--benchmark_time_unit=us", "add --benchmark_out"},
+                                   {"--benchmark_time_unit=hours", "one of ns, us, ms, s"},
+                                   {"--benchmark_report_aggregates_only", "add --benchmark_out"},
+                                   {"--benchmark_display_aggregates_only=true", "add --benchmark_format"},
+                                   {"--benchmark_out_format=csv", "without --benchmark_out"},
+                                   {"--benchmark_enable_random_interleaving=perhaps", "one of true, false"},
+                                   {"--benchmark_context=foo", "key=value"},
+                                   {"--benchmark_context==x", "key=value"},
+                                   {"--benchmark_context=a=1,a=2", "given twice"}}) {
+    std::vector<std::string> one{flag};
+    CHECK(error_of([&] { (void)take_benchmark_flags(one); }).find(part) != std::string::npos);
+  }
+  std::vector<std::string> twice{"--benchmark_filter=a", "--benchmark_filter=b"};
+  CHECK(error_of([&] { (void)take_benchmark_flags(twice); }).find("given twice") != std::string::npos);
   std::vector<std::string> wrong{"--benchmark_repetitions=many"};
   CHECK(error_of([&] { (void)take_benchmark_flags(wrong); }).find("a number from 1") != std::string::npos);
   std::vector<std::string> format{"--benchmark_format=xml"};

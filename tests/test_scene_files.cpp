@@ -24,7 +24,7 @@ TEST_CASE("scene files: everything that they may hold") {
       "0, 0, 1]\n"
       "      - {translate: [0, 0, 5], rotate: {axis: [0, 0, 1], degrees: 90}, scale: 2}\n"));
   REQUIRE(scene.mesh.size() == 12);
-  CHECK(scene.name == "s");
+  CHECK(scene.name == "two things");
   CHECK(scene.instances == 2);
   // Instanced meshes stand where their instances say, the other one once where it is; these come last.
   CHECK(scene.mesh.corners(0)[1] == Vec3f{11, 20, 30});
@@ -78,7 +78,16 @@ TEST_CASE("bad scene files: file, line, and the nearest key") {
       {"meshes: [a.obj\n", ":2:"},
       {"meshes:\n\t- a.obj\n", ":2:"},
       {"meshes: [a.obj]\nmeshes: [a.obj]\n", ":2: the scene names 'meshes' twice"},
-      {"meshes: [b.obj]\n", "b.obj: no such file"},
+      {"meshes:\n  - a.obj\n  - b.obj\n", "s.yaml:3: "},
+      {"meshes:\n  - a.obj\n  - b.obj\n", "b.obj: no such file; check the path"},
+      {"meshes:\n  - {file: b.obj}\n", "s.yaml:2: "},
+      {"meshes:\n  - keyframes:\n    - a.obj\n    - b.obj\nshutter: [0, 1]\n", "s.yaml:4: "},
+      {"meshes: [a.obj]\nenvironment:\n  image: x.hdr\n", "s.yaml:3: "},
+      {"name: a/b\nmeshes: [a.obj]\n", "s.yaml:1: name 'a/b' cannot be a part of a cell's name"},
+      {"meshes: [a.obj]\nname: ''\n", "s.yaml:2: name must be a text"},
+      {"meshes: [a.obj]\nname:\n", "s.yaml:2: name has no value"},
+      {"meshes: [a.obj]\nname: ' '\n", "s.yaml:2: name '' cannot be a part of a cell's name"},
+      {"meshes: [a.obj]\nname: \"a\\tb\"\n", "s.yaml:2: name 'a b' cannot be a part of a cell's name"},
       {"meshes: [{path: a.obj}]\n", ":1: unknown key of a mesh 'path'"},
       {"meshes: [a.obj]\ncamera:\n  position: [0, 0, 1]\n  lookat: [0, 0, 0]\n",
        ":4: unknown key of camera 'lookat'; did you mean 'look_at'?"},
@@ -137,6 +146,9 @@ TEST_CASE("words of the command line, and what scenes are called") {
   CHECK(generated.name() == "needles-5000-seed7");
   CHECK(parse_scene_word("city:12").name() == "city-12");
   CHECK(parse_scene_word("models/a.obj").name() == "a");
+  CHECK(parse_scene_word("not_there.yaml").name() == "not_there");
+  CHECK(parse_scene_word(folder.write("room.yaml", "meshes: [none.obj]\n").string()).name() == "room");
+  CHECK(parse_scene_word(folder.write("room.yaml", "meshes: [none.obj]\nname: chamber\n").string()).name() == "chamber");
   CHECK_THAT(error_of([] { (void)parse_scene_word("buny"); }), Catch::Contains("did you mean 'bunny'?"));
   CHECK_THAT(error_of([] { (void)parse_scene_word("citty:100"); }), Catch::Contains("did you mean 'city'?"));
   CHECK_THAT(error_of([] { (void)parse_scene_word("city:many"); }),
@@ -194,6 +206,21 @@ TEST_CASE("inspection counts what is wrong with a mesh") {
   const Scene sphere = load_scene(parse_scene_word("sphere:500"));
   CHECK(inspect_scene(sphere).closed);
   CHECK(inspect_scene(sphere).edges == 750);
+}
+
+TEST_CASE("inspection tells images that cannot be read, of used materials alone, and instances of what moves") {
+  const Folder folder;
+  folder.write("a.mtl", "newmtl wall\nKd 1 1 1\nmap_Kd none.png\nmap_d none.png\nnewmtl unused\nmap_Kd other.png\n");
+  folder.write("a.obj", "mtllib a.mtl\nusemtl wall\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  folder.write("b.obj", "v 0 0 9\nv 1 0 9\nv 0 1 9\nf 1 2 3\n");
+  folder.write("c.obj", "v 0 0 8\nv 1 0 9\nv 0 1 9\nf 1 2 3\n");
+  const std::string meshes = "instances: [{mesh: a, transforms: [{translate: [2, 0, 0]}, {translate: [4, 0, 0]}]}]\nmeshes: [a.obj, ";
+  const SceneInfo still = inspect_scene(load_file(folder.write("still.yaml", meshes + "b.obj]\n")));
+  REQUIRE(still.report.warnings.size() == 1);
+  CHECK_THAT(still.report.warnings[0], Catch::Contains("none.png: no image that can be read"));
+  CHECK((still.instances == 3 && still.named_instances == 2));
+  const SceneInfo moving = inspect_scene(load_file(folder.write("moving.yaml", meshes + "{keyframes: [b.obj, c.obj]}]\nshutter: [0, 1]\n")));
+  CHECK((moving.instances == 0 && moving.named_instances == 2 && moving.key_frames == 2));
 }
 
 TEST_CASE("effects: called for exactly where something needs them") {

@@ -40,7 +40,10 @@ std::span<const GeneratorInfo> generators() {
   return kInfos;
 }
 
-Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t seed) {
+namespace {
+
+/// The generator's place in the table.
+std::size_t checked(std::string_view name, std::size_t triangles, std::uint64_t seed) {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < std::size(kInfos); ++i) {
     names.emplace_back(kInfos[i].name);
@@ -52,11 +55,21 @@ Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t
       throw UserError(fmt::format(
           "generator {}: seed: {} would change nothing, since its shape has nothing random; leave it out",
           name, seed));
-    Scene scene = kFunctions[i](triangles, seed);
-    sanitise(scene, fmt::format("generator {}", name));
-    return scene;
+    return i;
   }
   throw UserError(unknown_name_message("generator", name, names));
+}
+
+}  // namespace
+
+void check_generated(std::string_view name, std::size_t triangles, std::uint64_t seed) {
+  static_cast<void>(checked(name, triangles, seed));
+}
+
+Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t seed) {
+  Scene scene = kFunctions[checked(name, triangles, seed)](triangles, seed);
+  sanitise(scene, fmt::format("generator {}", name));
+  return scene;
 }
 
 }  // namespace arboretum

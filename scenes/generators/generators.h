@@ -25,6 +25,8 @@ struct GeneratorInfo {
 /// Most triangles that a generator makes.
 inline constexpr std::size_t kMaxGeneratedTriangles = 500'000'000;
 
+/// What generate_scene() refuses, without generating.
+void check_generated(std::string_view name, std::size_t triangles, std::uint64_t seed);
 /// Throws UserError for an unknown name, a count of 0 or beyond kMaxGeneratedTriangles, or a seed other than
 /// 1 where the generator takes none.
 [[nodiscard]] Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t seed);

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The command line from outside: test_cli.py ARBORETUM. Exit statuses, one-line errors, kill and resume, full disks."""
 
+import csv
 import json
 import os
 import resource
@@ -35,6 +36,10 @@ class CommandLine(CommandLineCase):
             (("run", self.config, "iza=sse"), "did you mean 'isa'"),
             (("run", self.config, "isa=ssse"), "did you mean 'sse'"),
             (("run", self.config, "isa="), "empty"),
+            (("run", self.config, "structure=bvh4", "isa=sse", "structure=bvh2"), "structure is given twice"),
+            (("run", self.config, "threads=1", "--threads", "2"), "keep one"),
+            (("run", self.config, "scene=sphere_flake:100:2", "--list"), "seed: 2 would change nothing"),
+            (("verify", "sphere:100", "isa=scalar", "isa=scalar"), "isa is given twice"),
             (("run", self.config, "--filter", "("), "regular expression"),
             (("run", self.config, "--benchmark_nonsense=1"), "--benchmark_nonsense"),
             (("list", "structurs"), "did you mean 'structures'"),
@@ -92,6 +97,55 @@ class CommandLine(CommandLineCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("dropped 1 triangles with NaN", result.stderr)
 
+    def test_a_scene_that_does_not_load_leaves_earlier_results(self):
+        bad = self.write("bad.yaml", CONFIG.replace("[{generate: sphere_flake, triangles: 2000}]", "\n  - {generate: sphere_flake, triangles: 2000}\n  - {file: model.obj}"))
+        small = ("--filter", "trace.*bvh4.*watertight.*scalar/primary", "--no-plots")
+        self.write("model.obj", CUBE)
+        self.assertEqual(self.call("run", bad, *small, "--out", "out").returncode, 0)
+        before = {p.name: p.read_bytes() for p in (self.folder / "out").iterdir()}
+        self.write("model.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        self.assert_error(self.call("run", bad, *small, "--out", "out"), "bad.yaml:4: ", "model.obj")
+        self.assertEqual({p.name: p.read_bytes() for p in (self.folder / "out").iterdir()}, before)
+        self.assert_error(self.call("run", bad, *small, "--out", "other"), "bad.yaml:4: ")
+        self.assertFalse((self.folder / "other").exists())
+        unconcerned = ("--filter", "sphere_flake.*bvh4.*watertight.*scalar/primary", "--skip", "^build", "--no-plots")
+        self.assertEqual(self.call("run", bad, *unconcerned, "--out", "other").returncode, 0)
+
+    def test_a_scene_file_is_called_by_its_name(self):
+        self.write("model.obj", CUBE)
+        (self.folder / "sub").mkdir()
+        self.write("sub/model.obj", CUBE)
+        config = CONFIG.replace("{generate: sphere_flake, triangles: 2000}", "{file: model.obj}, {file: sub/model.obj}")
+        self.assert_error(self.call("run", self.write("two.yaml", config), "--list"), "two.yaml:2: scene 'model' is given twice", "a scene file with a `name:`")
+        scene = self.write("sub/scene.yaml", "name: other cube\nmeshes: [model.obj]\n")
+        config = config.replace("{file: sub/model.obj}", "{scene: sub/scene.yaml}")
+        names = self.call("run", self.write("two.yaml", config), "--list").stdout.splitlines()
+        self.assertEqual({name.split("/")[1] for name in names}, {"model", "other_cube"})
+        self.assertEqual(json.loads(self.call("info", scene, "--json").stdout)["name"], "other cube")
+        out = self.call("run", self.folder / "two.yaml", "--list", "scene=other_cube").stdout.splitlines()
+        self.assertEqual(out, [name for name in names if "/other_cube/" in name])
+        scene.write_text("meshes: [model.obj]\nname: a/b\n")
+        self.assert_error(self.call("run", self.folder / "two.yaml", "--list"), "scene.yaml:2: name 'a/b'")
+
+    def test_figures_of_an_earlier_run_go_and_other_files_stay(self):
+        few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build", "--out", "out")
+        (self.folder / "out").mkdir()
+        for name in ("sah_cost.png", "rays_per_second.svg", "mine.png", "sah_cost.png.txt", "report.html"):
+            self.write(f"out/{name}", "old")
+        self.assertEqual(self.run_small(*few).returncode, 0)
+        left = {p.name for p in (self.folder / "out").iterdir()}
+        self.assertEqual(left & {"sah_cost.png", "rays_per_second.svg", "mine.png", "sah_cost.png.txt", "report.html"}, {"mine.png", "sah_cost.png.txt"})
+
+    def test_a_chosen_interpreter_that_cannot_draw_is_an_error(self):
+        few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build")
+        self.assertEqual(self.run_small(*few, "--out", "out").returncode, 0)
+        wrong = {**os.environ, "ARBORETUM_PYTHON": "/nonexistent/python3"}
+        self.assert_error(self.call("plot", "out", env=wrong), "ARBORETUM_PYTHON is '/nonexistent/python3'")
+        self.assert_error(self.call("compare", "out", "out", "--plot", "a.svg", env=wrong), "ARBORETUM_PYTHON")
+        self.assert_error(self.call("run", self.config, *few, "--out", "other", env=wrong), "ARBORETUM_PYTHON")
+        self.assertFalse((self.folder / "other").exists())
+        self.assertEqual(self.run_small(*few, "--out", "other", env=wrong).returncode, 0)
+
     def test_a_run_leaves_what_the_contract_says(self):
         result = self.run_small()
         self.assertIn(result.returncode, (0, 1), result.stderr)
@@ -132,6 +186,40 @@ class CommandLine(CommandLineCase):
         self.assertFalse((self.folder / "results").exists())
         nothing = self.run_small("--filter", "nothing-has-this-name")
         self.assert_error(nothing, "nothing to measure", status=4)
+
+    def test_flags_of_google_benchmark(self):
+        few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build", "--out", "out")
+        every = self.cells()
+        self.assertEqual(self.cells("--benchmark_filter=all"), every)
+        self.assertEqual(self.cells("--benchmark_filter=-bvh4"), [n for n in every if "bvh4" not in n])
+        self.assertEqual(self.cells("--benchmark_filter=bvh4", "--filter", "sse", "--skip", "^build"),
+                         [n for n in every if "bvh4" in n and "/sse/" in n and not n.startswith("build")])
+        result = self.run_small(*few, "--benchmark_min_warmup_time=0.05", "--benchmark_context=foo=bar,note=two words", "--benchmark_out=copy.json",
+                                "--benchmark_time_unit=us", "--benchmark_report_aggregates_only=true")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        document = json.loads((self.folder / "out/results.json").read_text())
+        self.assertEqual((document["context"]["foo"], document["context"]["note"]), ("bar", "two words"))
+        cells = read_jsonl(self.folder / "out/cells.jsonl")
+        self.assertTrue(all([r["repetition_index"] for r in c["repetitions"]] == [0, 1, 2] for c in cells))
+        self.assertIn("min_warmup_time: 0.05", (self.folder / "out/effective.yaml").read_text())
+        copy = json.loads((self.folder / "copy.json").read_text())
+        self.assertEqual({b["run_type"] for b in copy["benchmarks"]}, {"aggregate"})
+        medians = [{b["name"]: b for b in d["benchmarks"] if b.get("aggregate_name") == "median"} for d in (document, copy)]
+        self.assertEqual(medians[0].keys(), medians[1].keys())
+        for name, entry in medians[0].items():
+            self.assertAlmostEqual(medians[1][name]["real_time"] / entry["real_time"], 1000, places=3)
+            self.assertEqual(medians[1][name]["time_unit"], "us")
+        shown = self.run_small(*few, "--benchmark_format=csv", "--benchmark_display_aggregates_only")
+        rows = list(csv.DictReader(shown.stdout.splitlines()))
+        self.assertEqual({row["aggregate_name"] for row in rows}, {"mean", "median", "stddev", "cv"})
+
+        (self.folder / "out").rename(self.folder / "kept")
+        self.assert_error(self.run_small(*few, "--benchmark_context=cpu=mine"), "has a 'cpu' of its own")
+        self.assert_error(self.run_small(*few, "--benchmark_repetitions=3", "--repetitions", "3"), "keep one")
+        self.assert_error(self.run_small(*few, "--benchmark_color=true"), "no effect")
+        self.assertFalse((self.folder / "out").exists())
+        lasting = {**os.environ, "BENCHMARK_MIN_WARMUP_TIME": "0.1"}
+        self.assertEqual(self.run_small(*few, env=lasting).returncode, 0)
 
     def test_an_isa_that_is_lacking_is_skipped_by_name(self):
         result = self.run_small("isa=scalar,sse", "workload=primary", env={**os.environ, "ARBORETUM_ISA": "scalar"})
@@ -216,6 +304,17 @@ class CommandLine(CommandLineCase):
         info = json.loads(self.call("info", "sphere_flake:2000", "--json").stdout)
         self.assertGreater(info["triangles"], 1000)
         self.assertIn("triangles", self.call("info", "sphere_flake:2000").stdout)
+        self.write("a.mtl", "newmtl wall\nKd 1 1 1\nmap_Kd none.png\n")
+        self.write("a.obj", "mtllib a.mtl\nusemtl wall\n" + CUBE)
+        self.write("b.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
+        scene = self.write("moving.yaml", "meshes: [a.obj, {keyframes: [a.obj, b.obj]}]\nshutter: [0, 1]\n"
+                           "instances: [{mesh: 0, transforms: [{translate: [2, 0, 0]}, {translate: [4, 0, 0]}]}]\n")
+        info = json.loads(self.call("info", scene, "--json").stdout)
+        self.assertEqual((info["instances"], info["instances_in_scene_file"]), (0, 2))
+        self.assertEqual(len([w for w in info["warnings"] if "none.png: no image" in w]), 1)
+        text = self.call("info", scene).stdout
+        self.assertIn("instances     2 named by the scene, laid out in one mesh because it moves", text)
+        self.assertIn("none.png: no image", text)
 
     def test_fail_fast_stops_at_the_first_wrong_answer(self):
         result = self.run_small("--fail-fast", "--skip", "^build")
