@@ -83,15 +83,26 @@ void refuse_other_shard(const std::filesystem::path& folder, const Shard& shard)
                               before->shard.is_whole() ? "results of the whole plan" : "shard " + before->shard.text(), shard.text()));
 }
 
-/// What a run that goes on has under other conditions than its beginning: its results then do not compare with each other.
-std::vector<std::string> changed_conditions(const std::filesystem::path& folder, const Json& now) {
+/// How two runs differ that should be one; empty where their results compare with each other.
+std::vector<std::string> differing_conditions(const Json& before, const Json& now) {
+  std::vector<std::string> differences;
+  for (const std::string& difference : machine_differences(before, now)) differences.push_back("begun under other conditions: " + difference);
+  const std::string then = before.value("git_revision", ""), at = now.value("git_revision", "");
+  if (then != at) differences.push_back(fmt::format("begun at revision {}, gone on with at {}", then.substr(0, 12), at.substr(0, 12)));
+  return differences;
+}
+
+/// The contexts of a run that is gone on with, one for each of its conditions that are not those of now.
+std::vector<Json> other_contexts(const std::filesystem::path& folder, const Json& now) {
   const std::optional<PlanRecord> before = read_plan_record(folder);
   if (!before) return {};
-  std::vector<std::string> warnings;
-  for (const std::string& difference : machine_differences(before->context, now)) warnings.push_back("begun under other conditions: " + difference);
-  const std::string then = before->context.value("git_revision", ""), at = now.value("git_revision", "");
-  if (then != at) warnings.push_back(fmt::format("begun at revision {}, gone on with at {}", then.substr(0, 12), at.substr(0, 12)));
-  return warnings;
+  std::vector<Json> all = before->earlier, others;
+  all.push_back(before->context);
+  for (const Json& context : all) {
+    const auto same = [&](const Json& other) { return differing_conditions(context, other).empty(); };
+    if (!same(now) && std::ranges::none_of(others, same)) others.push_back(context);
+  }
+  return others;
 }
 
 std::filesystem::path default_folder(const Experiment& experiment, const Shard& shard) {
@@ -154,7 +165,9 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
               fmt::format("# configuration hash: {}\n{}{}", hash, shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
   if (!shard.is_whole()) context["shard"] = shard.text();
   record.context = context;
-  const std::vector<std::string> changed = command.resume ? changed_conditions(folder, context) : std::vector<std::string>{};
+  if (command.resume) record.earlier = other_contexts(folder, context);
+  std::vector<std::string> changed;
+  for (const Json& earlier : record.earlier) std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
   write_whole(folder / kPlanFile, to_text(record));
   fmt::print(stderr, "{}: {} cells ({} done before), {} skipped{}; about {}\n", experiment.name, plan.cells.size(), journal.done().size(),
              plan.skipped.size(), shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),

@@ -40,6 +40,7 @@ PlanRecord record_of(const Plan& plan, const std::map<std::string, unsigned>& sh
 std::string to_text(const PlanRecord& record) {
   Json json = Json::object();
   json["context"] = record.context;
+  if (!record.earlier.empty()) json["earlier_contexts"] = record.earlier;
   json["shard"] = record.shard.text();
   json["filter"] = record.filter, json["skip"] = record.skip;
   json["excluded"] = record.excluded, json["filtered"] = record.filtered;
@@ -54,6 +55,7 @@ std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) 
     const Json json = Json::parse(stream);
     PlanRecord record;
     record.context = json.at("context");
+    for (const Json& context : json.value("earlier_contexts", Json::array())) record.earlier.push_back(context);
     record.shard = parse_shard(json.at("shard").get<std::string>());
     record.filter = json.value("filter", ""), record.skip = json.value("skip", "");
     record.excluded = json.value("excluded", std::size_t{0}), record.filtered = json.value("filtered", std::size_t{0});

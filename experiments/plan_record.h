@@ -25,6 +25,7 @@ struct PlanRecord {
   std::size_t excluded = 0, filtered = 0;
   std::vector<Entry> cells, skipped;  ///< of all shards, in the plan's order
   Json context = Json::object();
+  std::vector<Json> earlier = {};  ///< contexts of the runs that this one goes on with, the oldest first
 };
 
 inline constexpr const char* kPlanFile = "plan.json";

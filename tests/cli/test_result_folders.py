@@ -47,6 +47,18 @@ class ResultFolders(CommandLineCase):
             self.assert_error(self.run_small(f"--shard={bad}", "--list"), "I/N")
         self.assert_error(self.run_small("--shard", "40/40", "--filter", "trace/.*bvh2.*watertight.*/sse/"), "nothing to measure", status=4)
 
+    def test_a_run_gone_on_with_says_each_time_where_its_results_are_from(self):
+        folder = self.shard(1, 3)
+        plan = self.folder / folder / "plan.json"
+        record = json.loads(plan.read_text())
+        record["context"]["git_revision"] = "a" * 40
+        plan.write_text(json.dumps(record))
+        for _ in range(2):  # the second run must not take the first one's revision for that of all results
+            again = self.run_small("--shard", "1/3", *FEW, "--resume")
+            self.assertIn("begun at revision aaaaaaaaaaaa", again.stderr)
+            self.assertIn("begun at revision aaaaaaaaaaaa", " ".join(json.loads((self.folder / folder / "results.json").read_text())["warnings"]))
+            self.assertEqual([c["git_revision"] for c in json.loads(plan.read_text())["earlier_contexts"]], ["a" * 40])
+
     def test_merged_shards_are_the_whole_run(self):
         parts = [self.shard(i, 3) for i in (1, 2, 3)]
         self.assertEqual(self.context(parts[1])["shard"], "2/3")
