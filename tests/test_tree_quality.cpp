@@ -151,17 +151,25 @@ TEST_CASE("a leaf does not hold a triangle twice") {
     std::size_t twice = 0;
     unsigned most = 0;
   };
+  // Leaves are merged where blocks cost little, and where nodes do: then to fill blocks.
+  struct Costs {
+    float traversal, intersection, budget;
+  };
   for (const char* structure : {"bvh2", "bvh8"}) {
-    for (const char* builder : {"spatial_sah", "spatial_sah_reinsertion"}) {
-      BuildSettings settings;
-      settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa();
-      settings.parameters.intersection_cost = 0.3f;  // so that leaves are merged
-      BuildReport report;
-      Visitor visitor;
-      REQUIRE(build_structure(structure, mesh, settings, report)->visit(visitor));
-      INFO(structure << " " << builder);
-      CHECK(visitor.twice == 0);
-      CHECK(visitor.most > 1);
+    for (const std::string_view builder : binary_builder_names()) {
+      if (!splits_triangles(builder)) continue;
+      for (const Costs& costs : {Costs{1.0f, 0.3f, 0.75f}, Costs{0.05f, 4.0f, 4.0f}}) {
+        BuildSettings settings;
+        settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa();
+        settings.parameters.traversal_cost = costs.traversal, settings.parameters.intersection_cost = costs.intersection;
+        settings.parameters.duplication_budget = costs.budget;
+        BuildReport report;
+        Visitor visitor;
+        REQUIRE(build_structure(structure, mesh, settings, report)->visit(visitor));
+        INFO(structure << " " << builder << ", a block at " << costs.intersection << " and a node at " << costs.traversal);
+        CHECK(visitor.twice == 0);
+        if (costs.intersection < costs.traversal) CHECK(visitor.most > 1);
+      }
     }
   }
 }

@@ -119,8 +119,7 @@ class Reader {
   std::uint32_t nodes_ = 0, references_ = 0;
 };
 
-bool on_memory(void* total, std::ptrdiff_t bytes, bool) {
-  static_cast<std::atomic<std::ptrdiff_t>*>(total)->fetch_add(bytes, std::memory_order_relaxed);
+bool on_memory(void*, std::ptrdiff_t bytes, bool) {
   if (bytes >= 0) {
     MemoryMeter::add(std::size_t(bytes));
   } else {
@@ -158,8 +157,7 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
 
   const std::unique_ptr<std::remove_pointer_t<RTCDevice>, void (*)(RTCDevice)> device(rtcNewDevice("set_affinity=0"), &rtcReleaseDevice);
   if (!device) throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
-  std::atomic<std::ptrdiff_t> held{0};
-  rtcSetDeviceMemoryMonitorFunction(device.get(), &on_memory, &held);
+  rtcSetDeviceMemoryMonitorFunction(device.get(), &on_memory, nullptr);
   LinkedTree linked;
   {
     const std::unique_ptr<std::remove_pointer_t<RTCBVH>, void (*)(RTCBVH)> bvh(rtcNewBVH(device.get()), &rtcReleaseBVH);
@@ -180,8 +178,8 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
     phase("embree");
     Reader(*root, linked);
   }
+  linked.duplicates = spatial;
   tree = lay_out(linked, leaf_width);
-  tree.duplicates = spatial;
   phase("layout");
 }
 
