@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "structures/builders/clip.h"
 #include "structures/builders/collapse.h"
+#include "structures/builders/linked_tree.h"
 #include "tests/builder_checks.h"
 
 using namespace arboretum;
@@ -118,6 +119,22 @@ TEST_CASE("spatial splits keep their budget") {
   BuilderParameters parameters;
   parameters.duplication_budget = 5.0f;
   CHECK_THROWS_AS(build("spatial_sah", mesh, 4, 1, best_isa(), parameters), UserError);
+}
+
+TEST_CASE("more references than a tree can number are refused") {
+  require_budget("spatial_sah", kMaxReferences, 0.0f);
+  require_budget("embree_high", 214748364, 4.0f);
+  CHECK_THROWS_WITH(require_budget("spatial_sah", kMaxReferences + 1, 0.0f), Catch::Contains("spatial_sah: 1073741824 triangles") && Catch::Contains("2^30 - 1"));
+  CHECK_THROWS_AS(require_budget("embree_high", 214748365, 4.0f), UserError);
+  CHECK_THROWS_AS(require_budget("spatial_sah", 1, -0.1f), UserError);
+  BuilderParameters parameters;
+  parameters.duplication_budget = 4.1f;
+  for (const std::string_view builder : binary_builder_names()) {
+    if (splits_triangles(builder)) CHECK_THROWS_AS(build(builder, random_triangles(10, 0.1f, 1), 4, 1, best_isa(), parameters), UserError);
+  }
+  BinaryTree large;
+  large.node_count = std::size_t(LinkedNode::kLeaf) + 1;
+  CHECK_THROWS_AS(to_linked(std::move(large)), UserError);
 }
 
 TEST_CASE("binned_sah holds little beside what it builds") {

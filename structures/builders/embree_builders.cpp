@@ -140,7 +140,6 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
   };
   const bool spatial = quality == RTC_BUILD_QUALITY_HIGH;
   const std::size_t capacity = spatial ? n + std::size_t(double(n) * parameters.duplication_budget) : n;
-  if (capacity >= LinkedNode::kLeaf) throw UserError("embree's builders: more than 2^31 - 1 references; take a smaller duplication_budget");
   MeteredVector<RTCBuildPrimitive> primitives(capacity);
   std::atomic<bool> too_large{false};
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kGrain), [&](const auto& range) {
