@@ -320,5 +320,7 @@ TEST_CASE("parameters out of range are named") {
                     Catch::Contains("max_depth") && Catch::Contains("0 .. 21"));
   p = {}, p.max_leaf_blocks = 9;
   CHECK_THROWS_WITH(build({"bih", "binned_sah"}, mesh, "triangle4", 1, p),
-                    Catch::Contains("max_leaf_blocks"));
+                    Catch::Contains("max_leaf_blocks") && Catch::Contains("1 .. 8"));
+  p.max_leaf_blocks = 8;
+  CHECK_NOTHROW(build({"bih", "binned_sah"}, mesh, "triangle4", 1, p));
 }
