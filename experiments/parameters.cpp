@@ -6,6 +6,8 @@
 #include <charconv>
 #include <span>
 
+#include "structures/bvh/bvh.h"
+
 namespace arboretum {
 namespace {
 
@@ -44,7 +46,7 @@ const std::vector<Field>& fields() {
       {.name = "bins", .low = 4, .high = 64, .integer = &BuilderParameters::bins},
       {.name = "traversal_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::traversal_cost},
       {.name = "intersection_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::intersection_cost},
-      {.name = "max_leaf_blocks", .low = 1, .high = 7, .integer = &BuilderParameters::max_leaf_blocks},
+      {.name = "max_leaf_blocks", .low = 1, .high = bvh::kMaxLeafBlocks, .integer = &BuilderParameters::max_leaf_blocks},
       {.name = "morton_bits", .low = 30, .high = 63, .integer = &BuilderParameters::morton_bits, .choices = kMortonBits},
       {.name = "ploc_radius", .low = 1, .high = 128, .integer = &BuilderParameters::ploc_radius},
       {.name = "duplication_budget", .low = 0, .high = 4, .real = &BuilderParameters::duplication_budget},

@@ -15,7 +15,7 @@ std::unique_ptr<Accel> StructureCache::find(std::string_view structure, const Tr
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return nullptr;
   try {
-    return load_structure(structure, mesh, settings, file);
+    return load_structure(structure, mesh, settings, file, BuiltBy::this_program);
   } catch (const UserError& e) {
     note_(fmt::format("{} (built anew now)", e.what()));
     return nullptr;

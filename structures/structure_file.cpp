@@ -1,5 +1,6 @@
 #include "structures/structure_file.h"
 
+#include <link.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
@@ -28,7 +29,7 @@ namespace {
 using Bytes = std::span<const std::byte>;
 using Crc64 = boost::crc_optimal<64, 0x42f0e1eba9ea3693u, ~std::uint64_t{0}, ~std::uint64_t{0}, true, true>;
 
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kByteOrder = 0x01020304;
 constexpr std::array<char, 8> kMagic{'a', 'r', 'b', 'o', 't', 'r', 'e', 'e'};
 
@@ -40,8 +41,9 @@ struct StructureFileHeader {
   std::uint64_t file_bytes = 0;
   std::uint64_t checksum = 0;  ///< of the whole file, this field taken as 0
   std::uint64_t mesh_hash = 0, mesh_vertices = 0, mesh_triangles = 0;
+  std::uint64_t program = 0;  ///< program_digest() of what built it
 };
-static_assert(sizeof(StructureFileHeader) == 56 && offsetof(StructureFileHeader, checksum) == 24);
+static_assert(sizeof(StructureFileHeader) == 64 && offsetof(StructureFileHeader, checksum) == 24);
 
 std::uint64_t crc_of_pieces(Bytes bytes) {
   constexpr std::size_t kPiece = std::size_t{4} << 20;
@@ -125,6 +127,7 @@ void check_name(const std::filesystem::path& file, Archive& archive, const char*
 
 void write_whole(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings, const std::filesystem::path& file) {
   StructureFileHeader header = header_of(mesh);
+  header.program = program_digest();
   std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
   stream.write(reinterpret_cast<const char*>(&header), sizeof header);
   Archive archive(stream, mesh);
@@ -169,6 +172,28 @@ std::uint64_t hash_of(const TriangleMesh& mesh) {
   return crc_of_pieces(std::as_bytes(std::span(parts)));
 }
 
+std::uint64_t program_digest() {
+  static const std::uint64_t digest = [] {
+    std::vector<std::filesystem::path> files{"/proc/self/exe"};
+    const auto add = [](dl_phdr_info* object, std::size_t, void* to) {
+      if (std::string_view(object->dlpi_name).find("embree") != std::string_view::npos)
+        static_cast<std::vector<std::filesystem::path>*>(to)->emplace_back(object->dlpi_name);
+      return 0;
+    };
+    ::dl_iterate_phdr(add, &files);
+    std::vector<std::uint64_t> sums;
+    for (const std::filesystem::path& file : files) {
+      try {
+        sums.push_back(crc_of_pieces(MappedFile(file).bytes()));
+      } catch (const boost::interprocess::interprocess_exception& e) {
+        refuse(file, std::string("cannot be read: ") + e.what());
+      }
+    }
+    return crc_of_pieces(std::as_bytes(std::span(sums)));
+  }();
+  return digest;
+}
+
 std::string structure_file_name(std::string_view name, const TriangleMesh& mesh, const BuildSettings& settings) {
   const StructureEntry* entry = find_structure(name);
   const std::string parameters = entry ? parameters_of(entry->info, settings) : std::string();
@@ -192,7 +217,7 @@ void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings&
 }
 
 std::unique_ptr<Accel> load_structure(std::string_view name, const TriangleMesh& mesh, const BuildSettings& settings,
-                                      const std::filesystem::path& file) {
+                                      const std::filesystem::path& file, BuiltBy by) {
   const StructureEntry* entry = find_structure(name);
   if (!entry) throw UserError("there is no structure '" + std::string(name) + "'; see `arboretum list structures`");
   std::error_code error;
@@ -211,6 +236,8 @@ std::unique_ptr<Accel> load_structure(std::string_view name, const TriangleMesh&
   check_header(file, header, bytes.size());
   if (bytes.size() != header.file_bytes || checksum_of(header, bytes) != header.checksum)
     refuse(file, "is damaged: its checksum does not fit; build and save it again");
+  if (by == BuiltBy::this_program && header.program != program_digest())
+    refuse(file, "was built by another build of the program, whose builders may be others; build and save it again");
 
   Archive archive(bytes.subspan(sizeof header), mesh);
   check_name(file, archive, "structure", name);

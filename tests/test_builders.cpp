@@ -2,6 +2,7 @@
 // number of threads. A new builder is tested because it is in the table.
 #include <tbb/global_control.h>
 
+#include "structures/builders/reinsertion.h"
 #include "tests/builder_checks.h"
 
 using namespace arboretum;
@@ -82,4 +83,61 @@ TEST_CASE("every builder: a million equal triangles end in a shallow tree") {
     const Facts facts = check_tree(build(builder, mesh, 4), mesh, 4, splits_triangles(builder));
     CHECK(facts.depth < 64);
   }
+}
+
+namespace {
+
+/// Triangles about one point, each `ratio` times the size of the one before: reinsertion, left alone, makes a chain of every third.
+TriangleMesh nested(std::size_t count, double ratio) {
+  TriangleMesh mesh;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto first = std::uint32_t(mesh.vertices.size());
+    const auto size = float(std::pow(ratio, double(i)));
+    for (const Vec3f corner : {Vec3f{-1, -1, -1}, Vec3f{1, -1, 1}, Vec3f{0, 1, 0}}) mesh.vertices.push_back(corner * size);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+/// The sum of the inner nodes' areas, in units of the root's.
+double inner_area(const BinaryTree& tree) {
+  double sum = 0.0;
+  std::vector<std::uint32_t> stack{0};
+  while (!stack.empty()) {
+    const BinaryNode& node = tree.nodes[stack.back()];
+    stack.pop_back();
+    if (node.is_leaf()) continue;
+    sum += node.half_area();
+    stack.push_back(node.left), stack.push_back(node.left + 1);
+  }
+  return sum / tree.nodes[0].half_area();
+}
+
+}  // namespace
+
+TEST_CASE("every builder: triangles within each other end in a tree of bounded depth") {
+  const TriangleMesh mesh = nested(10000, 1.0003);
+  // The slowest that ploc may merge: a 64th of the clusters each round, then a pair.
+  const unsigned deepest = 1024 + unsigned(64 * std::log(10000.0 / 1024));
+  for (const std::string_view builder : binary_builder_names()) {
+    INFO(builder);
+    const Facts facts = check_tree(build(builder, mesh, 1), mesh, 1, splits_triangles(builder));
+    CHECK(facts.depth <= (builder.starts_with("ploc") ? deepest : kMaxReinsertedDepth));
+    CHECK(check_tree(build(builder, mesh, 1, 2), mesh, 1, splits_triangles(builder)).hash == facts.hash);
+    if (!builder.ends_with(kReinsertion)) continue;
+    BuilderParameters none;
+    none.reinsertion_top = 0;
+    const BinaryTree before = build(builder.substr(0, builder.size() - kReinsertion.size()), mesh, 1, 1, best_isa(), none);
+    CHECK(facts.depth <= std::max(kMaxReinsertedDepth, check_tree(before, mesh, 1, splits_triangles(builder)).depth));
+    CHECK(inner_area(build(builder, mesh, 1)) < inner_area(before));  // what it promises; SAH cost weighs whole leaf blocks, too
+  }
+}
+
+TEST_CASE("reinsertion of the top: triangles within each other end in a tree of bounded depth") {
+  const TriangleMesh mesh = nested(600000, 1.00002);
+  BuilderParameters with, without;
+  with.reinsertion_top = 65536, without.reinsertion_top = 0;
+  const BinaryTree before = build("morton", mesh, 1, 1, best_isa(), without), after = build("morton", mesh, 1, 1, best_isa(), with);
+  CHECK(check_tree(after, mesh, 1, false).depth <= kMaxReinsertedDepth + check_tree(before, mesh, 1, false).depth);
+  CHECK(inner_area(after) < inner_area(before));
 }

@@ -58,6 +58,7 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\nplots: [rays]\n", ":2", "unknown plot 'rays'"},
       {"scenes: [bunny]\nmetrics: [trace]\nplots: [sah_cost]\n", ":3", "has no data"},
       {"scenes: [bunny]\nparameters: {bins: 1000}\n", ":2", "bins must be an integer from 4 to 64"},
+      {"scenes: [bunny]\nparameters: {max_leaf_blocks: 9}\n", ":2", "max_leaf_blocks must be an integer from 1 to 8"},
       {"scenes: [bunny]\nparameters: {morton_bits: 31}\n", ":2", "morton_bits must be one of 30, 63"},
       {"scenes: [bunny]\nparameters: {colapse: greedy}\n", ":2", "did you mean 'collapse'"},
       {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [nome]}\n", ":3", "did you mean 'none'"},

@@ -301,6 +301,14 @@ TEST_CASE("a grid's expected steps are what random rays take") {
   CHECK(double(counters.boxes) / double(counters.nodes) == Approx(seen.steps).epsilon(0.03));
 }
 
+TEST_CASE("a level's cells are numbered in 32 bits, however many triangles are in one place") {
+  BuilderParameters p;
+  p.grid_density = 64;
+  CHECK(grid::wanted_cells(p, 1000) == 64000);
+  CHECK(grid::wanted_cells(p, 1000, grid::kOuterShare) == 2000);
+  CHECK(grid::wanted_cells(p, 7e7) == grid::kMostCells);
+}
+
 TEST_CASE("parameters out of range are named") {
   const TriangleMesh mesh = random_triangles(10, 0.5f, 15);
   BuilderParameters p;
@@ -312,5 +320,7 @@ TEST_CASE("parameters out of range are named") {
                     Catch::Contains("max_depth") && Catch::Contains("0 .. 21"));
   p = {}, p.max_leaf_blocks = 9;
   CHECK_THROWS_WITH(build({"bih", "binned_sah"}, mesh, "triangle4", 1, p),
-                    Catch::Contains("max_leaf_blocks"));
+                    Catch::Contains("max_leaf_blocks") && Catch::Contains("1 .. 8"));
+  p.max_leaf_blocks = 8;
+  CHECK_NOTHROW(build({"bih", "binned_sah"}, mesh, "triangle4", 1, p));
 }

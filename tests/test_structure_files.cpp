@@ -1,5 +1,8 @@
 // Saving and loading built structures: equal answers and equal statistics after a round trip, for every structure that can
 // be saved; and every file that does not fit is refused in one line.
+#include <boost/crc.hpp>
+
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -53,6 +56,25 @@ std::string refusal(const char* name, const TriangleMesh& mesh, const BuildSetti
 }
 
 bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
+
+/// The file, shorter than 4 MiB, with another digest of the program, and the checksum that goes with it.
+std::string by_another_program(std::string file) {
+  const auto sum = [](const void* bytes, std::size_t size) {
+    boost::crc_optimal<64, 0x42f0e1eba9ea3693u, ~std::uint64_t{0}, ~std::uint64_t{0}, true, true> piece, pieces;
+    piece.process_bytes(bytes, size);
+    const std::uint64_t of_piece = piece.checksum();
+    pieces.process_bytes(&of_piece, sizeof of_piece);
+    return std::uint64_t(pieces.checksum());
+  };
+  REQUIRE(file.size() < (std::size_t{4} << 20));
+  constexpr std::size_t kHeader = 64, kChecksum = 24, kProgram = 56;
+  file[kProgram] = char(file[kProgram] ^ 1);
+  std::memset(file.data() + kChecksum, 0, 8);
+  const std::uint64_t parts[] = {sum(file.data(), kHeader), sum(file.data() + kHeader, file.size() - kHeader)};
+  const std::uint64_t checksum = sum(parts, sizeof parts);
+  std::memcpy(file.data() + kChecksum, &checksum, sizeof checksum);
+  return file;
+}
 
 BuildSettings settings_for(const StructureInfo& info, std::string_view leaf) {
   BuildSettings settings;
@@ -143,7 +165,7 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
   SECTION("every truncation, and bytes at the end") {
     for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
       write(other, whole.substr(0, bytes));
-      CHECK(has(refusal("bvh4", mesh, settings, other), bytes < 56 ? "is no saved structure" : "is truncated"));
+      CHECK(has(refusal("bvh4", mesh, settings, other), bytes < 64 ? "is no saved structure" : "is truncated"));
     }
     write(other, whole + "x");
     CHECK(has(refusal("bvh4", mesh, settings, other), "is damaged"));
@@ -161,9 +183,9 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
   }
   SECTION("another version, another byte order") {
     std::string changed = whole;
-    changed[8] = 2;
+    changed[8] = 3;
     write(other, changed);
-    CHECK(has(refusal("bvh4", mesh, settings, other), "is of format version 2, this build reads version 1"));
+    CHECK(has(refusal("bvh4", mesh, settings, other), "is of format version 3, this build reads version 2"));
     changed = whole;
     std::reverse(changed.begin() + 12, changed.begin() + 16);
     write(other, changed);
@@ -184,6 +206,13 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
     BuildSettings wanted = settings;
     wanted.threads = 7, wanted.isa = Isa::scalar;
     CHECK(refusal("bvh4", mesh, wanted, file) == "");
+  }
+  SECTION("another build of the program: of use, but not as this one's") {
+    CHECK(program_digest() == program_digest());
+    CHECK_NOTHROW(load_structure("bvh4", mesh, settings, file, BuiltBy::this_program));
+    write(other, by_another_program(whole));
+    CHECK(refusal("bvh4", mesh, settings, other) == "");
+    CHECK_THROWS_WITH(load_structure("bvh4", mesh, settings, other, BuiltBy::this_program), Catch::Contains("was built by another build of the program"));
   }
   SECTION("another mesh: fewer triangles, one moved by an ulp, two swapped; materials do not matter") {
     TriangleMesh changed = mesh;

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "structures/builders/clip.h"
 #include "structures/builders/collapse.h"
+#include "structures/builders/linked_tree.h"
 #include "tests/builder_checks.h"
 
 using namespace arboretum;
@@ -120,6 +121,22 @@ TEST_CASE("spatial splits keep their budget") {
   CHECK_THROWS_AS(build("spatial_sah", mesh, 4, 1, best_isa(), parameters), UserError);
 }
 
+TEST_CASE("more references than a tree can number are refused") {
+  require_budget("spatial_sah", kMaxReferences, 0.0f);
+  require_budget("embree_high", 214748364, 4.0f);
+  CHECK_THROWS_WITH(require_budget("spatial_sah", kMaxReferences + 1, 0.0f), Catch::Contains("spatial_sah: 1073741824 triangles") && Catch::Contains("2^30 - 1"));
+  CHECK_THROWS_AS(require_budget("embree_high", 214748365, 4.0f), UserError);
+  CHECK_THROWS_AS(require_budget("spatial_sah", 1, -0.1f), UserError);
+  BuilderParameters parameters;
+  parameters.duplication_budget = 4.1f;
+  for (const std::string_view builder : binary_builder_names()) {
+    if (splits_triangles(builder)) CHECK_THROWS_AS(build(builder, random_triangles(10, 0.1f, 1), 4, 1, best_isa(), parameters), UserError);
+  }
+  BinaryTree large;
+  large.node_count = std::size_t(LinkedNode::kLeaf) + 1;
+  CHECK_THROWS_AS(to_linked(std::move(large)), UserError);
+}
+
 TEST_CASE("binned_sah holds little beside what it builds") {
   for (const KernelScene& scene : {KernelScene{"needles", needles(100000)}, KernelScene{"sphere", sphere(150)}}) {
     INFO(scene.name);
@@ -151,17 +168,25 @@ TEST_CASE("a leaf does not hold a triangle twice") {
     std::size_t twice = 0;
     unsigned most = 0;
   };
+  // Leaves are merged where blocks cost little, and where nodes do: then to fill blocks.
+  struct Costs {
+    float traversal, intersection, budget;
+  };
   for (const char* structure : {"bvh2", "bvh8"}) {
-    for (const char* builder : {"spatial_sah", "spatial_sah_reinsertion"}) {
-      BuildSettings settings;
-      settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa();
-      settings.parameters.intersection_cost = 0.3f;  // so that leaves are merged
-      BuildReport report;
-      Visitor visitor;
-      REQUIRE(build_structure(structure, mesh, settings, report)->visit(visitor));
-      INFO(structure << " " << builder);
-      CHECK(visitor.twice == 0);
-      CHECK(visitor.most > 1);
+    for (const std::string_view builder : binary_builder_names()) {
+      if (!splits_triangles(builder)) continue;
+      for (const Costs& costs : {Costs{1.0f, 0.3f, 0.75f}, Costs{0.05f, 4.0f, 4.0f}}) {
+        BuildSettings settings;
+        settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa();
+        settings.parameters.traversal_cost = costs.traversal, settings.parameters.intersection_cost = costs.intersection;
+        settings.parameters.duplication_budget = costs.budget;
+        BuildReport report;
+        Visitor visitor;
+        REQUIRE(build_structure(structure, mesh, settings, report)->visit(visitor));
+        INFO(structure << " " << builder << ", a block at " << costs.intersection << " and a node at " << costs.traversal);
+        CHECK(visitor.twice == 0);
+        if (costs.intersection < costs.traversal) CHECK(visitor.most > 1);
+      }
     }
   }
 }

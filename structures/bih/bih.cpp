@@ -9,6 +9,7 @@
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
+#include "structures/bvh/bvh.h"
 
 namespace arboretum::bih {
 namespace {
@@ -145,8 +146,9 @@ const StructureInfo& Bih::static_info() {
 
 void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  if (p.max_leaf_blocks < 1 || p.max_leaf_blocks > 8) {
-    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. 8");
+  if (p.max_leaf_blocks < 1 || p.max_leaf_blocks > bvh::kMaxLeafBlocks) {
+    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. " +
+                    std::to_string(bvh::kMaxLeafBlocks));
   }
   if (p.bins < 4 || p.bins > 64)
     throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");

@@ -56,19 +56,18 @@ constexpr Entry kBuilders[] = {
 #endif
 };
 
-/// A budget in range, and references that 32 bits can number.
-void require_budget(std::size_t triangles, float budget) {
-  if (!(budget >= 0.0f && budget <= 4.0f)) throw UserError("duplication_budget: " + std::to_string(budget) + " is not within 0 .. 4");
-  if (double(triangles) * (1.0 + double(budget)) >= 0x1p31) {
-    throw UserError("spatial_sah: " + std::to_string(triangles) + " triangles and a duplication_budget of " + std::to_string(budget) +
-                    " make more than 2^31 references; lower the budget");
-  }
-}
-
 /// Every builder has a second key, this behind its own: its tree improved by reinsertion.
 constexpr std::string_view kReinsertion = "_reinsertion";
 
 }  // namespace
+
+void require_budget(std::string_view builder, std::size_t triangles, float budget) {
+  if (!(budget >= 0.0f && budget <= 4.0f)) throw UserError("duplication_budget: " + std::to_string(budget) + " is not within 0 .. 4");
+  if (double(triangles) * (1.0 + double(budget)) > double(kMaxReferences)) {
+    throw UserError(std::string(builder) + ": " + std::to_string(triangles) + " triangles and a duplication_budget of " + std::to_string(budget) +
+                    " make more than 2^30 - 1 references; take a smaller duplication_budget or a smaller mesh");
+  }
+}
 
 const std::vector<std::string_view>& binary_builder_names() {
   static const std::vector<std::string> reinserted = [] {
@@ -96,7 +95,8 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
   if (top != BuilderParameters::kOwn && top > kMostTop) throw UserError("reinsertion_top: " + std::to_string(top) + " is not within 0 .. " + std::to_string(kMostTop));
   for (const Entry& e : kBuilders) {
     if (e.name != builder) continue;
-    if (builder == "spatial_sah") require_budget(mesh.size(), settings.parameters.duplication_budget);
+    const bool splits = builder == "spatial_sah" || builder == "embree_high";
+    require_budget(builder, mesh.size(), splits ? settings.parameters.duplication_budget : 0.0f);
     e.on(settings.isa)(mesh, settings.parameters, leaf_width, tree, report);
     if (reinserts) {
       reinsert(tree, rounds, leaf_width, report);

@@ -119,8 +119,7 @@ class Reader {
   std::uint32_t nodes_ = 0, references_ = 0;
 };
 
-bool on_memory(void* total, std::ptrdiff_t bytes, bool) {
-  static_cast<std::atomic<std::ptrdiff_t>*>(total)->fetch_add(bytes, std::memory_order_relaxed);
+bool on_memory(void*, std::ptrdiff_t bytes, bool) {
   if (bytes >= 0) {
     MemoryMeter::add(std::size_t(bytes));
   } else {
@@ -141,7 +140,6 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
   };
   const bool spatial = quality == RTC_BUILD_QUALITY_HIGH;
   const std::size_t capacity = spatial ? n + std::size_t(double(n) * parameters.duplication_budget) : n;
-  if (capacity >= LinkedNode::kLeaf) throw UserError("embree's builders: more than 2^31 - 1 references; take a smaller duplication_budget");
   MeteredVector<RTCBuildPrimitive> primitives(capacity);
   std::atomic<bool> too_large{false};
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kGrain), [&](const auto& range) {
@@ -158,8 +156,7 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
 
   const std::unique_ptr<std::remove_pointer_t<RTCDevice>, void (*)(RTCDevice)> device(rtcNewDevice("set_affinity=0"), &rtcReleaseDevice);
   if (!device) throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
-  std::atomic<std::ptrdiff_t> held{0};
-  rtcSetDeviceMemoryMonitorFunction(device.get(), &on_memory, &held);
+  rtcSetDeviceMemoryMonitorFunction(device.get(), &on_memory, nullptr);
   LinkedTree linked;
   {
     const std::unique_ptr<std::remove_pointer_t<RTCBVH>, void (*)(RTCBVH)> bvh(rtcNewBVH(device.get()), &rtcReleaseBVH);
@@ -180,8 +177,8 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
     phase("embree");
     Reader(*root, linked);
   }
+  linked.duplicates = spatial;
   tree = lay_out(linked, leaf_width);
-  tree.duplicates = spatial;
   phase("layout");
 }
 

@@ -7,6 +7,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
+#include "core/error.h"
+
 namespace arboretum {
 namespace {
 
@@ -82,6 +84,7 @@ class Layout {
 BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width) { return Layout(tree, leaf_width).run(); }
 
 LinkedTree to_linked(BinaryTree&& tree) {
+  if (tree.node_count > LinkedNode::kLeaf) throw UserError("reinsertion: a tree of more than 2^31 nodes; take wider leaf blocks or a smaller mesh");
   LinkedTree out;
   out.nodes.resize(tree.node_count);
   // Unused slots of the binary tree hold anything; nothing names them.

@@ -33,7 +33,7 @@ static_assert(sizeof(LinkedNode) == 32);
 struct LinkedTree {
   MeteredVector<LinkedNode> nodes;
   std::uint32_t root = 0;
-  MeteredVector<std::uint32_t> primitives;  ///< fewer than 2^31
+  MeteredVector<std::uint32_t> primitives;  ///< fewer than 2^30, or nodes would not be numbered in 31 bits
   bool duplicates = false;                  ///< a primitive may be referenced by several leaves
 };
 
@@ -41,7 +41,7 @@ struct LinkedTree {
 /// references becomes one leaf, unless it might name a primitive twice. The result depends on the tree alone. Runs in the caller's TBB arena. The tree is not empty.
 [[nodiscard]] BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width);
 
-/// The other way: nodes keep their numbers.
+/// The other way: nodes keep their numbers. Throws UserError where those take more than 31 bits.
 [[nodiscard]] LinkedTree to_linked(BinaryTree&& tree);
 
 }  // namespace arboretum

@@ -1,6 +1,7 @@
 // Each pass looks, in parallel and without changing anything, for the best new place of every node; then moves are made one
 // after another, the most gainful first. A move's gain is what it changes in the tree as it then is: one that no longer gains is
 // taken back. So no locks are needed, no conflict can spoil the tree, and the result is the same for any number of threads.
+// Things that lie within each other would become a chain; a move that brings anything below kMaxReinsertedDepth is not made.
 #include "structures/builders/reinsertion.h"
 
 #include <algorithm>
@@ -27,10 +28,11 @@ struct Move {
 
 class Reinsertion {
  public:
-  explicit Reinsertion(LinkedTree& tree) : tree_(tree), nodes_(tree.nodes), parent_(tree.nodes.size()) {
+  explicit Reinsertion(LinkedTree& tree) : tree_(tree), nodes_(tree.nodes), parent_(tree.nodes.size()), height_(tree.nodes.size()) {
     parent_[tree.root] = kNone;
-    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+    for (auto i = std::uint32_t(nodes_.size()); i-- > 0;) {  // children first
       if (!nodes_[i].is_leaf()) parent_[nodes_[i].left] = parent_[nodes_[i].right] = i;
+      height_[i] = height_from_children(i);
     }
   }
 
@@ -136,14 +138,37 @@ class Reinsertion {
     return grown + refit_upwards(parent_[parent]);
   }
 
+  /// How many levels are below.
+  [[nodiscard]] std::uint32_t height_from_children(std::uint32_t i) const noexcept {
+    const LinkedNode& node = nodes_[i];
+    return node.is_leaf() ? 0 : 1 + std::max(height_[node.left], height_[node.right]);
+  }
+
+  void update_heights(std::uint32_t index) noexcept {
+    for (; index != kNone; index = parent_[index]) {
+      const std::uint32_t height = height_from_children(index);
+      if (height == height_[index]) break;
+      height_[index] = height;
+    }
+  }
+
   bool try_move(std::uint32_t index, std::uint32_t target) noexcept {
     const std::uint32_t parent = parent_[index];
     if (parent == kNone || target == parent || parent_[target] == parent) return false;
-    for (std::uint32_t i = target; i != kNone; i = parent_[i]) {
+    std::uint32_t depth = 0;  // of the node and the target when it is made
+    for (std::uint32_t i = target; i != kNone; i = parent_[i], ++depth) {
       if (i == index) return false;  // an earlier move has put the target below
     }
-    const std::uint32_t brother = sibling(index);
-    if (move(index, target) < 0.0) return true;
+    if (depth + std::max(height_[index], height_[target]) > kMaxReinsertedDepth) return false;
+    const std::uint32_t brother = sibling(index), grandparent = parent_[parent];
+    if (move(index, target) < 0.0) {
+      // The parent, which now stands elsewhere, is right before and after what its old place changes.
+      height_[parent] = height_from_children(parent);
+      update_heights(grandparent);
+      height_[parent] = height_from_children(parent);
+      update_heights(parent_[parent]);
+      return true;
+    }
     (void)move(index, brother);
     return false;
   }
@@ -151,6 +176,7 @@ class Reinsertion {
   LinkedTree& tree_;
   MeteredVector<LinkedNode>& nodes_;
   MeteredVector<std::uint32_t> parent_;
+  MeteredVector<std::uint32_t> height_;  ///< 0 for a leaf
   MeteredVector<Move> moves_;
 };
 

@@ -185,7 +185,7 @@ class InnerBuilder {
     Sizes sizes;
     for (std::uint32_t id : ids) sizes.add(mesh_.corners(id), extent);
     const std::uint64_t limit = std::uint64_t(kInnerReferences) * ids.size();
-    double wanted = double(parameters_.grid_density) * double(ids.size());
+    double wanted = wanted_cells(parameters_, double(ids.size()));
     for (;; wanted *= 0.5) {
       const Index3 counts = counts_within(sizes, extent, wanted, 2 * pad_, double(limit));
       const std::uint32_t cells = counts[0] * counts[1] * counts[2];
@@ -299,6 +299,10 @@ void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& paramete
 
 }  // namespace
 
+double wanted_cells(const BuilderParameters& parameters, double triangles, double share) {
+  return std::min(double(parameters.grid_density) * triangles * share, kMostCells);
+}
+
 double expected_steps(const Level& level) {
   const double x = level.cell[0], y = level.cell[1], z = level.cell[2];
   const double nx = level.cells_on(0), ny = level.cells_on(1), nz = level.cells_on(2);
@@ -333,8 +337,7 @@ void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, 
   const std::uint64_t limit = std::min<std::uint64_t>(
       std::uint64_t(two_level ? kOuterReferences : kMostReferences) * mesh.size(), 0xfffffff0u);
   // The outer grid of two has cells for inner ones to refine; alone it has all of them.
-  double wanted = std::max(1.0, double(parameters.grid_density) * n * (two_level ? kOuterShare : 1.0));
-  wanted = std::min(wanted, 1e9);
+  double wanted = std::max(1.0, wanted_cells(parameters, n, two_level ? kOuterShare : 1.0));
   for (;; wanted *= 0.5) {
     const Index3 counts = counts_within(sizes, extent, wanted, 2 * pad, double(limit));
     cells.levels.assign(1, make_level(lower, extent, counts));

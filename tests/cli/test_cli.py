@@ -5,10 +5,12 @@ import csv
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
 import unittest
+from pathlib import Path
 
 from command_line_case import ARBORETUM, CONFIG, CommandLineCase, read_jsonl
 
@@ -83,6 +85,22 @@ class CommandLine(CommandLineCase):
         self.assertEqual(again.stderr.count("is damaged"), 1, again.stderr)
         traced = [c for c in read_jsonl(self.folder / "out/cells.jsonl") if c["metric"] == "trace"]
         self.assertEqual(sorted(("shared_load_seconds" in c, "shared_build_seconds" in c) for c in traced), [(False, True), (True, False)])
+
+    def test_a_structure_that_another_build_of_the_program_saved_is_built_anew(self):
+        self.config = self.write("cached.yaml", CONFIG.replace("measure: {", "measure: {structure_cache: trees, "))
+        words = ("run", self.config, "--no-plots", "structure=bvh4", "isa=scalar", "intersector=watertight", "workload=primary", "--out", "out")
+        other = Path(shutil.copy(ARBORETUM, self.folder / "another"))
+        with open(other, "ab") as program:
+            program.write(b"x")
+        data = {**os.environ, "ARBORETUM_DATA": str(Path(ARBORETUM).resolve().parent / "share/arboretum")}
+        notes = []
+        for program in (ARBORETUM, other, other, ARBORETUM):
+            result = subprocess.run([program, *map(str, words)], capture_output=True, text=True, cwd=self.folder, timeout=300, env=data)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            notes.append(result.stderr.count("was built by another build of the program"))
+        self.assertEqual(notes[0], 0)
+        self.assertGreater(notes[1], 0)
+        self.assertEqual(notes[2:], [0, notes[1]])
 
     def test_bad_scenes(self):
         config = "scenes: [{file: model.obj}]\naxes: {structure: bvh4, isa: scalar}\nmeasure: {resolution: [16, 16], min_time: 0.001}\n"
