@@ -211,6 +211,10 @@ class CommandLine(CommandLineCase):
                 self.assertTrue(entry["summary"], f"{title}: {entry['name']} has no summary")
         self.assertEqual(json.loads(self.call("list", "structures", "--json").stdout), listed["structures"])
         self.assertIn("bvh8", self.call("list", "structures").stdout)
+        read = {s["name"]: s["parameters"] for s in listed["structures"] if s["available"]}
+        self.assertIn("ploc_radius", read["bvh8"]["ploc"])
+        self.assertNotIn("ploc_radius", read["bvh8"]["binned_sah"])
+        self.assertEqual(next(b for b in listed["builders"] if b["name"] == "uniform")["parameters"], {"grid": ["grid_density"], "two_level": read["two_level"]["uniform"]})
 
     def test_info(self):
         info = json.loads(self.call("info", "sphere_flake:2000", "--json").stdout)
