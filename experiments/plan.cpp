@@ -99,7 +99,7 @@ class Planner {
   void resolve(Cell& cell, const StructureEntry* entry) {
     cell.traversal = resolve_traversal(cell.traversal, cell.isa);
     keep_settings(cell);
-    if (cell.box == kAuto) cell.box = default_box(cell.intersector);
+    cell.box = std::string(resolve_box(cell.box, cell.intersector));
     // What stands above another structure takes that one's defaults.
     const StructureEntry* below = entry && entry->info.takes_below ? registry_.structure(cell.parameters.below) : nullptr;
     if (cell.builder == kAuto) {
