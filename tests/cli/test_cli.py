@@ -8,6 +8,7 @@ import signal
 import subprocess
 import time
 import unittest
+from pathlib import Path
 
 from command_line_case import ARBORETUM, CONFIG, CommandLineCase, read_jsonl
 
@@ -114,6 +115,11 @@ class CommandLine(CommandLineCase):
                 self.assertGreater(row["build_seconds"], 0)
         for key in ("cpu", "isa", "compiler", "git_revision", "git_dirty", "configuration_hash", "seed", "date", "memory_bytes"):
             self.assertIn(key, document["context"])
+        # The revision is the program's, wherever catalogue and plot scripts are taken from.
+        there = self.run_small("--out", "there", "--filter", rows[0]["run_name"], env={**os.environ, "ARBORETUM_DATA": str(Path(__file__).parents[2])})
+        self.assertIn(there.returncode, (0, 1), there.stderr)
+        context = json.loads((self.folder / "there" / "results.json").read_text())["context"]
+        self.assertEqual(context["git_revision"], document["context"]["git_revision"])
         wrong = any(row.get("wrong_answers") for row in rows)
         self.assertEqual(result.returncode, 1 if wrong else 0)
         self.assertEqual(len((out / "results.csv").read_text().splitlines()), len(rows) + 1)
