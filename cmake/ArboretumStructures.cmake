@@ -1,9 +1,9 @@
 # Structures and the executables that have them. Comes with the source tree and with the installed package.
 #
 # A structure is a folder <folder>/ with <name>.h, which says `using Structures = TypeList<...>;` in namespace
-# arboretum::<folder>, its .cpp files, and <name>_kernels.h. For each of its types and each instruction set a kernel unit is
+# arboretum::<folder>, its .cpp files, <name>_kernels.h, and, where it says what its builders read, <name>_parameters.h. For each of its types and each instruction set a kernel unit is
 # generated; a generated registry.cpp says which structures and kernels an executable has. What the functions below hand to
-# each other is a record `<header as included>|<folder>|<types, comma-separated>`.
+# each other is a record `<header as included>|<folder>|<types, comma-separated>|<yes where there is a <name>_parameters.h>`.
 #
 #   arboretum_read_structure(<out> <header> <as included>)     the record of a structure's header
 #   arboretum_kernel_units(<out> <folder> <record>...)         writes kernel units into <folder>, sets their compile options
@@ -35,16 +35,22 @@ function(arboretum_read_structure out header include)
   endif()
   string(REGEX MATCHALL "[A-Za-z0-9_]+" types "${CMAKE_MATCH_1}")
   list(JOIN types "," types)
-  set(${out} "${include}|${folder}|${types}" PARENT_SCOPE)
+  string(REGEX REPLACE "\\.h$" "_parameters.h" parameters "${header}")
+  file(GLOB parameters CONFIGURE_DEPENDS "${parameters}")  # seen when it comes and when it goes
+  if(parameters)
+    set(parameters yes)
+  endif()
+  set(${out} "${include}|${folder}|${types}|${parameters}" PARENT_SCOPE)
 endfunction()
 
-# Sets <prefix>_header, _folder and _types in the caller.
+# Sets <prefix>_header, _folder, _types and _parameters in the caller.
 macro(arboretum_split_record prefix record)
   string(REPLACE "|" ";" ${prefix}_parts "${record}")
   list(GET ${prefix}_parts 0 ${prefix}_header)
   list(GET ${prefix}_parts 1 ${prefix}_folder)
   list(GET ${prefix}_parts 2 ${prefix}_types)
   string(REPLACE "," ";" ${prefix}_types "${${prefix}_types}")
+  list(GET ${prefix}_parts 3 ${prefix}_parameters)
 endmacro()
 
 # Compile options of a generated unit for an instruction set.
@@ -108,6 +114,10 @@ function(arboretum_registry file)
     endif()
     list(APPEND folders ${s_folder})
     string(APPEND includes "#include \"${s_header}\"\n")
+    if(s_parameters)
+      string(REGEX REPLACE "\\.h$" "_parameters.h" parameters "${s_header}")
+      string(APPEND includes "#include \"${parameters}\"\n")
+    endif()
     list(APPEND lists "${s_folder}::Structures")
     foreach(type IN LISTS s_types)
       foreach(isa IN LISTS ARBORETUM_ISAS)
@@ -127,6 +137,8 @@ namespace arboretum {
 ${declarations}
 // What makes an instruction set's rows is itself compiled for it: elsewhere it must not run.
 std::vector<StructureEntry> registered_structures() { return structure_entries(ConcatLists<${lists}>{}); }
+
+std::vector<BuilderParametersOf> registered_parameters() { return parameters_entries(ConcatLists<${lists}>{}); }
 
 std::vector<KernelRow> registered_kernels() {
   std::vector<KernelRow> rows;

@@ -9,5 +9,7 @@ namespace arboretum {
 /// executable, or one folder up (a build tree, where it links to the sources); where `cmake --install` puts it, seen from the
 /// executable, so that an installed tree may be moved. Throws UserError when there is none, or when $ARBORETUM_DATA names none.
 [[nodiscard]] std::filesystem::path data_folder();
+/// The same, $ARBORETUM_DATA left aside: what was built or installed together with the executable. Empty when there is none.
+[[nodiscard]] std::filesystem::path program_data_folder();
 
 }  // namespace arboretum

@@ -4,7 +4,6 @@
 #include <cctype>
 #include <utility>
 
-#include "intersectors/promises.h"
 #include "experiments/rendered_rays.h"
 #include "rendering/hard_workload.h"
 
@@ -63,7 +62,7 @@ constexpr Summary kTraversals[] = {
     {"stream_coherent", "Embree's stream of single rays, always with its coherent flag"},
     {"stream_incoherent", "Embree's stream of single rays, never with its coherent flag"},
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
-    {"auto", "looks at the rays, tile by tile: packets of 64 where they hold together, else streams"},
+    {"auto", "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (single rays where there are none)"},
 };
 constexpr Summary kIsas[] = {
     {"scalar", "no vector instructions: the reference that every machine runs"},
@@ -214,13 +213,6 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
   std::erase(list, std::string(kNone));
   return list;
 }
-
-std::string resolve_traversal(std::string_view traversal, Isa isa) {
-  if (traversal != "packet" && traversal != "hybrid") return std::string(traversal);
-  return std::string(traversal) + std::to_string(native_width(isa));
-}
-
-std::string_view default_box(std::string_view intersector) noexcept { return box_called_for(intersector); }
 
 std::string summary_of(Axis axis, std::string_view value, const Registry& registry) {
   switch (axis) {

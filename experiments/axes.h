@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "experiments/registry.h"
+#include "traversal/kernel_keys.h"
 
 namespace arboretum {
 
@@ -37,9 +38,8 @@ using AxisLists = std::array<std::vector<std::string>, kAxisCount>;
 }
 [[nodiscard]] std::optional<Axis> parse_axis(std::string_view name) noexcept;
 
-/// Stands for the value that follows from the others: the structure's first builder, the kernel's own leaf,
-/// the box test that the intersector calls for. Builder, leaf and box take it.
-inline constexpr std::string_view kAuto = "auto";
+// kAuto (traversal/kernel_keys.h) stands for the structure's first builder, the kernel's own leaf, the box test that the intersector calls
+// for: builder, leaf and box take it.
 /// Of the builder axis: each builder that the structure takes.
 inline constexpr std::string_view kAll = "all";
 /// The value of an axis that does not apply.
@@ -48,10 +48,6 @@ inline constexpr std::string_view kNone = "-";
 /// What a configuration may name on the axis, in the order of `list`: the registry's values, `auto`, `packet`
 /// and `hybrid` where they exist, and what an optional library would bring (embree). Empty for `threads`.
 [[nodiscard]] std::vector<std::string> known_values(Axis axis, const Registry& registry);
-/// `packet` and `hybrid` stand for the width of the ISA's own registers: packet8 on avx2. Others as they are.
-[[nodiscard]] std::string resolve_traversal(std::string_view traversal, Isa isa);
-/// `padded` for the tests that promise to lose no hit, `fast` for the others.
-[[nodiscard]] std::string_view default_box(std::string_view intersector) noexcept;
 
 /// One line for `list`.
 [[nodiscard]] std::string summary_of(Axis axis, std::string_view value, const Registry& registry);

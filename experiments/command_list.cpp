@@ -5,6 +5,7 @@
 #include "core/names.h"
 #include "experiments/axes.h"
 #include "experiments/commands.h"
+#include "experiments/parameters.h"
 #include "experiments/result.h"
 #include "intersectors/promises.h"
 #include "scenes/catalogue.h"
@@ -24,6 +25,25 @@ std::string plural(Axis axis) {
   }
 }
 
+/// Builder parameters that the structure reads, by builder.
+Json parameters_of(const StructureInfo& info, const Registry& registry) {
+  Json read = Json::object();
+  for (std::string_view builder : info.builders) {
+    Json& list = read[std::string(builder)] = Json::array();
+    for (const std::string& name : parameter_names())
+      if (!is_of_traversal(name) && registry.reads(name, info.name, builder, BuilderParameters{}.below)) list.push_back(name);
+  }
+  return read;
+}
+
+/// Builder parameters that the builder reads, by structure.
+Json parameters_of(const std::string& builder, const Registry& registry) {
+  Json read = Json::object();
+  for (const StructureEntry& entry : registry.structures)
+    if (Json all = parameters_of(entry.info, registry); all.contains(builder)) read[std::string(entry.info.name)] = all[builder];
+  return read;
+}
+
 Json axis_entries(Axis axis, const Registry& registry) {
   Json entries = Json::array();
   for (const std::string& value : known_values(axis, registry)) {
@@ -32,7 +52,9 @@ Json axis_entries(Axis axis, const Registry& registry) {
       const StructureEntry* structure = registry.structure(value);
       entry["available"] = structure != nullptr;
       if (structure) entry["builders"] = structure->info.builders, entry["leaves"] = structure->info.leaves;
+      if (structure) entry["parameters"] = parameters_of(structure->info, registry);
     }
+    if (axis == Axis::builder) entry["parameters"] = parameters_of(value, registry);
     if (axis == Axis::isa) entry["available"] = registry.has(*parse_isa(value));
     entries.push_back(std::move(entry));
   }

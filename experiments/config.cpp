@@ -138,11 +138,12 @@ class ConfigReader {
     for (const auto& entry : map) {
       const std::string key = entry.first.Scalar();
       for (const YAML::Node& node : yaml_.list(entry.second, "parameters: " + key)) {
-        if (node.Scalar() != kAuto) experiment_.parameter_places[key] = yaml_.where(entry.first);  // `auto` asks for nothing
         Parameters scratch;
         if (const std::string wrong = set_parameter(scratch, key, node.Scalar()); !wrong.empty()) {
           yaml_.fail(node, fmt::format("{} must be {}, not '{}'", key, wrong, node.Scalar()));
         }
+        // A default asks for nothing: effective.yaml names them all.
+        if (scratch != Parameters{}) experiment_.parameter_places[key] = yaml_.where(entry.first);
         experiment_.parameters[key].push_back(node.Scalar());
       }
     }

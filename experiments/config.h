@@ -71,7 +71,7 @@ struct Experiment {
   std::vector<SceneChoice> scenes;
   AxisLists axes;  ///< every axis has a value
   ParameterSweep parameters;
-  std::map<std::string, std::string> parameter_places;  ///< file:line of each
+  std::map<std::string, std::string> parameter_places;  ///< file:line of each that has a value other than its default
   RaySettings rays;
   std::vector<CellChoice> include, exclude;
   MeasureSettings measure;

@@ -27,7 +27,7 @@ Isa chosen_isa(const std::string& name, const Registry& registry) {
 }
 
 const StructureEntry& chosen_structure(const std::string& name, const TriangleMesh& mesh, const Registry& registry) {
-  const std::string_view wanted = name != kAuto ? std::string_view(name) : mesh.moves() ? "bvh4_motion" : "bvh8";
+  const std::string_view wanted = resolve_structure(name, mesh.moves());
   const StructureEntry* entry = registry.structure(wanted);
   if (!entry) throw UserError(fmt::format("this build has no structure {}", wanted));
   if (mesh.moves() && !entry->info.holds_motion)
@@ -52,13 +52,8 @@ BuiltKernel build_kernel(const KernelChoice& choice, const TriangleMesh& mesh, c
   const Isa isa = chosen_isa(choice.isa, registry);
   const StructureInfo& info = chosen_structure(choice.structure, mesh, registry).info;
   const StructureEntry* below = info.takes_below ? registry.structure(BuilderParameters{}.below) : nullptr;
-  std::string intersector = choice.intersector;
-  if (intersector == kAuto) {
-    const bool has_watertight = std::ranges::any_of(
-        registry.kernels, [&](const KernelRow& row) { return row.structure == info.name && row.intersector == "watertight"; });
-    intersector = has_watertight ? "watertight" : "pluecker";
-  }
-  const std::string box = choice.box == kAuto ? std::string(default_box(intersector)) : choice.box;
+  const std::string_view intersector = resolve_intersector(choice.intersector, info.name, registry.kernels);
+  const std::string_view box = resolve_box(choice.box, intersector);
   std::string leaf = choice.leaf;
   if (leaf == kAuto) leaf = registry.default_leaf(below ? below->info.name : info.name, intersector, isa);
   std::string traversal = resolve_traversal(choice.traversal, isa);

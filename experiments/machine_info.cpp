@@ -57,9 +57,10 @@ struct Revision {
   bool dirty = false;
 };
 
-/// Of the sources that a build tree links to, else what was written down when the program was installed.
+/// Of what was compiled: of the sources that the program's own build tree links to, else what was written down when it was installed. Only a
+/// program that has neither beside it (one with structures of its own) asks the folder that ARBORETUM_DATA names.
 Revision revision() {
-  const std::filesystem::path data = data_folder();
+  const std::filesystem::path own = program_data_folder(), data = own.empty() ? data_folder() : own;
   Revision r;
   if (std::filesystem::exists(data / "source")) {
     r.hash = git(data / "source", "rev-parse HEAD");

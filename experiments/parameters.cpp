@@ -130,6 +130,14 @@ bool concerns(std::string_view name, std::string_view traversal) {
   return name == "hybrid_threshold" ? traversal.starts_with("hybrid") : name == "rays_in_flight" && traversal == "queued";
 }
 
+void reset_parameter(BuilderParameters& parameters, std::string_view name) {
+  const BuilderParameters defaults;
+  const Field& f = field(name);
+  if (f.integer) parameters.*f.integer = defaults.*f.integer;
+  if (f.real) parameters.*f.real = defaults.*f.real;
+  if (f.word) parameters.*f.word = defaults.*f.word;
+}
+
 void drop_label(std::string& label, std::string_view name) {
   const std::size_t begin = label.find(fmt::format(":{}=", name));
   if (begin == std::string::npos) return;

@@ -18,6 +18,7 @@ using ParameterSweep = std::map<std::string, std::vector<std::string>>;
 struct Parameters {
   BuilderParameters builder;
   TraversalSettings traversal;
+  friend bool operator==(const Parameters&, const Parameters&) = default;
 };
 
 [[nodiscard]] std::vector<std::string> parameter_names();
@@ -28,6 +29,8 @@ struct Parameters {
 /// Whether it is of the ways of traversal, and means something to that one; builders read theirs as they concern them.
 [[nodiscard]] bool is_of_traversal(std::string_view name);
 [[nodiscard]] bool concerns(std::string_view name, std::string_view traversal);
+/// Sets a builder's parameter to its default.
+void reset_parameter(BuilderParameters& parameters, std::string_view name);
 /// Takes ":name=value" out of a label.
 void drop_label(std::string& label, std::string_view name);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 
@@ -95,15 +96,12 @@ class Planner {
   }
 
   /// Fills in `auto` and the ISA's own widths, as far as the structure is known.
-  void resolve(Cell& cell, const StructureEntry* entry) const {
+  void resolve(Cell& cell, const StructureEntry* entry) {
     cell.traversal = resolve_traversal(cell.traversal, cell.isa);
     keep_settings(cell);
-    if (cell.box == kAuto) cell.box = default_box(cell.intersector);
-    if (entry && !entry->info.uses_parameters) cell.parameters = {}, cell.parameter_label.clear();
+    cell.box = std::string(resolve_box(cell.box, cell.intersector));
     // What stands above another structure takes that one's defaults.
-    const bool above = entry && entry->info.takes_below;
-    if (!above) drop_below(cell);
-    const StructureEntry* below = above ? registry_.structure(cell.parameters.below) : nullptr;
+    const StructureEntry* below = entry && entry->info.takes_below ? registry_.structure(cell.parameters.below) : nullptr;
     if (cell.builder == kAuto) {
       const StructureEntry* of = below ? below : entry;
       cell.builder = of && !of->info.builders.empty() ? of->info.builders.front() : kNone;
@@ -113,12 +111,23 @@ class Planner {
           entry ? registry_.default_leaf(below ? below->info.name : cell.structure, cell.intersector, cell.isa) : "";
       cell.leaf = leaf.empty() ? kNone : leaf;
     }
+    keep_parameters(cell);
   }
 
-  /// The structure takes none below: the parameter means nothing to it.
-  static void drop_below(Cell& cell) {
-    cell.parameters.below = BuilderParameters{}.below;
-    drop_label(cell.parameter_label, "below");
+  /// Those that the cell's builder reads: to the others they mean nothing, and what differs in them alone is one cell.
+  void keep_parameters(Cell& cell) {
+    const std::string below = cell.parameters.below;
+    for (const auto& [name, values] : experiment_.parameters) {
+      if (is_of_traversal(name) || reads(name, cell.structure, cell.builder, below)) continue;
+      reset_parameter(cell.parameters, name);
+      drop_label(cell.parameter_label, name);
+    }
+  }
+
+  bool reads(const std::string& parameter, const std::string& structure, const std::string& builder, const std::string& below) {
+    const auto [known, is_new] = reads_.try_emplace({parameter, structure, builder, below}, false);
+    if (is_new) known->second = registry_.reads(parameter, structure, builder, below);
+    return known->second;
   }
 
   /// Those that concern the cell's way of traversal: to the others they mean nothing.
@@ -229,6 +238,8 @@ class Planner {
     if (!names_.insert(name).second) return;
     ++added_;
     traversals_.insert(cell.traversal);
+    for (const auto& [parameter, where] : experiment_.parameter_places)
+      if (!is_of_traversal(parameter) && reads(parameter, cell.structure, cell.builder, cell.parameters.below)) parameters_read_.insert(parameter);
     const std::string never = impossible(cell, entry), here = lacking(cell);
     cell.metric = Cell::Metric::trace;
     if (never.empty() && here.empty()) {
@@ -309,7 +320,12 @@ class Planner {
       }
     }
     for (const auto& [name, where] : experiment_.parameter_places) {
-      if (!is_of_traversal(name) || std::ranges::any_of(traversals_, [&key = name](const std::string& t) { return concerns(key, t); })) continue;
+      if (!is_of_traversal(name)) {
+        if (parameters_read_.contains(name)) continue;
+        throw UserError(fmt::format("{}: {} has no effect: no cell's builder reads it, only {}; add one to the axes, or take it out", where, name,
+                                    registry_.readers_of(name)));
+      }
+      if (std::ranges::any_of(traversals_, [&key = name](const std::string& t) { return concerns(key, t); })) continue;
       throw UserError(fmt::format("{}: {} has no effect: no cell's traversal is {}; add one to the axis, or take it out", where, name,
                                   name == "rays_in_flight" ? "queued" : "a hybrid"));
     }
@@ -320,7 +336,8 @@ class Planner {
   std::vector<ParameterPoint> points_;
   Plan plan_;
   std::vector<Cell> elsewhere_;  ///< of the scene under way: possible, but for what this machine lacks
-  std::set<std::string> names_, traversals_, builds_;
+  std::set<std::string> names_, traversals_, builds_, parameters_read_;
+  std::map<std::array<std::string, 4>, bool> reads_;  ///< of parameter, structure, builder, below
   std::set<std::size_t> used_includes_, used_excludes_;
   std::size_t added_ = 0;
 };

@@ -20,8 +20,9 @@ struct Plan {
 };
 
 /// The product of the axes, with `include`, without `exclude`. A combination that has no kernel, or whose ISA
-/// the machine lacks, is skipped with its reason. Throws UserError for an include that adds nothing and an
-/// exclude that takes nothing away.
+/// the machine lacks, is skipped with its reason. A parameter multiplies and names the cells whose builder, or way of
+/// traversal, reads it, and no others. Throws UserError for an include that adds nothing, an exclude that takes nothing away, and a parameter
+/// that no cell reads.
 [[nodiscard]] Plan make_plan(const Experiment& experiment, const Registry& registry);
 
 /// Keeps the cells (and those of `elsewhere`) that a NameFilter takes. Throws UserError for a broken expression.

@@ -1,6 +1,11 @@
 #include "experiments/registry.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <utility>
+
+#include "structures/parameters_read.h"
 
 namespace arboretum {
 
@@ -24,6 +29,37 @@ bool Registry::has(Isa isa) const {
   return std::ranges::find(isas, isa) != isas.end();
 }
 
+bool Registry::reads(std::string_view parameter, std::string_view name, std::string_view builder, std::string_view below) const {
+  const StructureEntry* entry = structure(name);
+  if (!entry || !entry->info.uses_parameters) return false;
+  const auto read = parameters_read ? parameters_read(name, builder, below) : std::nullopt;
+  if (read) return std::ranges::find(*read, parameter) != read->end();
+  return parameter != "below" || entry->info.takes_below;
+}
+
+std::string Registry::readers_of(std::string_view parameter) const {
+  std::vector<std::pair<std::string, std::string>> groups;  // builders, empty for all; structures
+  for (const StructureEntry& entry : structures) {
+    if (entry.info.takes_below && parameter != "below") continue;  // it reads what the structure below it does
+    std::vector<std::string_view> builders;
+    for (std::string_view builder : entry.info.builders)
+      if (reads(parameter, entry.info.name, builder, "")) builders.push_back(builder);
+    if (builders.empty()) continue;
+    const std::string key = builders.size() == entry.info.builders.size() ? "" : fmt::format("{}", fmt::join(builders, ", "));
+    const auto group = std::ranges::find(groups, key, &std::pair<std::string, std::string>::first);
+    if (group == groups.end())
+      groups.emplace_back(key, entry.info.name);
+    else
+      group->second += fmt::format(", {}", entry.info.name);
+  }
+  std::string words;
+  for (const auto& [builders, names] : groups) {
+    if (!words.empty()) words += "; ";
+    words += builders.empty() ? names : fmt::format("{} ({})", builders, names);
+  }
+  return words.empty() ? "nothing in this build" : words;
+}
+
 Registry this_registry() {
   Registry registry;
   registry.structures = all_structures();
@@ -32,6 +68,7 @@ Registry this_registry() {
   registry.default_leaf = default_leaf;
   registry.why_no_kernel = why_no_kernel;
   registry.build = build_structure;
+  registry.parameters_read = parameters_read;
   return registry;
 }
 

@@ -10,6 +10,7 @@
 
 #include "core/names.h"
 #include "library/mesh_check.h"
+#include "traversal/kernel_keys.h"
 
 namespace arboretum {
 namespace {
@@ -22,17 +23,22 @@ std::vector<std::string_view> isa_names(std::span<const Isa> isas) {
   return names;
 }
 
+std::string_view leaf_of(const TracerSettings& s, Isa isa) {
+  return is_auto(s.leaf) ? default_leaf(s.structure, s.intersector, isa) : std::string_view(s.leaf);
+}
+
 const KernelRow* find(const TracerSettings& s, std::string_view traversal, Isa isa) {
-  const std::string_view leaf = s.leaf.empty() ? default_leaf(s.structure, s.intersector, isa) : std::string_view(s.leaf);
-  return find_kernel(s.structure, leaf, s.intersector, s.box, traversal, isa);
+  const std::string_view leaf = leaf_of(s, isa);
+  const KernelRow* row = find_kernel(s.structure, leaf, s.intersector, s.box, resolve_traversal(traversal, isa), isa);
+  return row || traversal != kAuto ? row : find_kernel(s.structure, leaf, s.intersector, s.box, "single", isa);
 }
 
 /// The instruction sets that the settings allow, the best first.
 std::vector<Isa> allowed_isas(const TracerSettings& s) {
   const std::span<const Isa> available = available_isas();
-  if (s.isa.empty()) return {available.rbegin(), available.rend()};
-  check_name("isa", s.isa, isa_names(kAllIsas));
+  if (is_auto(s.isa)) return {available.rbegin(), available.rend()};
   const std::optional<Isa> isa = parse_isa(s.isa);
+  if (!isa) check_name("isa", s.isa, isa_names(kAllIsas));
   if (!is_available(*isa)) {
     std::string line = "isa " + s.isa + " is not available here; use one of";
     for (std::string_view name : isa_names(available)) line.append(" ").append(name);
@@ -48,22 +54,23 @@ void check_sizes(const RayBatch& rays, std::size_t answers) {
     throw UserError("a batch of " + std::to_string(rays.size()) + " rays with " + std::to_string(rays.times.size()) + " times");
 }
 
-/// The row for batches. Fills in the ISA and the leaf.
+/// The row for batches. Fills in what is left to the others: of the settings that `auto` and the like may stand in, all but the builder.
 const KernelRow& resolve_kernel(TracerSettings& s) {
   const AxisValues& known = axis_values();
-  if (!s.leaf.empty()) check_name("leaf", s.leaf, find_structure(s.structure)->info.leaves);
+  s.intersector = std::string(resolve_intersector(s.intersector, s.structure, kernel_table()));
+  s.box = std::string(resolve_box(s.box, s.intersector));
+  if (!is_auto(s.leaf)) check_name("leaf", s.leaf, find_structure(s.structure)->info.leaves);
   check_name("intersector", s.intersector, known.intersectors);
   check_name("box", s.box, known.boxes);
-  check_name("traversal", s.traversal, known.traversals);
   const std::vector<Isa> isas = allowed_isas(s);
+  if (const std::string way = resolve_traversal(s.traversal, isas.front()); way == s.traversal && way != kAuto) check_name("traversal", way, known.traversals);
   for (Isa isa : isas) {
     if (const KernelRow* row = find(s, s.traversal, isa)) {
-      s.isa = to_string(isa), s.leaf = row->leaf;
+      s.isa = to_string(isa), s.leaf = row->leaf, s.traversal = row->traversal;
       return *row;
     }
   }
-  const std::string_view leaf = s.leaf.empty() ? default_leaf(s.structure, s.intersector, isas.front()) : std::string_view(s.leaf);
-  throw UserError(why_no_kernel(s.structure, leaf, s.intersector, s.box, s.traversal, isas.front()));
+  throw UserError(why_no_kernel(s.structure, leaf_of(s, isas.front()), s.intersector, s.box, resolve_traversal(s.traversal, isas.front()), isas.front()));
 }
 
 }  // namespace
@@ -91,13 +98,14 @@ TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle
 Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
     : mesh_(std::make_unique<const TriangleMesh>(std::move(mesh))), settings_(std::move(settings)) {
   check_mesh(*mesh_);
+  settings_.structure = std::string(resolve_structure(settings_.structure, mesh_->moves()));
   const StructureEntry* entry = find_structure(settings_.structure);
   if (!entry) {
     std::vector<std::string_view> names;
     for (const StructureEntry& e : all_structures()) names.push_back(e.info.name);
     check_name("structure", settings_.structure, names);
   }
-  if (settings_.builder.empty()) settings_.builder = entry->info.builders.front();
+  if (is_auto(settings_.builder)) settings_.builder = entry->info.builders.front();
   if (settings_.threads == 0) settings_.threads = std::max(1u, std::thread::hardware_concurrency());
   batch_ = &resolve_kernel(settings_);
   const auto row_or_batch = [&](const std::string& traversal) {

@@ -28,16 +28,17 @@ namespace arboretum {
 [[nodiscard]] TriangleMesh make_mesh(std::span<const float> coordinates, std::span<const std::uint32_t> indices);
 [[nodiscard]] TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles);
 
-/// How a Tracer is built and how it traces, by the keys that `arboretum list` shows. The defaults put correctness first:
-/// no hit is lost at an edge, nor between two boxes.
+/// How a Tracer is built and how it traces, by the keys that `arboretum list` shows and `render` takes: `auto` (or nothing) where a value
+/// follows from the others, `packet` and `hybrid` for the instruction set's own width, `avx` for avx2 (traversal/kernel_keys.h). The defaults put
+/// correctness first: no hit is lost at an edge, nor between two boxes.
 struct TracerSettings {
   std::string structure = "bvh8";
-  std::string builder;  ///< empty: the structure's first
-  std::string leaf;     ///< empty: the block that suits structure, intersector and instruction set
+  std::string builder;  ///< `auto`: the structure's first
+  std::string leaf;     ///< `auto`: the block that suits structure, intersector and instruction set
   std::string intersector = "watertight";
   std::string box = "padded";
-  std::string traversal = "single";  ///< of batches; one ray goes by `single`, a packet of N by `packetN`, where the structure has them
-  std::string isa;                   ///< empty: the best of this machine for which there is such a kernel
+  std::string traversal = "single";  ///< of batches, `auto`: the structure's way called so, else single rays; one ray goes by `single`, a packet of N by `packetN`, where the structure has them
+  std::string isa;                   ///< `auto`: the best of this machine for which there is such a kernel
   unsigned threads = 0;              ///< of the build; 0: one a core. The structure is the same for any number.
   BuilderParameters parameters;
 };
@@ -91,7 +92,7 @@ class Tracer {
   [[nodiscard]] const Accel& structure() const noexcept { return *accel_; }
   /// Seconds, peak memory and phases of the build.
   [[nodiscard]] const BuildReport& report() const noexcept { return report_; }
-  /// The settings with every empty key filled in.
+  /// The settings with every key filled in that was left to the others.
   [[nodiscard]] const TracerSettings& settings() const noexcept { return settings_; }
   /// The row of the kernel table that traces batches.
   [[nodiscard]] const KernelRow& kernel() const noexcept { return *batch_; }

@@ -282,6 +282,35 @@ metrics: [trace]
   CHECK(plan.cells[2].builder_name() == "none");
 }
 
+TEST_CASE("a parameter multiplies and names the cells that read it, and no others; one that none reads is refused") {
+  const TemporaryFolder folder;
+  Registry registry = paper_registry();
+  registry.parameters_read = [](std::string_view structure, std::string_view builder, std::string_view) -> std::optional<std::vector<std::string_view>> {
+    if (structure != "tree") return std::nullopt;
+    return builder == "morton" ? std::vector<std::string_view>{"morton_bits"} : std::vector<std::string_view>{"bins", "collapse"};
+  };
+  const auto builders = [&](const std::string& axes, const std::string& parameters, const Overrides& overrides = {}) {
+    const fs::path file = folder.write("plan.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree, list], isa: [sse], "
+                                                    "intersector: [moller_trumbore], " + axes + "}\nparameters: {" + parameters + "}\nmetrics: [trace]\n");
+    std::vector<std::string> list;
+    for (const Cell& cell : make_plan(read_experiment(file, registry, overrides), registry).cells) list.push_back(cell.builder_name());
+    return list;
+  };
+  using List = std::vector<std::string>;
+  CHECK(builders("builder: [all]", "bins: [8, 16], morton_bits: [30, 63]") ==
+        List{"binned_sah:bins=8", "binned_sah:bins=16", "morton:morton_bits=30", "morton:morton_bits=63", "none"});
+  CHECK(builders("builder: [all]", "collapse: [greedy, optimal]") == List{"binned_sah:collapse=greedy", "binned_sah:collapse=optimal", "morton", "none"});
+  for (const std::string parameters : {"ploc_radius: [3, 4]", "ploc_radius: 3", "max_depth: 5", "grid_density: 2", "below: bvh4"}) {
+    const std::string error = error_of([&] { builders("builder: [all]", parameters); });
+    INFO(parameters << ": " << error);
+    CHECK(error.find("plan.yaml:3: " + parameters.substr(0, parameters.find(':')) + " has no effect") != std::string::npos);
+  }
+  CHECK(error_of([&] { builders("builder: [binned_sah]", "morton_bits: 30"); }).find("only morton (tree)") != std::string::npos);
+  // Asking for a default is no error (effective.yaml names them all), nor is an axis that the command line takes away from a parameter.
+  CHECK(builders("builder: [binned_sah]", "max_depth: 0, ploc_radius: 16, morton_bits: 63") == List{"binned_sah"});
+  CHECK(builders("builder: [all]", "morton_bits: [30, 63]", {.axes = {"builder=binned_sah"}}) == List{"binned_sah"});
+}
+
 TEST_CASE("the command line lays axes over the file") {
   const TemporaryFolder folder;
   const Registry registry = paper_registry();

@@ -451,3 +451,39 @@ TEST_CASE("the kernel table has every structure, and names each row once") {
     if (!is_available(isa)) std::cout << "skipped: " << to_string(isa) << ", not available here\n";
   }
 }
+
+TEST_CASE("what has no kernel says why: which instruction sets, leaves or loops there are") {
+  const auto why = [](std::string_view structure, std::string_view leaf, std::string_view traversal, Isa isa) {
+    return why_no_kernel(structure, leaf, "moller_trumbore", "fast", traversal, isa);
+  };
+  const auto here = [](std::string_view structure) { return find_structure(structure) != nullptr; };  // a program may have others, and fewer of ours
+  if (here("bvh8")) {
+    CHECK(why("bvh8", "triangle8", "single", Isa::scalar) == "bvh8 has triangle8 with sse, avx2, avx512 only");
+    for (Isa isa : {Isa::scalar, Isa::sse, Isa::avx2})
+      if (cpu_supports(isa)) CHECK(why("bvh8", "triangle16", "single", isa) == "bvh8 has triangle16 with avx512 only");
+  }
+  if (here("bvh4_motion")) CHECK(why("bvh4_motion", "triangle4", "single", Isa::scalar) == "bvh4_motion has no leaf triangle4: it has triangle4i");
+  // What a reason says of an instruction set is what the table has.
+  for (const StructureEntry& entry : all_structures()) {
+    for (Isa isa : available_isas()) {
+      for (std::string_view leaf : entry.info.leaves) {
+        const bool there = std::ranges::any_of(kernel_table(), [&](const KernelRow& r) { return r.structure == entry.info.name && r.leaf == leaf && r.isa == isa; });
+        if (there || entry.info.build_depends_on_isa) continue;
+        INFO(entry.info.name << " " << leaf << " " << to_string(isa));
+        const std::string reason = why_no_kernel(entry.info.name, leaf, "moller_trumbore", "fast", "single", isa);
+        const std::size_t with = reason.find(" with ");
+        REQUIRE(with != std::string::npos);
+        CHECK(reason.find(to_string(isa), with) == std::string::npos);
+      }
+    }
+    // Every structure of ours that lacks rays in flight or streams has a reason of its own, not a list of those that have them.
+    for (std::string_view traversal : {"queued", "queued16", "stream", "stream_sorted", "stream_lists"}) {
+      const bool there = std::ranges::any_of(kernel_table(), [&](const KernelRow& r) { return r.structure == entry.info.name && r.traversal == traversal; });
+      if (there || entry.info.build_depends_on_isa) continue;
+      const std::string reason = why_no_kernel(entry.info.name, entry.info.leaves.front(), "moller_trumbore", "fast", traversal, Isa::scalar);
+      INFO(entry.info.name << " " << traversal << ": " << reason);
+      CHECK(reason.find("that is for") == std::string::npos);
+      CHECK(reason.find(std::string(entry.info.name) + " has no " + std::string(traversal) + " traversal: ") == 0);
+    }
+  }
+}

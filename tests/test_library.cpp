@@ -2,6 +2,7 @@
 // header says, and every misuse is one line.
 #include "library/arboretum.h"
 
+#include <tuple>
 #include <type_traits>
 
 #include "core/instances.h"
@@ -116,6 +117,24 @@ TEST_CASE("the defaults: watertight, padded, the best instruction set") {
   CHECK(tracer.structure().bytes() > 0);
   const Isa best = tracer.kernel().isa;
   for (Isa isa : available_isas()) CHECK((isa <= best || default_leaf("bvh8", "watertight", isa).empty()));
+}
+
+TEST_CASE("keys that stand for others mean what they mean on the command line") {
+  const TriangleMesh mesh = random_triangles(200, 0.3f, 3);
+  const auto settled = [&](const TracerSettings& settings) { return Tracer(mesh, settings).settings(); };
+  const TracerSettings plain = settled({});
+  const TracerSettings all_auto = settled({.structure = "auto", .builder = "auto", .leaf = "auto", .intersector = "auto", .box = "auto", .isa = "auto"});
+  CHECK(std::tie(all_auto.structure, all_auto.builder, all_auto.leaf, all_auto.intersector, all_auto.box, all_auto.isa) ==
+        std::tie(plain.structure, plain.builder, plain.leaf, plain.intersector, plain.box, plain.isa));
+  CHECK(settled({.intersector = "moller_trumbore", .box = "auto"}).box == "fast");
+  CHECK(settled({.structure = "bvh8", .traversal = "auto"}).traversal == "auto");
+  CHECK(settled({.structure = "grid", .traversal = "auto"}).traversal == "single");
+  for (Isa isa : available_isas()) {
+    const std::string width = std::to_string(native_width(isa)), name(to_string(isa));
+    CHECK(settled({.traversal = "packet", .isa = name}).traversal == "packet" + width);
+    CHECK(settled({.traversal = "hybrid", .isa = name}).traversal == "hybrid" + width);
+  }
+  if (is_available(Isa::avx2)) CHECK(settled({.isa = "avx"}).isa == "avx2");
 }
 
 TEST_CASE("a tracer moves with its mesh") {

@@ -5,6 +5,8 @@
 #include <tuple>
 
 #include "core/error.h"
+#include "structures/leaves/blocks.h"
+#include "structures/leaves/leaf_form.h"
 #include "structures/registry.h"
 
 namespace arboretum {
@@ -46,9 +48,69 @@ template <class Wanted>
   return words;
 }
 
+/// Whether kernels of an instruction set with registers of W lanes, 1 for scalar, take blocks of `width` triangles.
+template <int W>
+[[nodiscard]] bool takes_blocks(unsigned width) {
+  bool takes = false;
+  for_each_type(BlocksOfWidth<EdgeBlock, W>{}, [&]<class Block>(std::type_identity<Block>) { takes = takes || unsigned(Block::kWidth) == width; });
+  return takes;
+}
+
+[[nodiscard]] bool takes_blocks(Isa isa, unsigned width) {
+  switch (isa) {
+    case Isa::scalar: return takes_blocks<1>(width);
+    case Isa::sse: return takes_blocks<4>(width);
+    case Isa::avx2: return takes_blocks<8>(width);
+    case Isa::avx512: return takes_blocks<16>(width);
+  }
+  return false;
+}
+
+/// The instruction sets, this machine's or not, whose kernels read the leaf: " avx2, avx512".
+[[nodiscard]] std::string isas_of_leaf(unsigned width) {
+  std::string words;
+  for (Isa isa : kAllIsas)
+    if (takes_blocks(isa, width)) words.append(words.empty() ? " " : ", ").append(to_string(isa));
+  return words;
+}
+
+/// Of a leaf for which the structure has no row of that way of traversal on that instruction set.
+[[nodiscard]] std::string why_no_leaf(std::string_view structure, std::string_view leaf, std::string_view traversal, Isa isa) {
+  const std::string s(structure), l(leaf), t(traversal);
+  const StructureEntry* entry = find_structure(structure);
+  const LeafForm* form = find_leaf_form(leaf);
+  const bool taken = entry && std::ranges::find(entry->info.leaves, leaf) != entry->info.leaves.end();
+  if (taken && form && !takes_blocks(isa, form->width)) return s + " has " + l + " with" + isas_of_leaf(form->width) + " only";
+  const std::string leaves = values_of(&KernelRow::leaf, [&](const KernelRow& r) { return r.structure == structure && r.traversal == traversal && r.isa == isa; });
+  return s + " has no leaf " + l + (taken ? " for " + t + ": that has" : ": it has") + leaves;
+}
+
+/// Ways of traversal that could be written for a structure and are not: what is in the way of sharing the loops that are there.
+struct NotBuilt {
+  std::string_view structure;
+  bool queued, stream;
+  std::string_view why;
+};
+constexpr NotBuilt kNotBuilt[] = {
+    {"bvh4_aos", true, false, "not built: rays in flight push the children that a node test leaves in one register, whose references lie side by side; here they lie 16 bytes apart, in lane w of the boxes"},
+    {"bvh4_aos", false, true, "not built: a stream keeps a node's planes in registers, each plane of all children in one, for all its rays; here a register holds whole boxes beside the ray's own interval"},
+    {"bvh4_quantised", true, false, "not built: rays in flight read planes that are floats; these are steps of the node's own grid, which each test brings into the ray's terms first"},
+    {"bvh4_quantised", false, true, "not built: a stream keeps a node's planes in registers as floats for all its rays; these are decoded anew for each ray, as part of its distances"},
+    {"bvh8_quantised", true, false, "not built: rays in flight read planes that are floats; these are steps of the node's own grid, which each test brings into the ray's terms first"},
+    {"bvh8_quantised", false, true, "not built: a stream keeps a node's planes in registers as floats for all its rays; these are decoded anew for each ray, as part of its distances"},
+    {"bih", true, false, "not built: the loops over rays in flight are the wide BVHs' and the kd-tree's; a step here is two planes that may overlap or leave a gap, with an interval of t for each child"},
+    {"bih", false, true, "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them"},
+    {"kdtree", false, true, "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them"},
+    {"octree", true, false, "not built: a node has no boxes, its place in the cube comes with the visit, and a step of a ray in flight would have to carry it"},
+    {"octree", false, true, "not built: a node has no boxes, its place in the cube comes with the visit; a stream reads boxes from the node"},
+};
+
 /// Of a way of traversal that the structure has no row of.
 [[nodiscard]] std::string why_no_traversal(std::string_view structure, std::string_view traversal) {
   if (const StructureEntry* entry = find_structure(structure); entry && !entry->info.only_single_rays.empty()) return std::string(entry->info.only_single_rays);
+  const bool queued = traversal.starts_with("queued"), stream = traversal == "stream" || traversal == "stream_sorted" || traversal == "stream_lists";
+  for (const NotBuilt& n : kNotBuilt)
+    if (n.structure == structure && ((n.queued && queued) || (n.stream && stream))) return std::string(n.why);
   const std::string owners = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.traversal == traversal; });
   return owners.empty() ? "no structure of this build has it on this machine" : "that is for" + owners;
 }
@@ -107,7 +169,7 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   if (!any_row(structure, "", "", "", traversal, nullptr)) return s + " has no " + t + " traversal: " + why_no_traversal(structure, traversal);
   if (!any_row(structure, "", "", "", traversal, &isa)) return s + " has no " + t + " traversal on " + a;
   if (!any_row(structure, "", intersector, "", traversal, &isa)) return s + " has no " + i + " kernels for " + t;
-  if (!any_row(structure, leaf, "", "", traversal, &isa)) return s + " has no leaf " + l + " for " + t;
+  if (!any_row(structure, leaf, "", "", traversal, &isa)) return why_no_leaf(structure, leaf, traversal, isa);
   if (!any_row(structure, leaf, intersector, "", traversal, &isa)) {
     std::string others;
     for (const KernelRow& r : kernel_table()) {

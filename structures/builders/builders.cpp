@@ -1,7 +1,10 @@
 #include "structures/builders/builders.h"
 
+#include <array>
+
 #include "core/error.h"
 #include "core/names.h"
+#include "structures/builders/builder_parameters.h"
 #include "structures/builders/embree_builders.h"
 #include "structures/builders/fast_builders.h"
 #include "structures/builders/reinsertion.h"
@@ -37,6 +40,7 @@ BinaryBuilder on_any(Isa) {
 struct Entry {
   std::string_view name;
   BinaryBuilder (*on)(Isa);
+  std::array<std::string_view, 4> reads = {};  ///< of BuilderParameters; reinsertion's apart
   unsigned reinserted_top = 0;  ///< where reinsertion_top leaves it to the builder
 };
 
@@ -44,15 +48,15 @@ struct Entry {
 constexpr unsigned kTop = 512, kMostTop = 65536;
 
 constexpr Entry kBuilders[] = {
-    {"binned_sah", on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>, kTop},
-    {"sweep_sah", on_any<build_sweep_sah>, kTop},
-    {"spatial_sah", on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>, kTop},
-    {"morton", on_any<build_morton>},
-    {"ploc", on_any<build_ploc>},
+    {"binned_sah", on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>, {"bins"}, kTop},
+    {"sweep_sah", on_any<build_sweep_sah>, {}, kTop},
+    {"spatial_sah", on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>, {"bins", "duplication_budget", "spatial_overlap", "spatial_gain"}, kTop},
+    {"morton", on_any<build_morton>, {"morton_bits"}},
+    {"ploc", on_any<build_ploc>, {"morton_bits", "ploc_radius"}},
 #ifdef ARBORETUM_HAVE_EMBREE
-    {"embree_low", on_any<build_embree_low>},
-    {"embree_medium", on_any<build_embree_medium>},
-    {"embree_high", on_any<build_embree_high>},
+    {"embree_low", on_any<build_embree_low>, {"traversal_cost", "intersection_cost"}},
+    {"embree_medium", on_any<build_embree_medium>, {"traversal_cost", "intersection_cost"}},
+    {"embree_high", on_any<build_embree_high>, {"traversal_cost", "intersection_cost", "duplication_budget"}},
 #endif
 };
 
@@ -67,6 +71,19 @@ void require_budget(std::string_view builder, std::size_t triangles, float budge
     throw UserError(std::string(builder) + ": " + std::to_string(triangles) + " triangles and a duplication_budget of " + std::to_string(budget) +
                     " make more than 2^30 - 1 references; take a smaller duplication_budget or a smaller mesh");
   }
+}
+
+std::vector<std::string_view> binary_builder_parameters(std::string_view builder) {
+  const bool reinserts = builder.ends_with(kReinsertion);
+  if (reinserts) builder.remove_suffix(kReinsertion.size());
+  for (const Entry& e : kBuilders) {
+    if (e.name != builder) continue;
+    std::vector<std::string_view> names{reinserts ? "reinsertion_rounds" : "reinsertion_top"};
+    for (std::string_view name : e.reads)
+      if (!name.empty()) names.push_back(name);
+    return names;
+  }
+  return {};
 }
 
 const std::vector<std::string_view>& binary_builder_names() {

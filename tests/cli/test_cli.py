@@ -186,6 +186,11 @@ class CommandLine(CommandLineCase):
                 self.assertGreater(row["build_seconds"], 0)
         for key in ("cpu", "isa", "compiler", "git_revision", "git_dirty", "configuration_hash", "seed", "date", "memory_bytes"):
             self.assertIn(key, document["context"])
+        # The revision is the program's, wherever catalogue and plot scripts are taken from.
+        there = self.run_small("--out", "there", "--filter", rows[0]["run_name"], env={**os.environ, "ARBORETUM_DATA": str(Path(__file__).parents[2])})
+        self.assertIn(there.returncode, (0, 1), there.stderr)
+        context = json.loads((self.folder / "there" / "results.json").read_text())["context"]
+        self.assertEqual(context["git_revision"], document["context"]["git_revision"])
         wrong = any(row.get("wrong_answers") for row in rows)
         self.assertEqual(result.returncode, 1 if wrong else 0)
         self.assertEqual(len((out / "results.csv").read_text().splitlines()), len(rows) + 1)
@@ -317,6 +322,10 @@ class CommandLine(CommandLineCase):
                 self.assertTrue(entry["summary"], f"{title}: {entry['name']} has no summary")
         self.assertEqual(json.loads(self.call("list", "structures", "--json").stdout), listed["structures"])
         self.assertIn("bvh8", self.call("list", "structures").stdout)
+        read = {s["name"]: s["parameters"] for s in listed["structures"] if s["available"]}
+        self.assertIn("ploc_radius", read["bvh8"]["ploc"])
+        self.assertNotIn("ploc_radius", read["bvh8"]["binned_sah"])
+        self.assertEqual(next(b for b in listed["builders"] if b["name"] == "uniform")["parameters"], {"grid": ["grid_density"], "two_level": read["two_level"]["uniform"]})
 
     def test_info(self):
         info = json.loads(self.call("info", "sphere_flake:2000", "--json").stdout)

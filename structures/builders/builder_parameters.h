@@ -1,0 +1,12 @@
+// What each builder of binary trees reads of BuilderParameters; told beside the builder, in the table of builders.cpp.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+namespace arboretum {
+
+/// What build_binary_tree reads with that builder; nothing for a builder that is not there.
+[[nodiscard]] std::vector<std::string_view> binary_builder_parameters(std::string_view builder);
+
+}  // namespace arboretum
