@@ -15,7 +15,7 @@ namespace arboretum {
 class StructureCache {
  public:
   /// An empty `folder`: no cache, nothing is found or kept. A folder that is missing is made with the first structure.
-  StructureCache(std::filesystem::path folder, NoteFunction note) : folder_(std::move(folder)), note_(std::move(note)) {}
+  StructureCache(std::filesystem::path folder, NoteFunction note);
 
   /// The saved structure that fits, built by this very program; nullptr where there is none. A file that does not fit is noted and left to keep() to
   /// replace.
