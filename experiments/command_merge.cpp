@@ -80,7 +80,7 @@ ExitStatus command_merge(const MergeCommand& command) {
     if (command.require_all) throw UserError(missing + "; give the folders that hold them too, or leave out --require-all");
     merged.outcome.warnings.insert(merged.outcome.warnings.begin(), missing);
   }
-  if (!command.no_plots && !plots_of(merged.context).empty()) require_chosen_python();
+  if (!command.no_plots) require_chosen_python();
   make_output_folder(command.out);
   write_beside(command.out, parts, merged);
   std::string cells;

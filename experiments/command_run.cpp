@@ -151,7 +151,7 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   initialize_benchmark(command.benchmark.others);
   Json context = machine_context(experiment, hash, command.command_line);
   add_custom_context(context, command.benchmark);
-  if (!command.no_plots && !experiment.plots.empty() && command.benchmark.format == "console") require_chosen_python();
+  if (!command.no_plots && command.benchmark.format == "console") require_chosen_python();
   require_scenes(experiment, plan);
   make_output_folder(folder);
   if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
