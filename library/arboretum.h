@@ -33,14 +33,14 @@ namespace arboretum {
 /// correctness first: no hit is lost at an edge, nor between two boxes.
 struct TracerSettings {
   std::string structure = "bvh8";
-  std::string builder;  ///< `auto`: the structure's first
-  std::string leaf;     ///< `auto`: the block that suits structure, intersector and instruction set
+  std::string builder = {};  ///< `auto`: the structure's first
+  std::string leaf = {};     ///< `auto`: the block that suits structure, intersector and instruction set
   std::string intersector = "watertight";
   std::string box = "padded";
   std::string traversal = "single";  ///< of batches, `auto`: the structure's way called so, else single rays; one ray goes by `single`, a packet of N by `packetN`, where the structure has them
-  std::string isa;                   ///< `auto`: the best of this machine for which there is such a kernel
+  std::string isa = {};              ///< `auto`: the best of this machine for which there is such a kernel
   unsigned threads = 0;              ///< of the build; 0: one a core. The structure is the same for any number.
-  BuilderParameters parameters;
+  BuilderParameters parameters = {};
 };
 
 /// A mesh with a structure over it, ready for rays. Moves, does not copy; a Tracer that was moved from can only be assigned to

@@ -56,7 +56,7 @@ class ResultFolders(CommandLineCase):
         for _ in range(2):  # the second run must not take the first one's revision for that of all results
             again = self.run_small("--shard", "1/3", *FEW, "--resume")
             self.assertIn("begun at revision aaaaaaaaaaaa", again.stderr)
-            self.assertIn("begun at revision aaaaaaaaaaaa", " ".join(json.loads((self.folder / folder / "results.json").read_text())["warnings"]))
+            self.assertIn("begun at revision aaaaaaaaaaaa", " ".join(self.context(folder)["warnings"]))
             self.assertEqual([c["git_revision"] for c in json.loads(plan.read_text())["earlier_contexts"]], ["a" * 40])
 
     def test_merged_shards_are_the_whole_run(self):
