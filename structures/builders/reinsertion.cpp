@@ -30,10 +30,16 @@ class Reinsertion {
  public:
   explicit Reinsertion(LinkedTree& tree) : tree_(tree), nodes_(tree.nodes), parent_(tree.nodes.size()), height_(tree.nodes.size()) {
     parent_[tree.root] = kNone;
-    for (auto i = std::uint32_t(nodes_.size()); i-- > 0;) {  // children first
-      if (!nodes_[i].is_leaf()) parent_[nodes_[i].left] = parent_[nodes_[i].right] = i;
-      height_[i] = height_from_children(i);
+    MeteredVector<std::uint32_t> order(nodes_.size());  // parents before their children, wherever they stand
+    std::size_t listed = 0;
+    order[listed++] = tree.root;
+    for (std::size_t k = 0; k < listed; ++k) {
+      const LinkedNode& node = nodes_[order[k]];
+      if (node.is_leaf()) continue;
+      parent_[node.left] = parent_[node.right] = order[k];
+      order[listed++] = node.left, order[listed++] = node.right;
     }
+    while (listed-- > 0) height_[order[listed]] = height_from_children(order[listed]);
   }
 
   /// Whether anything was gained.
