@@ -122,15 +122,53 @@ void write_results(const std::filesystem::path& folder, const RunOutcome& outcom
   if (flags.format != "console") fmt::print("{}", text(flags.format, flags.report_aggregates_only || flags.display_aggregates_only));
 }
 
-/// What an earlier run concluded with, its figures among it. Other files are not ours.
-void remove_stale(const std::filesystem::path& folder) {
+/// What a run concludes with, its figures among it.
+std::vector<std::string> concluding_files() {
   std::vector<std::string> names{"results.json", "results.csv", "report.html"};
   for (std::string_view plot : plot_names())
     for (const char* extension : {".png", ".svg"}) names.push_back(std::string(plot) + extension);
-  for (const std::string& name : names) {
-    std::error_code ignored;
-    if (!std::filesystem::is_directory(folder / name, ignored)) std::filesystem::remove(folder / name, ignored);
+  return names;
+}
+
+/// Files of `names` that are in the folder. Others there are not ours.
+std::vector<std::string> present(const std::filesystem::path& folder, std::vector<std::string> names) {
+  std::error_code ignored;
+  std::erase_if(names, [&](const std::string& name) { return !std::filesystem::is_regular_file(folder / name, ignored); });
+  return names;
+}
+
+void remove_files(const std::filesystem::path& folder, const std::vector<std::string>& names) {
+  std::error_code ignored;
+  for (const std::string& name : names) std::filesystem::remove(folder / name, ignored);
+}
+
+/// All that a run writes into its folder.
+std::vector<std::string> files_of_run(const std::filesystem::path& folder) {
+  std::vector<std::string> names = concluding_files();
+  names.insert(names.end(), {"cells.jsonl", "repetitions.jsonl", "effective.yaml", kPlanFile});
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("camera_edges-") && name.ends_with(".json")) names.push_back(name);
   }
+  return present(folder, std::move(names));
+}
+
+/// Nothing measured is lost by a run that begins anew: what the last one left goes to a folder beside it, in place of the one before.
+void set_aside(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (const auto bytes = std::filesystem::file_size(folder / "cells.jsonl", error); error || bytes == 0) {
+    remove_files(folder, present(folder, concluding_files()));
+    return;
+  }
+  const std::filesystem::path aside = folder / "previous";
+  make_output_folder(aside);
+  remove_files(aside, files_of_run(aside));
+  for (const std::string& name : files_of_run(folder)) {
+    std::filesystem::rename(folder / name, aside / name, error);
+    if (error) throw UserError(fmt::format("{} cannot be moved to {}: {}; choose another folder with --out", (folder / name).string(), aside.string(), error.message()));
+  }
+  fmt::print(stderr, "{}: the results of the run before are in {}\n", folder.string(), aside.string());
 }
 
 /// What --benchmark_context says of the run goes into the context, beside what is there already and will be.
@@ -157,10 +195,9 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
   if (!command.benchmark.out.empty())
     AppendFile(command.benchmark.out, true);  // cannot be written: say so now
-  const bool replaces = !command.resume && std::filesystem::exists(folder / "cells.jsonl");
+  if (!command.resume) set_aside(folder);
   Journal journal(folder, hash, plan, command.resume);
-  if (replaces) fmt::print(stderr, "{}: the results of an earlier run are replaced\n", folder.string());
-  remove_stale(folder);
+  remove_files(folder, present(folder, concluding_files()));
   write_whole(folder / "effective.yaml",
               fmt::format("# configuration hash: {}\n{}{}", hash, shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
   if (!shard.is_whole()) context["shard"] = shard.text();

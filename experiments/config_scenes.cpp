@@ -64,8 +64,18 @@ auto with_place(const YamlReader& yaml, const YAML::Node& node, const Read& read
 
 SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::filesystem::path& folder, std::string& missing) {
   if (node.IsScalar()) {
-    const std::string word = yaml.text(node, "scene");
-    return with_place(yaml, node, [&] { return named(word); });
+    // As on the command line, but a name is never a file of the folder that the program happens to run in.
+    const std::string word = yaml.text(node, "scene"), extension = std::filesystem::path(word).extension().string();
+    SceneSpec spec;
+    if (extension == ".yaml" || extension == ".yml") {
+      spec.scene = find_file(yaml, node, "scene", folder, false, missing);
+    } else if (!extension.empty() || word.find('/') != std::string::npos) {
+      spec.file = find_file(yaml, node, "file", folder, false, missing);
+    } else {
+      spec = with_place(yaml, node, [&] { return word.find(':') == std::string::npos ? named(word) : parse_scene_word(word); });
+      if (!spec.generator.empty()) with_place(yaml, node, [&] { return check_generated(spec.generator, spec.triangles, spec.seed), 0; });
+    }
+    return spec;
   }
   yaml.check_map(node, "a scene", std::vector<std::string>{"file", "scene", "generate", "catalogue", "triangles", "seed", "optional",
                                                            "stretch", "size", "offset"});

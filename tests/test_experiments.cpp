@@ -127,6 +127,26 @@ axes:
   CHECK(plan.skipped.empty());
 }
 
+TEST_CASE("scenes may be words, as on the command line") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path model = folder.write("ring.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  folder.write("room.yaml", "models: [{file: ring.obj}]\n");
+  const auto read = [&](const std::string& scenes) { return read_experiment(folder.write("words.yaml", "scenes: " + scenes + "\n"), registry); };
+  const Experiment experiment = read("[ring.obj, room.yaml, sphere:500, 'needles:500:2', sphere]");
+  REQUIRE(experiment.scenes.size() == 5);
+  CHECK(experiment.scenes[0].spec.file == model);
+  CHECK(experiment.scenes[1].spec.scene == folder.path / "room.yaml");
+  CHECK((experiment.scenes[2].spec.generator == "sphere" && experiment.scenes[2].spec.triangles == 500));
+  CHECK(experiment.scenes[3].spec.seed == 2);
+  CHECK(experiment.scenes[4].spec.generator == "sphere");
+  const auto error = [&](const std::string& scenes) { return error_of([&] { (void)read(scenes); }); };
+  CHECK(error("[rings.obj]").find("words.yaml:1: file '") != std::string::npos);
+  CHECK(error("[sphere:many]").find("words.yaml:1: ") != std::string::npos);
+  CHECK(error("[spheer:100]").find("did you mean 'sphere'") != std::string::npos);
+  CHECK(error("[bunni]").find("did you mean 'bunny'") != std::string::npos);
+}
+
 TEST_CASE("what cannot be is skipped with its reason, and an ISA that is lacking is never replaced") {
   const TemporaryFolder folder;
   const Registry registry = paper_registry();

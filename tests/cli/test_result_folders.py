@@ -59,6 +59,23 @@ class ResultFolders(CommandLineCase):
             self.assertIn("begun at revision aaaaaaaaaaaa", " ".join(self.context(folder)["warnings"]))
             self.assertEqual([c["git_revision"] for c in json.loads(plan.read_text())["earlier_contexts"]], ["a" * 40])
 
+    def test_a_run_that_begins_anew_loses_nothing(self):
+        folder = self.folder / self.shard(1, 3)
+        (folder / "notes.txt").write_text("mine")
+        first = {name: (folder / name).read_text() for name in ("cells.jsonl", "results.json", "plan.json", "effective.yaml")}
+        again = self.run_small("--shard", "1/3", *FEW)
+        self.assertIn("the results of the run before are in", again.stderr)
+        self.assertEqual({name: (folder / "previous" / name).read_text() for name in first}, first)
+        self.assertEqual({c["name"] for c in read_jsonl(folder / "cells.jsonl")}, {c["name"] for c in read_jsonl(folder / "previous/cells.jsonl")})
+        self.assertIn(self.call("compare", str(folder / "previous"), str(folder)).returncode, (0, 3))
+        self.assertFalse((folder / "previous/notes.txt").exists())
+        second = (folder / "cells.jsonl").read_text()
+        self.run_small("--shard", "1/3", *FEW)
+        self.assertEqual((folder / "previous/cells.jsonl").read_text(), second)
+        self.assertFalse((folder / "previous/previous").exists())
+        self.run_small("--shard", "1/3", *FEW, "--resume")
+        self.assertEqual((folder / "previous/cells.jsonl").read_text(), second)
+
     def test_merged_shards_are_the_whole_run(self):
         parts = [self.shard(i, 3) for i in (1, 2, 3)]
         self.assertEqual(self.context(parts[1])["shard"], "2/3")
