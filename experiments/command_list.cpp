@@ -36,6 +36,16 @@ Json parameters_of(const StructureInfo& info, const Registry& registry) {
   return read;
 }
 
+/// Ways of traversal that the structure has on some instruction set of the machine.
+Json traversals_of(const std::string& structure, const Registry& registry) {
+  Json list = Json::array();
+  for (const std::string& value : known_values(Axis::traversal, registry)) {
+    const auto has = [&](const KernelRow& row) { return row.structure == structure && row.traversal == value && registry.has(row.isa); };
+    if (std::ranges::any_of(registry.kernels, has)) list.push_back(value);
+  }
+  return list;
+}
+
 /// Builder parameters that the builder reads, by structure.
 Json parameters_of(const std::string& builder, const Registry& registry) {
   Json read = Json::object();
@@ -52,7 +62,7 @@ Json axis_entries(Axis axis, const Registry& registry) {
       const StructureEntry* structure = registry.structure(value);
       entry["available"] = structure != nullptr;
       if (structure) entry["builders"] = structure->info.builders, entry["leaves"] = structure->info.leaves;
-      if (structure) entry["parameters"] = parameters_of(structure->info, registry);
+      if (structure) entry["traversals"] = traversals_of(value, registry), entry["parameters"] = parameters_of(structure->info, registry);
     }
     if (axis == Axis::builder) entry["parameters"] = parameters_of(value, registry);
     if (axis == Axis::isa) entry["available"] = registry.has(*parse_isa(value));
@@ -122,7 +132,14 @@ Json promise_entries(const Registry& registry) {
 std::string remark(const Json& entry) {
   std::string line = entry["summary"].get<std::string>();
   if (entry.contains("builders") && !entry["builders"].empty()) {
-    line += fmt::format(" [builders: {}]", fmt::join(entry["builders"].get<std::vector<std::string>>(), " "));
+    constexpr std::string_view kAgain = "_reinsertion";
+    std::vector<std::string> names = entry["builders"];
+    const std::size_t all = names.size();
+    const std::vector<std::string> every = names;
+    std::erase_if(names, [&](const std::string& name) {
+      return name.ends_with(kAgain) && std::ranges::find(every, name.substr(0, name.size() - kAgain.size())) != every.end();
+    });
+    line += fmt::format(" [builders: {}{}]", fmt::join(names, " "), names.size() < all ? fmt::format("; each also as …{}", kAgain) : "");
   }
   if (entry.contains("generator")) {
     line += entry["generator"].get<bool>()

@@ -322,6 +322,10 @@ class CommandLine(CommandLineCase):
                 self.assertTrue(entry["summary"], f"{title}: {entry['name']} has no summary")
         self.assertEqual(json.loads(self.call("list", "structures", "--json").stdout), listed["structures"])
         self.assertIn("bvh8", self.call("list", "structures").stdout)
+        self.assertLess(max(map(len, self.call("list", "structures").stdout.splitlines())), 260)
+        ways = {s["name"]: s["traversals"] for s in listed["structures"] if s["available"]}
+        self.assertEqual(ways["grid"], ["single"])
+        self.assertLess({"single", "packet8", "queued", "stream", "auto"}, set(ways["bvh8"]))
         read = {s["name"]: s["parameters"] for s in listed["structures"] if s["available"]}
         self.assertIn("ploc_radius", read["bvh8"]["ploc"])
         self.assertNotIn("ploc_radius", read["bvh8"]["binned_sah"])
