@@ -124,7 +124,8 @@ TEST_CASE("every row of the table, none left out, is right on a batch of generic
     REQUIRE(same_bits(closest_hit(row, accel, rays, &counters), hits));
     REQUIRE(any_hit(row, accel, rays, &counters) == any_truth);
   }
-  CHECK(rows > 10000);
+  CHECK(rows >= runnable_rows().size());
+  CHECK(rows > 100);  // a structure of one's own has some hundreds, the whole table tens of thousands
 }
 
 TEST_CASE("any hit, the counting kernels and batches of any size agree with closest hit") {
