@@ -157,10 +157,7 @@ std::vector<std::string> files_of_run(const std::filesystem::path& folder) {
 /// Nothing measured is lost by a run that begins anew: what the last one left goes to a folder beside it, in place of the one before.
 void set_aside(const std::filesystem::path& folder) {
   std::error_code error;
-  if (const auto bytes = std::filesystem::file_size(folder / "cells.jsonl", error); error || bytes == 0) {
-    remove_files(folder, present(folder, concluding_files()));
-    return;
-  }
+  if (const auto bytes = std::filesystem::file_size(folder / "cells.jsonl", error); error || bytes == 0) return;
   const std::filesystem::path aside = folder / "previous";
   make_output_folder(aside);
   remove_files(aside, files_of_run(aside));
