@@ -261,6 +261,19 @@ TEST_CASE("what the search once found stays mended") {
   }
 }
 
+namespace {
+
+/// What verify finds of the cell, by kind of ray, on rays aimed at the mesh.
+std::vector<VerifyTally> tallies_of(const VerifiedCell& verified, const Registry& registry, const TriangleMesh& mesh, std::size_t count, std::span<const HardKind> kinds) {
+  const HardRays rays = HardRayMaker(mesh).make(1, 0, count, kinds);
+  const Oracle oracle(mesh);
+  StructureShelf shelf(mesh, registry, 1);
+  std::vector<Hit> hits;
+  return verify_cell(verified.cell, shelf.get(verified.cell), {mesh, oracle, rays, oracle.closest_hit(rays.batch())}, hits, {});
+}
+
+}  // namespace
+
 TEST_CASE("a kernel that leaks is told to leak, and a promise that it breaks is shown as a small case") {
   const Registry registry = this_registry();
   std::vector<VerifiedCell> cells = only(promising_cells(registry), "bvh8", "watertight");
@@ -274,11 +287,7 @@ TEST_CASE("a kernel that leaks is told to leak, and a promise that it breaks is 
   liar.cell.kernel = leaky, liar.cell.leaf = leaky->leaf;
   const TriangleMesh mesh = generate_sphere(300, 1).mesh;
   const std::array kinds{HardKind::vertex, HardKind::edge};
-  const HardRays rays = HardRayMaker(mesh).make(1, 0, 4000, kinds);
-  const Oracle oracle(mesh);
-  StructureShelf shelf(mesh, registry, 1);
-  std::vector<Hit> hits;
-  const auto tallies = verify_cell(liar.cell, shelf.get(liar.cell), {mesh, oracle, rays, oracle.closest_hit(rays.batch())}, hits, {});
+  const auto tallies = tallies_of(liar, registry, mesh, 4000, kinds);
   const VerifyTally& edge = tallies[static_cast<std::size_t>(HardKind::edge)];
   CHECK(edge.rays == 2000);
   CHECK(edge.cracks > 20);
@@ -300,12 +309,8 @@ TEST_CASE("a kernel that writes no answer is wrong on every ray") {
   cells[0].cell.kernel = &silent;
   const TriangleMesh mesh = generate_sphere(300, 1).mesh;
   const std::array kinds{HardKind::interior, HardKind::far};
-  const HardRays rays = HardRayMaker(mesh).make(1, 0, 200, kinds);
-  const Oracle oracle(mesh);
-  StructureShelf shelf(mesh, registry, 1);
-  std::vector<Hit> hits;
   VerifyTally sum;
-  for (const VerifyTally& t : verify_cell(cells[0].cell, shelf.get(cells[0].cell), {mesh, oracle, rays, oracle.closest_hit(rays.batch())}, hits, {})) sum += t;
+  for (const VerifyTally& t : tallies_of(cells[0], registry, mesh, 200, kinds)) sum += t;
   CHECK(sum.rays == 200);
   CHECK(sum.any_missed + sum.any_false == 200);
   CHECK(sum.broken == 200);
