@@ -27,7 +27,7 @@ struct BuilderParameters {
   unsigned bins = 32;             ///< binned SAH: bins an axis, 4 .. 64
   float traversal_cost = 1.0f;    ///< cost of a node visit, in units of one block test
   float intersection_cost = 1.0f; ///< cost of testing one leaf block
-  unsigned max_leaf_blocks = 4;   ///< leaf blocks in a leaf at most, 1 .. 7
+  unsigned max_leaf_blocks = 4;   ///< leaf blocks in a leaf at most, 1 .. 8
   unsigned morton_bits = 63;      ///< morton, ploc: bits of a code, 30 or 63
   unsigned ploc_radius = 16;      ///< ploc: neighbours looked at on each side, 1 .. 128
   float duplication_budget = 0.75f;  ///< spatial_sah: references added at most, as a share of the triangles, 0 .. 4
@@ -99,6 +99,7 @@ struct StructureInfo {
   bool needs_motion = false;                ///< measured only where the scene moves
   bool takes_below = false;                 ///< stands above structures of another kind: BuilderParameters::below
   std::string_view only_single_rays = {};   ///< why it has no other way of traversal, where that is so: what skipped cells say
+  std::string_view no_streams = {};         ///< why its rays do not go as streams, where they go in other ways than alone: the same
   bool uses_parameters = true;              ///< false where the builders read none of BuilderParameters: sweeping them makes no new cells
 };
 

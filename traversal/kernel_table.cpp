@@ -85,32 +85,12 @@ template <int W>
   return s + " has no leaf " + l + (taken ? " for " + t + ": that has" : ": it has") + leaves;
 }
 
-/// Ways of traversal that could be written for a structure and are not: what is in the way of sharing the loops that are there.
-struct NotBuilt {
-  std::string_view structure;
-  bool queued, stream;
-  std::string_view why;
-};
-constexpr NotBuilt kNotBuilt[] = {
-    {"bvh4_aos", true, false, "not built: rays in flight push the children that a node test leaves in one register, whose references lie side by side; here they lie 16 bytes apart, in lane w of the boxes"},
-    {"bvh4_aos", false, true, "not built: a stream keeps a node's planes in registers, each plane of all children in one, for all its rays; here a register holds whole boxes beside the ray's own interval"},
-    {"bvh4_quantised", true, false, "not built: rays in flight read planes that are floats; these are steps of the node's own grid, which each test brings into the ray's terms first"},
-    {"bvh4_quantised", false, true, "not built: a stream keeps a node's planes in registers as floats for all its rays; these are decoded anew for each ray, as part of its distances"},
-    {"bvh8_quantised", true, false, "not built: rays in flight read planes that are floats; these are steps of the node's own grid, which each test brings into the ray's terms first"},
-    {"bvh8_quantised", false, true, "not built: a stream keeps a node's planes in registers as floats for all its rays; these are decoded anew for each ray, as part of its distances"},
-    {"bih", true, false, "not built: the loops over rays in flight are the wide BVHs' and the kd-tree's; a step here is two planes that may overlap or leave a gap, with an interval of t for each child"},
-    {"bih", false, true, "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them"},
-    {"kdtree", false, true, "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them"},
-    {"octree", true, false, "not built: a node has no boxes, its place in the cube comes with the visit, and a step of a ray in flight would have to carry it"},
-    {"octree", false, true, "not built: a node has no boxes, its place in the cube comes with the visit; a stream reads boxes from the node"},
-};
-
 /// Of a way of traversal that the structure has no row of.
 [[nodiscard]] std::string why_no_traversal(std::string_view structure, std::string_view traversal) {
-  if (const StructureEntry* entry = find_structure(structure); entry && !entry->info.only_single_rays.empty()) return std::string(entry->info.only_single_rays);
-  const bool queued = traversal.starts_with("queued"), stream = traversal == "stream" || traversal == "stream_sorted" || traversal == "stream_lists";
-  for (const NotBuilt& n : kNotBuilt)
-    if (n.structure == structure && ((n.queued && queued) || (n.stream && stream))) return std::string(n.why);
+  if (const StructureEntry* entry = find_structure(structure)) {
+    if (!entry->info.only_single_rays.empty()) return std::string(entry->info.only_single_rays);
+    if (traversal.starts_with("stream") && !entry->info.no_streams.empty()) return std::string(entry->info.no_streams);
+  }
   const std::string owners = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.traversal == traversal; });
   return owners.empty() ? "no structure of this build has it on this machine" : "that is for" + owners;
 }

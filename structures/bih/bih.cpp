@@ -139,6 +139,7 @@ const StructureInfo& Bih::static_info() {
     i.builders = binary_builder_names();
     for_each_type(AllBlocks{},
                   [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.no_streams = "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them";
     return i;
   }();
   return info;

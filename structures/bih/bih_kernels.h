@@ -2,6 +2,7 @@
 #pragma once
 
 #include "structures/bih/bih_packet.h"
+#include "structures/bih/bih_queued.h"
 #include "structures/bih/bih_single.h"
 #include "structures/leaves/leaf_kernels.h"
 #include "traversal/auto_rows.h"
@@ -18,11 +19,7 @@ struct BihSingle {
   static ARBORETUM_INLINE bool trace(const bih::Bih& tree, const Ray& ray, NearestHit& best, const Counting& counting, Scratch& stack, Visits& visits) {
     const IntervalRay interval(BoxRay<2, Padded>(ray, tree.max_coordinate()));
     float low = ray.tnear, high = best.t;
-    for (unsigned a = 0; a < 3; ++a) {
-      const float faces[2] = {(&tree.bounds().lower.x)[a], (&tree.bounds().upper.x)[a]};
-      low = later(interval.at_begin(faces[interval.negative[a]], a), low);
-      high = earlier(interval.at_end(faces[1 - interval.negative[a]], a), high);
-    }
+    clip_to_scene(tree, interval, low, high);
     return low <= high && search_bih<AnyHit>(tree, interval, tree.nodes(), low, high, best, counting, stack.data(), visits);
   }
 };
@@ -30,6 +27,7 @@ struct BihSingle {
 inline void add_kernels(std::type_identity<bih::Bih>, KernelRows& rows) {
   using Single = ListedLeaves<bih::Bih, BihSingle>;
   Single::add(rows);
+  add_queued_rows<bih::Bih, BihQueued, Single::Functions>(rows, TypeList<>{});
   add_packet_rows<bih::Bih, BihPacketFamily>(rows, TypeList<>{});
   add_rows<bih::Bih, AutoFunctions<BihPacketFamily, TypeList<>, Single::Functions>>(rows, "auto", TypeList<>{});
 }

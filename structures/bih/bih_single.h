@@ -48,6 +48,57 @@ struct IntervalStack : BatchStack<IntervalEntry, 128> {
   explicit IntervalStack(const bih::Bih& tree) : BatchStack(tree.stack_entries()) {}
 };
 
+/// Cuts [low, high] to the ray's part within the scene's box; empty, low > high, where there is none.
+ARBORETUM_INLINE void clip_to_scene(const bih::Bih& tree, const IntervalRay& interval, float& low, float& high) {
+  for (unsigned a = 0; a < 3; ++a) {
+    const float faces[2] = {(&tree.bounds().lower.x)[a], (&tree.bounds().upper.x)[a]};
+    low = later(interval.at_begin(faces[interval.negative[a]], a), low);
+    high = earlier(interval.at_end(faces[1 - interval.negative[a]], a), high);
+  }
+}
+
+inline constexpr std::uint32_t kNoNode = ~0u;
+
+/// At an inner node of that kind, with the ray's interval [low, high] there: the child to go on with and its interval, or kNoNode where the ray meets none; where it meets two,
+/// the far one goes to the stack.
+template <class Counting>
+ARBORETUM_INLINE std::uint32_t step_bih(const bih::Node* node, std::uint32_t kind, const IntervalRay& interval, float& low, float& high, IntervalEntry*& top, const Counting& counting) {
+  const std::uint32_t first = node->first();
+  if (kind < bih::Node::kLeaf) {
+    const unsigned axis = kind, back = interval.negative[axis];
+    const float near_high = earlier(interval.at_end(node->clip[back], axis), high);
+    const float far_low = later(interval.at_begin(node->clip[1 - back], axis), low);
+    const bool near = low <= near_high, far = far_low <= high;
+    counting.node(2, 2, unsigned(near) + unsigned(far));
+    if (near) {
+      if (far) *top++ = {first + 1 - back, far_low, high};
+      high = near_high;
+      return first + back;
+    }
+    if (far) {
+      low = far_low;
+      return first + 1 - back;
+    }
+    return kNoNode;
+  }
+  const unsigned axis = kind - bih::Node::kClip, back = interval.negative[axis];
+  low = later(interval.at_begin(node->clip[back], axis), low);
+  high = earlier(interval.at_end(node->clip[1 - back], axis), high);
+  counting.node(1, 1, low <= high);
+  return low <= high ? first : kNoNode;
+}
+
+/// The next that waits and its interval, or kNoNode; `nearest`: beyond it nothing is visited.
+template <bool AnyHit>
+ARBORETUM_INLINE std::uint32_t pop_bih(IntervalEntry*& top, const IntervalEntry* stack, float& low, float& high, float nearest) {
+  do {
+    if (top == stack) return kNoNode;
+    --top;
+  } while (!AnyHit && top->low > nearest);
+  low = top->low, high = earlier(nearest, top->high);
+  return top->node;
+}
+
 /// What lies below `node`, where the ray's interval is [low, high]. visits(code) is called for leaves and ends the search where it is true.
 template <bool AnyHit, class Counting, class Visits>
 ARBORETUM_INLINE bool search_bih(const bih::Bih& tree, const IntervalRay& interval, const bih::Node* node, float low, float high, NearestHit& best, const Counting& counting,
@@ -55,40 +106,15 @@ ARBORETUM_INLINE bool search_bih(const bih::Bih& tree, const IntervalRay& interv
   IntervalEntry* top = stack;
   const bih::Node* const nodes = tree.nodes();
   for (;;) {
-    const std::uint32_t kind = node->kind();
-    if (kind < bih::Node::kLeaf) {
-      const unsigned axis = kind, back = interval.negative[axis];
-      const float near_high = earlier(interval.at_end(node->clip[back], axis), high);
-      const float far_low = later(interval.at_begin(node->clip[1 - back], axis), low);
-      const bool near = low <= near_high, far = far_low <= high;
-      counting.node(2, 2, unsigned(near) + unsigned(far));
-      const std::uint32_t first = node->first();
-      if (near) {
-        if (far) *top++ = {first + 1 - back, far_low, high};
-        high = near_high, node = nodes + first + back;
-        continue;
-      }
-      if (far) {
-        low = far_low, node = nodes + first + 1 - back;
-        continue;
-      }
-    } else if (kind == bih::Node::kLeaf) {
-      if (visits(node->code())) return true;
-    } else {
-      const unsigned axis = kind - bih::Node::kClip, back = interval.negative[axis];
-      low = later(interval.at_begin(node->clip[back], axis), low);
-      high = earlier(interval.at_end(node->clip[1 - back], axis), high);
-      counting.node(1, 1, low <= high);
-      if (low <= high) {
-        node = nodes + node->first();
-        continue;
-      }
+    std::uint32_t next = kNoNode;
+    if (const std::uint32_t kind = node->kind(); kind != bih::Node::kLeaf) {
+      next = step_bih(node, kind, interval, low, high, top, counting);
+    } else if (visits(node->code())) {
+      return true;
     }
-    do {
-      if (top == stack) return false;
-      --top;
-    } while (!AnyHit && top->low > best.t);
-    low = top->low, high = earlier(best.t, top->high), node = nodes + top->node;
+    if (next == kNoNode) next = pop_bih<AnyHit>(top, stack, low, high, best.t);
+    if (next == kNoNode) return false;
+    node = nodes + next;
   }
 }
 

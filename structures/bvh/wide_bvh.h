@@ -101,6 +101,7 @@ const StructureInfo& WideBvh<Format>::static_info() {
     i.summary = Format::kSummary;
     i.builders = binary_builder_names();
     for (const LeafForm& form : leaf_forms()) i.leaves.push_back(form.name);
+    if constexpr (requires { Format::kNoStreams; }) i.no_streams = Format::kNoStreams;
     return i;
   }();
   return info;

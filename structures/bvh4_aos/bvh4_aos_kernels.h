@@ -7,6 +7,7 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
+#include "structures/bvh/bvh_node_walk.h"
 #include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/auto_rows.h"
@@ -21,6 +22,7 @@ struct AosNodeTest {
   /// AVX-512 leaves a child's result in lane 0 of its group, the others gather the four.
   static constexpr bool kInGroups = kRegisterWidth == 16;
   static constexpr int W = kInGroups ? 16 : 4, kSlots = 4, kStride = kInGroups ? 1 : 4;
+  static constexpr std::size_t kBytes = sizeof(bvh4_aos::Node);
   using Lanes = vf<16>;
   Lanes r, f, g;
   vm<16> upper_is_near, upper_is_far;  ///< in lane w both: there the maximum's is a number, the minimum's a reference
@@ -86,9 +88,14 @@ struct AosPacketNodes {
 };
 
 inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows) {
-  add_rows<bvh4_aos::Bvh4Aos, BvhSingle<AosNodeTest>::Functions>(rows, "single", UsualLeaves{});
-  add_packet_rows<bvh4_aos::Bvh4Aos, BvhPacketFamily<AosPacketNodes>>(rows, TypeList<>{});
-  add_rows<bvh4_aos::Bvh4Aos, AutoFunctions<BvhPacketFamily<AosPacketNodes>, TypeList<>, BvhSingle<AosNodeTest>::Functions>>(rows, "auto", UsualLeaves{});
+  using Structure = bvh4_aos::Bvh4Aos;
+  using Packets = BvhPacketFamily<AosPacketNodes>;
+  using Single = BvhSingle<AosNodeTest>::Functions;
+  add_rows<Structure, Single>(rows, "single", UsualLeaves{});
+  add_queued_rows<Structure, BvhNodeQueue<AosNodeTest>::Of, Single>(rows, BatchLeaves{});
+  add_packet_rows<Structure, Packets>(rows, TypeList<>{});
+  using Incoherent = IncoherentInFlight<BvhNodeQueue<AosNodeTest>::Of, Single, 4>;
+  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single>>(rows, "auto", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -11,6 +11,7 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
+#include "structures/bvh/bvh_node_walk.h"
 #include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/auto_rows.h"
@@ -25,6 +26,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 template <int N, bool Padded>
 struct QuantisedNodeTest {
   static constexpr int W = N, kSlots = N, kStride = 1;
+  static constexpr std::size_t kBytes = sizeof(bvh_quantised::Node<N>);
   using F = vf<W>;
   using Node = bvh_quantised::Node<N>;
   F r, f, g, tnear, tfar;
@@ -141,9 +143,14 @@ struct QuantisedPacketNodes {
 template <int N>
 void add_kernels(std::type_identity<bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>>, KernelRows& rows) {
   using Structure = bvh::WideBvh<bvh_quantised::QuantisedNodes<N>>;
-  add_rows<Structure, typename BvhSingle<QuantisedTests<N>::template Nodes>::Functions>(rows, "single", UsualLeaves{});
-  add_packet_rows<Structure, BvhPacketFamily<QuantisedPacketNodes<N>>>(rows, TypeList<>{});
-  add_rows<Structure, AutoFunctions<BvhPacketFamily<QuantisedPacketNodes<N>>, TypeList<>, typename BvhSingle<QuantisedTests<N>::template Nodes>::Functions>>(rows, "auto", UsualLeaves{});
+  using Packets = BvhPacketFamily<QuantisedPacketNodes<N>>;
+  using Queue = BvhNodeQueue<QuantisedTests<N>::template Nodes>;
+  using Single = typename BvhSingle<QuantisedTests<N>::template Nodes>::Functions;
+  add_rows<Structure, Single>(rows, "single", UsualLeaves{});
+  add_queued_rows<Structure, Queue::template Of, Single>(rows, BatchLeaves{});
+  add_packet_rows<Structure, Packets>(rows, TypeList<>{});
+  using Incoherent = IncoherentInFlight<Queue::template Of, Single, N>;
+  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single>>(rows, "auto", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

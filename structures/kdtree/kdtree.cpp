@@ -39,6 +39,7 @@ const StructureInfo& KdTree::static_info() {
     i.summary = "kd-tree: axis-aligned planes, triangles clipped to their cells, 8-byte nodes";
     i.builders = {"binned_sah", "sweep_sah"};
     for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.no_streams = "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them";
     return i;
   }();
   return info;

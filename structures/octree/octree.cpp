@@ -20,6 +20,7 @@ const StructureInfo& Octree::static_info() {
     i.builders = {"octants"};
     for_each_type(AllBlocks{},
                   [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.no_streams = "not built: a stream reads the children's boxes from the node; here they come from the node's place in the cube, which a stream's stack (a node and a mask of its rays) does not hold";
     return i;
   }();
   return info;

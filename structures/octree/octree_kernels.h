@@ -3,6 +3,7 @@
 
 #include "structures/leaves/leaf_kernels.h"
 #include "structures/octree/octree_packet.h"
+#include "structures/octree/octree_queued.h"
 #include "structures/octree/octree_single.h"
 #include "traversal/auto_rows.h"
 #include "traversal/packet_rows.h"
@@ -25,6 +26,7 @@ struct OctreeSingle {
 inline void add_kernels(std::type_identity<octree::Octree>, KernelRows& rows) {
   using Single = ListedLeaves<octree::Octree, OctreeSingle>;
   Single::add(rows);
+  add_queued_rows<octree::Octree, OctreeQueued, Single::Functions>(rows, TypeList<>{});
   add_packet_rows<octree::Octree, OctreePacketFamily>(rows, TypeList<>{});
   add_rows<octree::Octree, AutoFunctions<OctreePacketFamily, TypeList<>, Single::Functions>>(rows, "auto", TypeList<>{});
 }

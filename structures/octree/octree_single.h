@@ -65,58 +65,69 @@ struct OctreeRay {
   ARBORETUM_INLINE F far(F face) const { return plane_distance(face, reciprocal, far_constant); }
 };
 
+/// A cell and where the ray enters it.
+struct OctreeEntry {
+  OctreeCell cell;
+  float t;
+};
+
+/// At the inner cell of `e`, between tnear and the nearest hit: of the children that the ray meets `e` becomes the first, the others go to the stack, far to near. Returns whether there
+/// are any.
+template <class Counting>
+ARBORETUM_INLINE bool step_octree(const octree::Octree& tree, const OctreeRay& box, OctreeEntry& e, float tnear, float nearest, OctreeEntry*& top, const Counting& counting) {
+  using F = vf<8>;
+  const vm<8> x = vm<8>::from_bits(0xaa), y = vm<8>::from_bits(0xcc), z = vm<8>::from_bits(0xf0);
+  const OctreePlanes planes(tree.cube(), e.cell, box.negative);
+  alignas(16) float in[4], middle_near[4], middle_far[4], out[4];
+  box.near(planes.in).store(in), box.near(planes.middle).store(middle_near);
+  box.far(planes.middle).store(middle_far), box.far(planes.out).store(out);
+  const F entry = max_x86(max_x86(select(x, F(middle_near[0]), F(in[0])), select(y, F(middle_near[1]), F(in[1]))),
+                          max_x86(select(z, F(middle_near[2]), F(in[2])), F(tnear)));
+  const F exit = min_x86(min_x86(select(x, F(out[0]), F(middle_far[0])), select(y, F(out[1]), F(middle_far[1]))),
+                         min_x86(select(z, F(out[2]), F(middle_far[2])), F(nearest)));
+  unsigned hit = (entry <= exit).bits() & permute_by_octant(e.cell.node.mask, box.octant);
+  if constexpr (Counting::kCounting) counting.node(unsigned(__builtin_popcount(e.cell.node.mask)), 8, unsigned(__builtin_popcount(hit)));
+  if (hit == 0) return false;
+  alignas(32) float t[8];
+  entry.store(t);
+  const octree::Node* const children = tree.nodes() + e.cell.node.first;
+  const auto child = [&](unsigned number) { return OctreeEntry{planes.child(e.cell, children, number ^ box.octant), t[number]}; };
+  const unsigned first = unsigned(__builtin_ctz(hit));
+  for (hit &= hit - 1; hit;) {  // far to near
+    const unsigned number = 31u - unsigned(__builtin_clz(hit));
+    hit ^= 1u << number;
+    *top++ = child(number);
+  }
+  e = child(first);
+  return true;
+}
+
+/// The next that waits into `e`, or false; `nearest`: beyond it nothing is visited.
+template <bool AnyHit>
+ARBORETUM_INLINE bool pop_octree(OctreeEntry*& top, const OctreeEntry* stack, OctreeEntry& e, float nearest) {
+  do {
+    if (top == stack) return false;
+    e = *--top;
+  } while (!AnyHit && e.t > nearest);
+  return true;
+}
+
 /// What lies in the cell `start`, which the ray is taken to enter. visits(code) is called for leaves and ends the search where it is true; `last` is the leaf that the
 /// ray comes from, since neighbouring cells may share one.
 template <bool AnyHit, class Counting, class Visits>
-ARBORETUM_INLINE bool search_octree(const octree::Octree& tree, const OctreeRay& box, const OctreeCell& start, float tnear_of_ray, NearestHit& best, LeafCode& last,
+ARBORETUM_INLINE bool search_octree(const octree::Octree& tree, const OctreeRay& box, const OctreeCell& start, float tnear, NearestHit& best, LeafCode& last,
                                     const Counting& counting, Visits& visits) {
-  using F = vf<8>;
-  struct Entry {
-    OctreeCell cell;
-    float t;
-  };
-  const octree::Node* const nodes = tree.nodes();
-  const F tnear(tnear_of_ray);
-  const vm<8> x = vm<8>::from_bits(0xaa), y = vm<8>::from_bits(0xcc), z = vm<8>::from_bits(0xf0);
-  Entry stack[kMostOctreeCells];
-  Entry* top = stack;
-  Entry e{start, 0.0f};
+  OctreeEntry stack[kMostOctreeCells];
+  OctreeEntry* top = stack;
+  OctreeEntry e{start, 0.0f};
   for (;;) {
-    if (e.cell.node.mask == 0) {
-      if (e.cell.node.first != last) {
-        last = e.cell.node.first;
-        if (visits(last)) return true;
-      }
-    } else {
-      const OctreePlanes planes(tree.cube(), e.cell, box.negative);
-      alignas(16) float in[4], middle_near[4], middle_far[4], out[4];
-      box.near(planes.in).store(in), box.near(planes.middle).store(middle_near);
-      box.far(planes.middle).store(middle_far), box.far(planes.out).store(out);
-      const F entry = max_x86(max_x86(select(x, F(middle_near[0]), F(in[0])), select(y, F(middle_near[1]), F(in[1]))),
-                              max_x86(select(z, F(middle_near[2]), F(in[2])), tnear));
-      const F exit = min_x86(min_x86(select(x, F(out[0]), F(middle_far[0])), select(y, F(out[1]), F(middle_far[1]))),
-                             min_x86(select(z, F(out[2]), F(middle_far[2])), F(best.t)));
-      unsigned hit = (entry <= exit).bits() & permute_by_octant(e.cell.node.mask, box.octant);
-      if constexpr (Counting::kCounting) counting.node(unsigned(__builtin_popcount(e.cell.node.mask)), 8, unsigned(__builtin_popcount(hit)));
-      if (hit != 0) {
-        alignas(32) float t[8];
-        entry.store(t);
-        const octree::Node* const children = nodes + e.cell.node.first;
-        const auto child = [&](unsigned number) { return Entry{planes.child(e.cell, children, number ^ box.octant), t[number]}; };
-        const unsigned first = unsigned(__builtin_ctz(hit));
-        for (hit &= hit - 1; hit;) {  // far to near
-          const unsigned number = 31u - unsigned(__builtin_clz(hit));
-          hit ^= 1u << number;
-          *top++ = child(number);
-        }
-        e = child(first);
-        continue;
-      }
+    if (e.cell.node.mask != 0) {
+      if (step_octree(tree, box, e, tnear, best.t, top, counting)) continue;
+    } else if (e.cell.node.first != last) {
+      last = e.cell.node.first;
+      if (visits(last)) return true;
     }
-    do {
-      if (top == stack) return false;
-      e = *--top;
-    } while (!AnyHit && e.t > best.t);
+    if (!pop_octree<AnyHit>(top, stack, e, best.t)) return false;
   }
 }
 

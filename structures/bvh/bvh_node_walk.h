@@ -1,0 +1,137 @@
+// Many rays in flight through a wide BVH of any node format (traversal/queued_rays.h).
+//
+// The steps of bvh_single.h, one at a time: children in the same order, nearest on top of the ray's own stack; for any hit as they stand in the node. What starts beyond a
+// new hit leaves the stack when it is found, so that a step takes the top and compares nothing. The bvh::SoaNodes have a loop of their own (bvh_queued.h), whose
+// steps build the ray's node test anew from its constants; here a ray keeps the test itself, whatever it consists of.
+#pragma once
+
+#include "structures/bvh/bvh_queued.h"
+#include "traversal/queued_rays.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+/// push() (bvh_queued.h), also where references lie `Stride` places apart, and of four children without a branch on AVX2, too.
+template <int Stride, bool AnyHit, int W>
+ARBORETUM_INLINE void push_children_of(const bvh::NodeReference* child, vf<W> entry, unsigned hit, StackEntry*& top) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE || ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
+  if constexpr (W == 4) {
+    const __m128i distances = _mm_castps_si128(entry.v), references = _mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride]));
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+    const __m128i from = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompressBytes.bytes[hit]));
+    const __m128i r = _mm_shuffle_epi8(references, from), k = _mm_shuffle_epi8(distances, from);
+    __m128d a = _mm_castsi128_pd(_mm_unpacklo_epi32(r, k)), b = _mm_castsi128_pd(_mm_unpackhi_epi32(r, k));
+    if constexpr (!AnyHit) sort_down(a, b);
+    _mm_storeu_pd(reinterpret_cast<double*>(top), a), _mm_storeu_pd(reinterpret_cast<double*>(top + 2), b);
+    top += __builtin_popcount(hit);
+#else
+    const int count = __builtin_popcount(hit);
+    const __m128i from = _mm_cvtepu8_epi32(_mm_cvtsi32_si128(int(std::uint32_t(kCompress.lanes[hit])))), present = _mm_cmpgt_epi32(_mm_set1_epi32(count), _mm_setr_epi32(0, 1, 2, 3));
+    const auto together = [&](__m128i v) { return _mm_and_si128(_mm_castps_si128(_mm_permutevar_ps(_mm_castsi128_ps(v), from)), present); };
+    const __m128i r = together(references), k = together(distances);
+    const __m256d e = _mm256_castsi256_pd(_mm256_set_m128i(_mm_unpackhi_epi32(r, k), _mm_unpacklo_epi32(r, k)));
+    _mm256_storeu_pd(reinterpret_cast<double*>(top), AnyHit ? e : sort_down(e));
+    top += count;
+#endif
+    return;
+  }
+#endif
+  if constexpr (Stride == 1) {
+    push<W, AnyHit>(child, entry, hit, top);
+  } else {
+    alignas(64) std::uint32_t key[W];
+    entry.store(key);
+    bvh::NodeReference references[W];
+    for (int i = 0; i < W; ++i) references[i] = child[i * Stride];
+    push_in_scalars<W, AnyHit>(references, key, hit, top);
+  }
+}
+
+/// `Nodes`: a ray and how it meets nodes, as bvh_single.h says.
+template <class Nodes, class Leaves, bool AnyHit>
+class BvhNodeWalk {
+ public:
+  static constexpr bool kAnyHit = AnyHit;
+  using Target = bvh::NodeReference;
+  using Entry = StackEntry;
+  struct State {
+    Nodes nodes;
+    typename Leaves::RayData data;
+    Entry* top;
+    float tnear;
+    NearestHit best;
+  };
+
+  BvhNodeWalk(const Accel& accel, const KernelRow& row) : BvhNodeWalk(static_cast<const bvh::BvhBase&>(accel), row) {}
+
+  /// Beside what waits: the end, and what push() writes beyond its top.
+  std::size_t stack_entries() const { return stack_entries_ + 6; }
+
+  ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
+    stack[0] = kDone;
+    new (state) State{Nodes(ray, max_coordinate_), leaves_.prepare(ray), stack + 1, ray.tnear, NearestHit{ray.tfar}};
+  }
+  ARBORETUM_INLINE Target first(const State&) const { return root_; }
+  static ARBORETUM_INLINE unsigned kind(Target target) { return kind_of(target); }
+
+  ARBORETUM_INLINE void prefetch(Target target) const {
+    constexpr int kLines = int((std::max(Nodes::kBytes, Leaves::kBytesAhead) + 63 + 32) / 64);
+    const auto* at = reinterpret_cast<const char*>(base_ + bvh::offset_of(target));
+    for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+  }
+
+  ARBORETUM_INLINE Target node(State& s, Target target) const {
+    const std::byte* const node = base_ + bvh::offset_of(target);
+    vf<Nodes::W> entry;
+    const unsigned hit = s.nodes.test(node, entry);
+    push_children_of<Nodes::kStride, AnyHit>(Nodes::children(node), entry, hit, s.top);
+    return pop(s);
+  }
+
+  ARBORETUM_INLINE Target leaf(State& s, Target target, Entry* stack) const {
+    const std::byte* const blocks = base_ + bvh::offset_of(target);
+    const unsigned count = bvh::block_count(target);
+    if constexpr (AnyHit) {
+      if (leaves_.any_hit(s.data, blocks, count, s.tnear, s.best.t)) s.best.primitive = 0, s.top = stack + 1;
+    } else if (leaves_.closest_hit(s.data, blocks, count, s.tnear, s.best)) {
+      s.nodes.shorten(s.best.t);
+      Entry* out = stack + 1;
+      for (const Entry* e = out; e != s.top; ++e) {
+        *out = *e;
+        out += __builtin_bit_cast(float, std::uint32_t(*e >> 32)) <= s.best.t;
+      }
+      s.top = out;
+    }
+    return pop(s);
+  }
+
+  ARBORETUM_INLINE void finish(State& s) const {
+    if constexpr (!AnyHit) leaves_.finish(s.data, s.best);
+  }
+
+ private:
+  BvhNodeWalk(const bvh::BvhBase& tree, const KernelRow& row)
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), stack_entries_(tree.stack_entries()) {}
+
+  static ARBORETUM_INLINE Target pop(State& s) { return Target(*--s.top); }
+
+  const std::byte* base_;
+  bvh::NodeReference root_;
+  float max_coordinate_;
+  Leaves leaves_;
+  std::size_t stack_entries_;
+};
+
+/// As traversal/queued_functions.h takes it, for nodes that `Nodes<Padded>` tests.
+template <template <bool> class Nodes>
+struct BvhNodeQueue {
+  template <class Leaves, bool Padded, bool AnyHit>
+  using Of = QueuedRays<BvhNodeWalk<Nodes<Padded>, Leaves, AnyHit>>;
+};
+
+/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register, and that has been measured (docs/performance.md), else alone.
+template <template <class, bool, bool> class Queue, class Single, int N>
+using IncoherentInFlight = std::conditional_t<kRegisterWidth == 8 || (kRegisterWidth == 4 && N == 4), QueuedFunctions<Queue, Single, 32, 64>, Single>;
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum

@@ -1,0 +1,60 @@
+// What rays in flight (traversal/queued_rays.h) through structures with shared leaves (leaf_lists.h) have in common: leaves by their code, and
+// targets that are a node's number, a leaf's code or the end.
+#pragma once
+
+#include "structures/leaves/leaf_lists.h"
+#include "traversal/queued_rays.h"
+
+namespace arboretum {
+namespace ARBORETUM_ISA_NAMESPACE {
+
+struct ListedTarget {
+  enum Kind : std::uint32_t { kNode = 0, kLeaf = 1, kNothing = 2 };
+  std::uint32_t at;
+  Kind kind;
+};
+
+template <class Leaves, bool AnyHit>
+class ListedQueuedLeaves {
+ public:
+  static constexpr bool kAnyHit = AnyHit;
+  using Target = ListedTarget;
+  static constexpr Target kEnd = {0, Target::kNothing};
+
+  static ARBORETUM_INLINE unsigned kind(Target target) { return target.kind; }
+
+  template <class State>
+  ARBORETUM_INLINE void finish(State& s) const {
+    if constexpr (!AnyHit) leaves_.finish(s.data, s.best);
+  }
+
+ protected:
+  ListedQueuedLeaves(const KernelRow& row, const LeafStore& store) : store_(store), leaves_(row, store.vertices()) {}
+
+  ARBORETUM_INLINE void prefetch_leaf(LeafCode code) const {
+    constexpr int kLines = int((Leaves::kBytesAhead + 63 + 32) / 64);
+    const auto* at = reinterpret_cast<const char*>(blocks_of(store_.range(code)));
+    for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+  }
+
+  /// Returns whether the search ends: any hit has its answer. `State` has tnear beside what traversal/queued_rays.h asks for.
+  template <class State>
+  ARBORETUM_INLINE bool test(State& s, LeafCode code) const {
+    const LongLeaf range = store_.range(code);
+    if constexpr (AnyHit) {
+      if (!leaves_.any_hit(s.data, blocks_of(range), range.blocks, s.tnear, s.best.t)) return false;
+      s.best.primitive = 0;
+      return true;
+    }
+    leaves_.closest_hit(s.data, blocks_of(range), range.blocks, s.tnear, s.best);
+    return false;
+  }
+
+  ARBORETUM_INLINE const std::byte* blocks_of(LongLeaf range) const { return store_.blocks() + range.first * leaves_.block_bytes(); }
+
+  const LeafStore& store_;
+  const Leaves leaves_;
+};
+
+}  // namespace ARBORETUM_ISA_NAMESPACE
+}  // namespace arboretum
