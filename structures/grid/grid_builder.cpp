@@ -5,8 +5,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
-#include "core/timer.h"
+#include "structures/builders/phase_clock.h"
 #include "structures/grid/cell_ranges.h"
 
 namespace arboretum::grid {
@@ -312,17 +313,11 @@ double expected_steps(const Level& level) {
 
 void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, bool two_level,
                  unsigned leaf_width, Cells& cells, BuildReport& report) {
-  double start = wall_seconds();
-  const auto phase = [&](const char* name) {
-    const double now = wall_seconds();
-    report.phases.emplace_back(name, now - start), start = now;
-  };
+  PhaseClock phase(report);
   const Bounds3f bounds = mesh.bounds();
-  double largest = 0, reach = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    largest = std::max({largest, std::abs(double(bounds.lower[a])), std::abs(double(bounds.upper[a]))});
-    reach = std::max(reach, double(bounds.upper[a]) - bounds.lower[a]);
-  }
+  const double largest = largest_coordinate(bounds);
+  double reach = 0;
+  for (std::size_t a = 0; a < 3; ++a) reach = std::max(reach, double(bounds.upper[a]) - bounds.lower[a]);
   reach = std::max(reach, largest / 64);
   cells.max_coordinate = float(largest), cells.reach = float(reach);
   cells.pad = std::max(float(0x1p-20 * largest + 0x1p-16 * reach), 0x1p-100f);
@@ -344,10 +339,10 @@ void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, 
     if (fill_lists(mesh, cells.levels[0], pad, limit, cells.lists)) break;
   }
   cells.codes.assign(cells.levels[0].size(), kEmptyLeaf);
-  phase("outer grid");
+  phase.ends("outer grid");
   if (two_level) {
     add_inner_grids(mesh, parameters, leaf_width, cells);
-    phase("inner grids");
+    phase.ends("inner grids");
   }
 }
 
