@@ -10,6 +10,7 @@
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
 #include "experiments/conclusion.h"
+#include "experiments/config_plots.h"
 #include "experiments/effective.h"
 #include "experiments/estimate.h"
 #include "experiments/interleave.h"
