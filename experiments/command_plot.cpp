@@ -5,6 +5,7 @@
 
 #include "core/names.h"
 #include "experiments/commands.h"
+#include "experiments/config_plots.h"
 #include "experiments/plotting.h"
 #include "experiments/result.h"
 

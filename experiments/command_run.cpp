@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <memory>
 #include <numeric>
 #include <system_error>
 #include <thread>
@@ -10,6 +11,7 @@
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
 #include "experiments/conclusion.h"
+#include "experiments/config_plots.h"
 #include "experiments/effective.h"
 #include "experiments/estimate.h"
 #include "experiments/interleave.h"
@@ -50,18 +52,24 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
 }
 
 /// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each that is read or placed is loaded
-/// for this alone, and again when its turn comes: a long sweep does not hold all of them.
-void require_scenes(const Experiment& experiment, const Plan& plan) {
+/// for this, one at a time. Where it is the only scene it stays; of several each is loaded again when its turn comes: a long sweep does not hold all
+/// of them.
+LoadedScene require_scenes(const Experiment& experiment, const Plan& plan) {
+  LoadedScene loaded;
+  std::size_t wanted = 0;
   for (std::size_t i = 0; i < experiment.scenes.size(); ++i) {
     const SceneChoice& scene = experiment.scenes[i];
-    if (!scene.spec.generator.empty() && scene.placing.label.empty()) continue;  // what is generated was checked with the configuration
     if (std::ranges::none_of(plan.cells, [i](const Cell& cell) { return cell.scene_index == i; })) continue;
+    ++wanted, loaded.data.reset();
+    if (!scene.spec.generator.empty() && scene.placing.label.empty()) continue;  // what is generated was checked with the configuration
     try {
-      static_cast<void>(SceneData(scene, experiment.measure, [](const std::string&) {}));
+      loaded = {i, std::make_unique<SceneData>(scene, experiment.measure)};
     } catch (const UserError& e) {
       throw UserError(fmt::format("{}: {}", scene.where, e.what()));
     }
   }
+  if (wanted > 1) loaded.data.reset();
+  return loaded;
 }
 
 void refuse_other_configuration(const std::filesystem::path& folder, const std::string& hash) {
@@ -188,7 +196,7 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   Json context = machine_context(experiment, hash, command.command_line);
   add_custom_context(context, command.benchmark);
   if (!command.no_plots && command.benchmark.format == "console") require_chosen_python();
-  require_scenes(experiment, plan);
+  LoadedScene loaded = require_scenes(experiment, plan);
   make_output_folder(folder);
   if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
   if (!command.benchmark.out.empty())
@@ -208,7 +216,7 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
              plan.skipped.size(), shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
              format_duration(total_seconds(experiment, plan)));
 
-  RunOutcome outcome = run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast});
+  RunOutcome outcome = run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast}, std::move(loaded));
   outcome.warnings = changed;
   std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())), std::back_inserter(outcome.warnings));
   try {

@@ -12,13 +12,12 @@
 #include "core/names.h"
 #include "core/timer.h"
 #include "experiments/append_file.h"
-#include "experiments/axis_words.h"
 #include "experiments/case_file.h"
 #include "experiments/commands.h"
 #include "experiments/config_scenes.h"
-#include "experiments/plan.h"
 #include "experiments/progress.h"
 #include "experiments/summary.h"
+#include "experiments/verify_plan.h"
 #include "experiments/verify_reduce.h"
 #include "experiments/verify_report.h"
 #include "oracle/random_cases.h"
@@ -74,50 +73,9 @@ class Verify {
 
   // Cells.
 
-  std::vector<std::string> all_values(Axis axis, std::size_t triangles) const {
-    std::vector<std::string> values = known_values(axis, registry_);
-    std::erase_if(values, [&](const std::string& v) { return v == kAuto || v == kAll || v == "packet" || v == "hybrid"; });
-    if (axis == Axis::isa) {
-      values.clear();
-      for (Isa isa : registry_.isas) values.emplace_back(to_string(isa));
-    }
-    if (axis == Axis::structure)
-      std::erase_if(values, [&](const std::string& v) {
-        return v == "embree" || (v == "brute_force" && subject_ == Subject::scene && triangles > kBruteForceTriangles);
-      });
-    return values;
-  }
-
   void make_cells(const SceneChoice& scene, std::size_t triangles) {
-    Experiment experiment;
-    experiment.name = "verify", experiment.scenes = {scene};
-    experiment.metrics = {.trace = true, .build = false, .quality = false, .accuracy = true};
-    refuse_repeated_axes(command_.axes);
-    for (const std::string& word : command_.axes) {
-      // `all` of any axis; the builder has one of its own.
-      const std::size_t equals = word.find('=');
-      const auto axis = parse_axis(word.substr(0, equals));
-      if (axis && axis != Axis::builder && equals != std::string::npos && word.substr(equals + 1) == kAll) {
-        experiment.axes[index_of(*axis)] = all_values(*axis, triangles);
-        continue;
-      }
-      AxisWord read = read_axis_word(word, registry_, {});
-      if (read.key == "workload" || read.key == "threads")
-        throw UserError(fmt::format("command line: verify has rays of its own and no {} axis; see --kinds, --threads", read.key));
-      experiment.axes[index_of(*parse_axis(read.key))] = std::move(read.values);
-    }
-    const auto fill = [&](Axis a, std::vector<std::string> values) {
-      if (experiment.axes[index_of(a)].empty()) experiment.axes[index_of(a)] = std::move(values);
-    };
-    for (Axis a : {Axis::structure, Axis::intersector, Axis::isa}) fill(a, all_values(a, triangles));
-    for (Axis a : {Axis::builder, Axis::leaf, Axis::box}) fill(a, {std::string(kAuto)});
-    fill(Axis::traversal, {"single"});
-    fill(Axis::workload, {"verify"}), fill(Axis::threads, {"1"});
-    plan_ = make_plan(experiment, registry_);
-    apply_filter(plan_, command_.filter, command_.skip);
+    plan_ = make_verify_plan(command_, scene, subject_ == Subject::scene && triangles > kBruteForceTriangles, registry_);
     for (const Cell& cell : plan_.cells) cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box), {}, {}});
-    // The plan names cells after a workload, which they have not here.
-    for (SkippedCell& cell : plan_.skipped) cell.name.clear();
   }
 
   ExitStatus nothing() const {

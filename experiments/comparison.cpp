@@ -11,50 +11,18 @@
 #include <span>
 
 #include "core/error.h"
-#include "core/random.h"
 #include "experiments/axes.h"
-#include "experiments/significance.h"
+#include "experiments/ratio_bootstrap.h"
 #include "experiments/results_writer.h"
 
 namespace arboretum {
 namespace {
 
-constexpr std::size_t kResamples = 2000;
 constexpr const char* kEmbree = "machine";  // the group that is no axis of the table
-using Replicates = std::vector<double>;  // logarithms of ratios
 
 /// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
 std::vector<double> rates(const CellResult& r) {
   return r.rates(r.cell.threads == 1);
-}
-
-/// The same for a name whatever else is compared.
-std::uint64_t seed_of(const std::string& name) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (unsigned char c : name) hash = (hash ^ c) * 0x100000001b3u;
-  return hash;
-}
-
-double resampled_median(const std::vector<double>& values, std::uint64_t seed, std::size_t i, std::vector<double>& picked) {
-  picked.resize(values.size());
-  for (std::size_t j = 0; j < values.size(); ++j)
-    picked[j] = values[static_cast<std::size_t>(random_double(seed, i, j) * static_cast<double>(values.size()))];
-  return median(picked);
-}
-
-/// Logarithms of the ratio of the medians, of samples drawn anew from both.
-Replicates log_ratios(const std::string& name, const std::vector<double>& a, const std::vector<double>& b) {
-  const std::uint64_t seed = seed_of(name);
-  Replicates logs(kResamples);
-  std::vector<double> picked;
-  for (std::size_t i = 0; i < kResamples; ++i)
-    logs[i] = std::log(resampled_median(b, mix64(seed + 1), i, picked) / resampled_median(a, mix64(seed), i, picked));
-  return logs;
-}
-
-Interval interval(double log_centre, Replicates logs) {
-  std::ranges::sort(logs);
-  return {std::exp(log_centre), std::exp(logs[kResamples * 25 / 1000]), std::exp(logs[kResamples * 975 / 1000 - 1])};
 }
 
 class Comparer {
@@ -152,7 +120,7 @@ class Comparer {
   /// Of the sums of its cells' replicates.
   MeanRatio mean_of(const Group& group, Replicates sums) const {
     for (double& v : sums) v /= static_cast<double>(group.cells.size());
-    MeanRatio mean{group.axis, group.value, interval(mean_centre(group.cells), std::move(sums)), group.cells.size()};
+    MeanRatio mean{group.axis, group.value, ratio_interval(mean_centre(group.cells), std::move(sums)), group.cells.size()};
     for (std::size_t i : group.cells) {
       const Verdict v = out_.cells[i].verdict;
       ++(v == Verdict::faster ? mean.faster : v == Verdict::slower ? mean.slower : v == Verdict::undecided ? mean.undecided : mean.indistinguishable);
@@ -198,11 +166,11 @@ class Comparer {
     const std::vector<double> a = rates(cell.a);
     std::vector<double> b = rates(cell.b);
     cell.rate_a = bootstrap_median(a), cell.rate_b = bootstrap_median(b);
-    cell.ratio = interval(centres_[i], std::move(logs));
+    cell.ratio = ratio_interval(centres_[i], std::move(logs));
     const double machine = cell.ratio.median / (cell.rate_b.median / cell.rate_a.median);  // 1 without a control
     if (!out_.options.control.empty())
       for (double& rate : b) rate *= machine;
-    cell.p = test_p(cell.test, a, b);
+    cell.p = p_value(cell.test, a, b);
   }
 
   /// The same for all cells of as many repetitions, whatever was measured.
@@ -213,17 +181,6 @@ class Comparer {
       const double least = smallest_p(cell.a.repetitions.size(), cell.b.repetitions.size()) * static_cast<double>(tested.size());
       cell.test = least <= out_.options.significance ? SignificanceTest::mann_whitney : SignificanceTest::welch;
     }
-  }
-
-  static double test_p(SignificanceTest test, std::span<const double> a, std::span<const double> b) {
-    if (test == SignificanceTest::none) return 1.0;
-    if (test == SignificanceTest::mann_whitney) return mann_whitney_p(a, b);
-    const auto logs = [](std::span<const double> rates) {
-      std::vector<double> out;
-      for (double rate : rates) out.push_back(std::log(rate));
-      return out;
-    };
-    return welch_p(logs(a), logs(b));
   }
 
   void judge() {
@@ -299,15 +256,6 @@ std::string_view to_string(Verdict verdict) noexcept {
     case Verdict::slower: return "slower";
     case Verdict::indistinguishable: return "indistinguishable";
     case Verdict::undecided: return "undecided";
-  }
-  return "";
-}
-
-std::string_view to_string(SignificanceTest test) noexcept {
-  switch (test) {
-    case SignificanceTest::none: return "none";
-    case SignificanceTest::mann_whitney: return "mann_whitney";
-    case SignificanceTest::welch: return "welch";
   }
   return "";
 }

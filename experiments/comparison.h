@@ -13,6 +13,7 @@
 
 #include "experiments/result.h"
 #include "experiments/sampling.h"
+#include "experiments/significance.h"
 
 namespace arboretum {
 
@@ -25,10 +26,6 @@ struct CompareOptions {
 
 enum class Verdict { faster, slower, indistinguishable, undecided };
 [[nodiscard]] std::string_view to_string(Verdict verdict) noexcept;
-
-/// `none`: of a single repetition.
-enum class SignificanceTest { none, mann_whitney, welch };
-[[nodiscard]] std::string_view to_string(SignificanceTest test) noexcept;
 
 struct ComparedCell {
   CellResult a, b;

@@ -9,18 +9,13 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "experiments/axis_words.h"
+#include "experiments/config_plots.h"
 #include "experiments/config_scenes.h"
 #include "experiments/yaml_reader.h"
 #include "rendering/workload.h"
 
 namespace arboretum {
 namespace {
-
-constexpr std::string_view kPlots[] = {"rays_per_second", "rays_by_builder", "sah_cost", "epo", "bytes_per_triangle", "build_time",
-                                       "sah_vs_time", "accuracy_vs_time", "lane_utilization", "published_ratios", "leaks_vs_distance",
-                                       "leaks_vs_aspect", "leak_picture", "self_intersection", "traversal_ratios"};
-/// Drawn only where a configuration names them: few experiments have something for them to show.
-constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios", "traversal_ratios"};
 
 std::vector<std::string> strings(std::span<const std::string_view> views) {
   return {views.begin(), views.end()};
@@ -56,10 +51,7 @@ class ConfigReader {
     apply(overrides);
     fill_defaults();
     refuse_ineffective_rays(root["rays"]);
-    if (const auto node = root["plots"])
-      read_plots(node);
-    else
-      experiment_.plots = default_plots();
+    experiment_.plots = root["plots"] ? read_plots(yaml_, root["plots"], experiment_) : default_plots(experiment_);
     return std::move(experiment_);
   }
 
@@ -220,54 +212,6 @@ class ConfigReader {
       yaml_.fail(node, "metric quality has no effect without trace or build: add one of them");
   }
 
-  bool plot_has_data(std::string_view plot) const {
-    const Metrics& m = experiment_.metrics;
-    if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" || plot == "published_ratios" || plot == "traversal_ratios") return m.trace;
-    if (plot == "build_time") return m.build;
-    if (plot == "sah_cost" || plot == "epo") return m.quality;
-    if (plot == "bytes_per_triangle") return m.trace || m.build;
-    if (plot == "sah_vs_time") return m.quality && m.trace;
-    return m.accuracy && m.trace;
-  }
-
-  /// What a plot needs and the experiment has not, its metrics apart; empty: nothing.
-  std::string plot_lacks(std::string_view plot) const {
-    if ((plot == "leaks_vs_distance" || plot == "leaks_vs_aspect") && !has_workload([](const std::string& w) { return w.starts_with("hard"); }))
-      return "it shows workloads of hard rays, as hard_edge";
-    if (plot == "leak_picture" && !has_workload([](const std::string& w) { return w == "camera_edges"; })) return "it shows the workload camera_edges";
-    if (plot == "self_intersection" && !(has_rays_on_surfaces(experiment_) && experiment_.rays.self_intersection.size() > 1))
-      return "it shows several ways of `rays: self_intersection`";
-    return {};
-  }
-
-  template <class Predicate>
-  bool has_workload(const Predicate& wanted) const {
-    const auto has = [&](const AxisLists& axes) { return std::ranges::any_of(axes[index_of(Axis::workload)], wanted); };
-    return has(experiment_.axes) || std::ranges::any_of(experiment_.include, [&](const CellChoice& c) { return has(c.axes); });
-  }
-
-  std::vector<std::string> default_plots() const {
-    std::vector<std::string> plots;
-    for (std::string_view plot : kPlots)
-      if (plot_has_data(plot) && plot_lacks(plot).empty() && std::ranges::find(kOnlyWhenNamed, plot) == std::end(kOnlyWhenNamed)) plots.emplace_back(plot);
-    return plots;
-  }
-
-  void read_plots(const YAML::Node& node) {
-    if (node.IsSequence() && node.size() == 0) return;  // no plots, said plainly
-    const std::vector<std::string> known = strings(kPlots);
-    for (const YAML::Node& value : yaml_.list(node, "plots")) {
-      const std::string name = value.Scalar();
-      if (std::ranges::find(known, name) == known.end())
-        yaml_.fail(value, unknown_name_message("plot", name, known));
-      if (!plot_has_data(name))
-        yaml_.fail(value, fmt::format("plot {} has no data: a metric that it shows is not in metrics", name));
-      if (const std::string lack = plot_lacks(name); !lack.empty() && !experiment_.overridden)
-        yaml_.fail(value, fmt::format("plot {} has no data: {}, and there are none", name, lack));
-      experiment_.plots.push_back(name);
-    }
-  }
-
   void apply(const Overrides& overrides) {
     refuse_repeated_axes(overrides.axes);
     for (const std::string& word : overrides.axes) apply_axis(word);
@@ -338,10 +282,6 @@ class ConfigReader {
 bool has_rays_on_surfaces(const Experiment& experiment) {
   const auto has = [](const AxisLists& axes) { return std::ranges::any_of(axes[index_of(Axis::workload)], starts_on_surfaces); };
   return has(experiment.axes) || std::ranges::any_of(experiment.include, [&](const CellChoice& c) { return has(c.axes); });
-}
-
-std::span<const std::string_view> plot_names() {
-  return kPlots;
 }
 
 Experiment read_experiment(const std::filesystem::path& file, const Registry& registry,

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -90,9 +89,6 @@ struct Overrides {
 
 /// Whether a workload of the sweep starts on surfaces, so that RaySettings mean something.
 [[nodiscard]] bool has_rays_on_surfaces(const Experiment& experiment);
-
-/// Plots that plots/plot.py draws.
-[[nodiscard]] std::span<const std::string_view> plot_names();
 
 /// Reads and checks. Throws UserError, one line: `file:line: what; mend`.
 [[nodiscard]] Experiment read_experiment(const std::filesystem::path& file, const Registry& registry,

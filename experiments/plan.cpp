@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "experiments/name_filter.h"
+#include "experiments/why_impossible.h"
 #include "rendering/workload.h"
 
 namespace arboretum {
@@ -19,8 +20,6 @@ std::string Cell::name() const {
 }
 
 namespace {
-
-constexpr std::string_view kEmbreeMissing = "this build has no embree: install libembree-dev and build again";
 
 bool contains(const std::vector<std::string>& list, std::string_view value) {
   return std::ranges::find(list, value) != list.end();
@@ -141,56 +140,6 @@ class Planner {
     keep("rays_in_flight", cell.settings.rays_in_flight);
   }
 
-  /// Why the cell's way of traversal cannot be set so; empty where it can.
-  static std::string impossible_setting(const Cell& cell) {
-    const unsigned threshold = cell.settings.hybrid_threshold;
-    if (threshold == TraversalSettings::kOwn) return {};
-    const auto rays = static_cast<unsigned>(std::stoul(cell.traversal.substr(std::string_view("hybrid").size())));
-    if (threshold <= rays) return {};
-    return fmt::format("{} has packets of {} rays: no threshold of {}", cell.traversal, rays, threshold);
-  }
-
-  /// Why the structure below cannot be, or not so; empty where it can.
-  std::string impossible_below(const Cell& cell) const {
-    const std::string& name = cell.parameters.below;
-    const StructureEntry* below = registry_.structure(name);
-    std::string why = below ? why_not_below(below->info) : "this build has no structure of that name";
-    if (why.empty()) why = lacks_builder(*below, cell.builder);
-    if (why.empty() && !registry_.kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa)) {
-      why = registry_.why_no_kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
-      if (why.empty()) why = "no such kernel in this build";
-    }
-    return why.empty() ? why : fmt::format("{} over {}: {}", cell.structure, name, why);
-  }
-
-  static std::string lacks_builder(const StructureEntry& entry, const std::string& builder) {
-    const auto& builders = entry.info.builders;
-    if (builders.empty() || std::ranges::find(builders, builder) != builders.end()) return {};
-    return fmt::format("{} has no builder {} (it takes {})", entry.info.name, builder, fmt::join(builders, ", "));
-  }
-
-  /// Why the cell cannot be; empty where it can.
-  std::string impossible(Cell& cell, const StructureEntry* entry) const {
-    if (!entry) return std::string(kEmbreeMissing);
-    const bool moves = experiment_.scenes[cell.scene_index].moves;
-    if (moves && !entry->info.holds_motion) return fmt::format("{} holds one moment, and the scene moves", cell.structure);
-    if (!moves && entry->info.needs_motion) return fmt::format("{} is for moving scenes, and nothing moves", cell.structure);
-    // First what is below: builder and leaf are its own.
-    if (entry->info.takes_below && !moves) {
-      if (std::string why = impossible_below(cell); !why.empty()) return why;
-    }
-    if (const std::string why = lacks_builder(*entry, cell.builder); !why.empty()) return why;
-    cell.kernel =
-        registry_.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
-    if (!cell.kernel) {
-      const std::string why = registry_.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box,
-                                                      cell.traversal, cell.isa);
-      return why.empty() ? "no such kernel in this build" : why;
-    }
-    if (std::string why = impossible_setting(cell); !why.empty()) return why;
-    return {};
-  }
-
   /// Why this machine lacks what the cell needs; empty where it has it.
   std::string lacking(const Cell& cell) const {
     const std::string& missing = experiment_.scenes[cell.scene_index].missing;
@@ -240,7 +189,7 @@ class Planner {
     traversals_.insert(cell.traversal);
     for (const auto& [parameter, where] : experiment_.parameter_places)
       if (!is_of_traversal(parameter) && reads(parameter, cell.structure, cell.builder, cell.parameters.below)) parameters_read_.insert(parameter);
-    const std::string never = impossible(cell, entry), here = lacking(cell);
+    const std::string never = why_impossible(cell, experiment_.scenes[cell.scene_index].moves, registry_), here = lacking(cell);
     cell.metric = Cell::Metric::trace;
     if (never.empty() && here.empty()) {
       out.push_back(std::move(cell));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <deque>
 #include <map>
+#include <memory>
 #include <new>
 #include <thread>
 
@@ -29,12 +30,13 @@ constexpr std::size_t kPrepareUnits = 2;  // making a cell ready takes about two
 class Runner {
  public:
   Runner(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal,
-         const RunOptions& options)
+         const RunOptions& options, LoadedScene loaded)
       : experiment_(experiment),
         plan_(plan),
         registry_(registry),
         journal_(journal),
         options_(options),
+        loaded_(std::move(loaded)),
         progress_(pending_cells(), pending_units()),
         cache_(experiment.measure.structure_cache, [this](const std::string& line) { progress_.note(line); }) {}
 
@@ -87,8 +89,13 @@ class Runner {
       (cell.metric == Cell::Metric::build ? builds : traces).push_back(&cell);
     }
     if (builds.empty() && traces.empty()) return;
-    SceneData data(experiment_.scenes[index], experiment_.measure,
-                   [this](const std::string& line) { progress_.note(line); });
+    std::unique_ptr<SceneData> scene = std::move(loaded_.data);
+    if (!scene || loaded_.index != index) {
+      scene.reset();  // before the next one is loaded
+      scene = std::make_unique<SceneData>(experiment_.scenes[index], experiment_.measure);
+    }
+    SceneData& data = *scene;
+    data.note_to([this](const std::string& line) { progress_.note(line); });
     StructurePool pool(data.mesh(), registry_, experiment_.metrics.quality, cache_);
     if (!builds.empty()) run_builds(builds, data, pool);
     run_traces(traces, data, pool);
@@ -264,6 +271,7 @@ class Runner {
   const Registry& registry_;
   Journal& journal_;
   const RunOptions& options_;
+  LoadedScene loaded_;
   Progress progress_;
   StructureCache cache_;
   RunOutcome outcome_;
@@ -274,11 +282,11 @@ class Runner {
 }  // namespace
 
 RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry,
-                    Journal& journal, const RunOptions& options) {
+                    Journal& journal, const RunOptions& options, LoadedScene loaded) {
   unsigned threads = std::max(1u, std::thread::hardware_concurrency());
   for (const Cell& cell : plan.cells) threads = std::max(threads, cell.threads);
   const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);
-  return Runner(experiment, plan, registry, journal, options).run();
+  return Runner(experiment, plan, registry, journal, options, std::move(loaded)).run();
 }
 
 }  // namespace arboretum

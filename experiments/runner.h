@@ -8,6 +8,7 @@
 #include "experiments/journal.h"
 #include "experiments/plan.h"
 #include "experiments/result.h"
+#include "experiments/scene_data.h"
 
 namespace arboretum {
 
@@ -26,8 +27,8 @@ struct RunOutcome {
 
 /// Cells of one scene and workload whose structures fit the memory together are interleaved. Takes up what
 /// the journal holds. A UserError on the way (a scene that does not load, a full disk) ends the run and is
-/// told in the outcome, so that what was measured can still be written.
+/// told in the outcome, so that what was measured can still be written. `loaded` is not loaded again.
 [[nodiscard]] RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry,
-                                  Journal& journal, const RunOptions& options);
+                                  Journal& journal, const RunOptions& options, LoadedScene loaded = {});
 
 }  // namespace arboretum

@@ -33,6 +33,7 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
     : name_(choice.name),
       view_{.width = measure.width, .height = measure.height, .seed = measure.seed},
       note_(std::move(note)) {
+  if (!note_) note_ = [this](const std::string& line) { waiting_.push_back(line); };
   const double begin = wall_seconds();
   scene_ = load_scene(choice.spec);
   if (!choice.placing.label.empty()) place(choice.placing);
@@ -43,6 +44,12 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
                       name_, report.non_finite, report.out_of_range, report.degenerate));
   }
   for (const std::string& warning : report.warnings) note_(fmt::format("{}: {}", name_, warning));
+}
+
+void SceneData::note_to(NoteFunction note) {
+  note_ = std::move(note);
+  for (const std::string& line : waiting_) note_(line);
+  waiting_.clear();
 }
 
 void SceneData::place(const Placing& placing) {

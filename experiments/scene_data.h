@@ -25,8 +25,13 @@ using NoteFunction = std::function<void(const std::string&)>;
 
 class SceneData {
  public:
-  /// Loads the scene and notes what the loader found. Throws UserError.
-  SceneData(const SceneChoice& choice, const MeasureSettings& measure, NoteFunction note);
+  /// Loads the scene and notes what the loader found; without `note` that waits for note_to(). Throws UserError.
+  SceneData(const SceneChoice& choice, const MeasureSettings& measure, NoteFunction note = {});
+  SceneData(const SceneData&) = delete;
+  SceneData& operator=(const SceneData&) = delete;
+
+  /// Where notes go from now on, those that wait first.
+  void note_to(NoteFunction note);
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return scene_.mesh; }
@@ -66,6 +71,7 @@ class SceneData {
   std::string name_;
   View view_;
   NoteFunction note_;
+  std::vector<std::string> waiting_;  ///< notes from before there was anyone to take them
   Scene scene_;
   std::unique_ptr<Oracle> oracle_;
   Json facts_ = Json::object();
@@ -75,6 +81,12 @@ class SceneData {
   std::map<const Workload*, std::vector<ExactHit>> closest_truth_;
   std::map<const Workload*, std::vector<std::uint8_t>> any_truth_;
   std::map<std::string, std::vector<ExactHit>> start_truth_;  ///< the same for all ways of leaving the surface
+};
+
+/// A scene that was loaded before its turn.
+struct LoadedScene {
+  std::size_t index = 0;                  ///< of the experiment's scenes
+  std::unique_ptr<SceneData> data = {};  ///< null: none was
 };
 
 }  // namespace arboretum

@@ -89,6 +89,26 @@ double welch_p(std::span<const double> a, std::span<const double> b) {
   return std::min(1.0, 2.0 * boost::math::cdf(boost::math::complement(distribution, difference / std::sqrt(variance))));
 }
 
+std::string_view to_string(SignificanceTest test) noexcept {
+  switch (test) {
+    case SignificanceTest::none: return "none";
+    case SignificanceTest::mann_whitney: return "mann_whitney";
+    case SignificanceTest::welch: return "welch";
+  }
+  return "";
+}
+
+double p_value(SignificanceTest test, std::span<const double> a, std::span<const double> b) {
+  if (test == SignificanceTest::none) return 1.0;
+  if (test == SignificanceTest::mann_whitney) return mann_whitney_p(a, b);
+  const auto logs = [](std::span<const double> rates) {
+    std::vector<double> out;
+    for (double rate : rates) out.push_back(std::log(rate));
+    return out;
+  };
+  return welch_p(logs(a), logs(b));
+}
+
 double smallest_p(std::size_t a, std::size_t b) noexcept {
   double ways = 1.0;
   for (std::size_t i = 1; i <= a; ++i) ways *= static_cast<double>(b + i) / static_cast<double>(i);

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace arboretum {
@@ -17,6 +18,13 @@ namespace arboretum {
 /// Two-sided p-value of Welch's test for equal means, with the degrees of freedom of Welch and Satterthwaite. 1 where a sample has fewer than
 /// two values; without any spread 0 where the means differ, 1 where they do not.
 [[nodiscard]] double welch_p(std::span<const double> a, std::span<const double> b);
+
+/// `none`: of a single repetition.
+enum class SignificanceTest { none, mann_whitney, welch };
+[[nodiscard]] std::string_view to_string(SignificanceTest test) noexcept;
+
+/// Two-sided p-value of two samples of rates; Welch's test takes their logarithms. 1 of `none`.
+[[nodiscard]] double p_value(SignificanceTest test, std::span<const double> a, std::span<const double> b);
 
 /// The smallest p-value that the Mann-Whitney test of samples of these sizes can reach: 2 / C(a + b, a).
 [[nodiscard]] double smallest_p(std::size_t a, std::size_t b) noexcept;

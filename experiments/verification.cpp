@@ -1,21 +1,17 @@
 #include "experiments/verification.h"
 
-
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "core/coordinates.h"
 
 namespace arboretum {
 namespace {
 
 constexpr std::size_t kBlock = 4096;  // rays of one call
-
-float largest(Vec3f v) {
-  return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
-}
 
 /// A kernel leaves none of its answers unwritten: what stood there before is none.
 constexpr Hit kUnwritten{.t = -1.0f, .u = 0.0f, .v = 0.0f, .primitive = 0xdeadbeefu};
@@ -47,10 +43,7 @@ std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j,
 class Judge {
  public:
   Judge(const Cell& cell, const VerifyBatch& batch)
-      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box)) {
-    const Bounds3f box = batch.mesh.bounds();
-    largest_ = box.empty() ? 0.0f : std::max(largest(box.lower), largest(box.upper));
-  }
+      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box)), largest_(largest_coordinate(batch.mesh.bounds())) {}
 
   void operator()(std::size_t i, const Hit& answer, AnyAnswer any, const Hit* reference, std::vector<VerifyTally>& tallies) const {
     const Ray& ray = batch_.rays.rays[i];
@@ -89,10 +82,10 @@ class Judge {
 
 }  // namespace
 
-bool is_within(const Promise& promise, const Ray& ray, float largest_coordinate) noexcept {
+bool is_within(const Promise& promise, const Ray& ray, float largest) noexcept {
   if (promise.exponent == 0) return true;
   const float high = std::ldexp(1.0f, promise.exponent), low = 1.0f / high;
-  const float size = std::max(largest_coordinate, largest(ray.origin)), direction = largest(ray.direction);
+  const float size = std::max(largest, largest_coordinate(ray.origin)), direction = largest_coordinate(ray.direction);
   // A ray that is none must miss at whatever numbers: NaN and infinity are within.
   return !is_valid(ray) || (size >= low && size <= high && direction >= low && direction <= high);
 }

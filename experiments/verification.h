@@ -45,8 +45,8 @@ class StructureShelf {
   std::size_t bytes_ = 0;
 };
 
-/// Whether the cell's promise speaks of this ray: the numbers of ray and scene are within its range.
-[[nodiscard]] bool is_within(const Promise& promise, const Ray& ray, float largest_coordinate) noexcept;
+/// Whether the cell's promise speaks of this ray: the numbers of ray and scene, whose largest coordinate this is, are within its range.
+[[nodiscard]] bool is_within(const Promise& promise, const Ray& ray, float largest) noexcept;
 
 /// Traces closest and any hit of the whole batch, in blocks on all TBB threads allowed to the caller, and counts, one tally for
 /// each kind of kHardKindNames. `hits` becomes the cell's answers; `reference`, where it is not empty, those of another cell.

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/instances.h"
 
@@ -22,11 +23,9 @@ void check_triangles(const TriangleMesh& mesh, const std::string& of) {
                         "; indices count from 0");
       }
       for (std::size_t k = 0; k < mesh.frames(); ++k) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          if (std::abs(mesh.frame(k)[vertex][axis]) <= kMaxCoordinate) continue;
-          throw UserError(of + "triangle " + number(i) + ": vertex " + number(vertex) + (k == 0 ? "" : " of key frame " + number(k)) +
-                          " is not finite or beyond 2^40; drop such triangles or scale the mesh");
-        }
+        if (is_in_range(mesh.frame(k)[vertex])) continue;
+        throw UserError(of + "triangle " + number(i) + ": vertex " + number(vertex) + (k == 0 ? "" : " of key frame " + number(k)) +
+                        " is not finite or beyond 2^40; drop such triangles or scale the mesh");
       }
     }
   }

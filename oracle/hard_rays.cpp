@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/coordinates.h"
 #include "core/motion.h"
 #include "core/random.h"
 
@@ -158,7 +159,7 @@ class HardRayMaker::Draw {
     if (below(2)) {
       const auto c = corners(source);
       const Vec3f n = normalize(cross(c[1] - c[0], c[2] - c[0]));
-      const float size = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)}) * 0x1p-20f;
+      const float size = largest_coordinate(p) * 0x1p-20f;
       if (is_finite(n)) p = p + n * (dot(n, d) < 0 ? -size : size);
     }
     return {p, 0.0f, d, kInf};

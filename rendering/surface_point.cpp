@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/bounds.h"
+#include "core/rounding.h"
 
 namespace arboretum {
 namespace {
@@ -63,8 +64,8 @@ Vec3f SurfacePoint::beyond_error_bound(Vec3d side) const noexcept {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double s = axis == 0 ? side.x : axis == 1 ? side.y : side.z;
       const double w = axis == 0 ? wanted.x : axis == 1 ? wanted.y : wanted.z;
-      if (s > 0.0 && double(p[axis]) < w) p[axis] = std::nextafter(p[axis], Bounds3f::kInfinity);
-      if (s < 0.0 && double(p[axis]) > w) p[axis] = std::nextafter(p[axis], -Bounds3f::kInfinity);
+      if (s > 0.0) p[axis] = rounded_up(w);
+      if (s < 0.0) p[axis] = rounded_down(w);
     }
     if (dot(Vec3d(p) - a_, side) > 0.5 * distance) return p;
   }

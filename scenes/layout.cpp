@@ -1,21 +1,17 @@
 #include "scenes/layout.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <numeric>
 #include <utility>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 
 namespace arboretum {
 namespace {
 
 constexpr std::size_t kMostFrames = 4096;
-
-bool can_be_traced(Vec3f v) noexcept {
-  return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate && std::abs(v.z) <= kMaxCoordinate;
-}
 
 /// The kept triangles of [begin, end) as a mesh of their own; vertices that cannot be traced become the origin.
 TriangleMesh part_of(const TriangleMesh& mesh, std::size_t begin, std::size_t end, const std::vector<bool>& kept) {
@@ -29,7 +25,7 @@ TriangleMesh part_of(const TriangleMesh& mesh, std::size_t begin, std::size_t en
   if (low > high) return part;
   part.vertices.assign(mesh.vertices.begin() + low, mesh.vertices.begin() + high + 1);
   for (Vec3f& v : part.vertices)
-    if (!can_be_traced(v)) v = Vec3f{};
+    if (!is_in_range(v)) v = Vec3f{};
   for (std::size_t i = begin; i < end; ++i) {
     const Triangle& t = mesh.triangles[i];
     if (kept[i - begin]) part.triangles.push_back({t.a - low, t.b - low, t.c - low});
@@ -37,11 +33,11 @@ TriangleMesh part_of(const TriangleMesh& mesh, std::size_t begin, std::size_t en
   return part;
 }
 
-bool can_be_traced(const TriangleMesh& mesh, const std::vector<bool>& kept) {
+bool is_in_range(const TriangleMesh& mesh, const std::vector<bool>& kept) {
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!kept[i]) continue;
     for (const Vec3f& p : mesh.corners(i))
-      if (!can_be_traced(p)) return false;
+      if (!is_in_range(p)) return false;
   }
   return true;
 }
@@ -136,7 +132,7 @@ std::shared_ptr<const Instancing> kept_instances(const TriangleMesh& mesh, const
     std::uint32_t number = kNone;
     if (is_identity(instance.to_world) || condition(instance.to_world) <= kWorstCondition) {
       const auto [entry, fresh] = known.try_emplace({instance.prototype, pattern}, kNone);
-      if (fresh && can_be_traced(prototype, pattern)) {
+      if (fresh && is_in_range(prototype, pattern)) {
         entry->second = std::uint32_t(after->prototypes.size());
         after->prototypes.push_back(part_of(prototype, 0, prototype.size(), pattern));
       }

@@ -10,141 +10,20 @@
 
 #include <fmt/format.h>
 
-#include "core/error.h"
 #include "scenes/file_bytes.h"
 #include "scenes/number_text.h"
+#include "scenes/ply_header.h"
 #include "scenes/polygon.h"
 #include "scenes/readers.h"
 
 namespace arboretum {
 namespace {
 
-enum class Type : unsigned char { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
-
-constexpr std::size_t size_of(Type type) noexcept {
-  constexpr std::size_t kSizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-  return kSizes[int(type)];
-}
-
-struct Property {
-  std::string name;
-  Type type = Type::float32;
-  bool is_list = false;
-  Type count_type = Type::uint8;
-};
-
-struct Element {
-  std::string name;
-  std::uint64_t count = 0;
-  std::vector<Property> properties;
-
-  [[nodiscard]] int find(std::initializer_list<std::string_view> names) const {
-    for (std::size_t i = 0; i < properties.size(); ++i)
-      if (std::find(names.begin(), names.end(), properties[i].name) != names.end()) return int(i);
-    return -1;
-  }
-};
-
-enum class Format { ascii, little_endian, big_endian };
-
-struct Header {
-  Format format = Format::ascii;
-  std::vector<Element> elements;
-  std::size_t bytes = 0;  ///< where the data begins
-};
-
-class Failure {
- public:
-  explicit Failure(const std::filesystem::path& path) : name_(path.string()) {}
-  [[noreturn]] void operator()(const std::string& what) const { throw UserError(name_ + ": " + what); }
-  [[noreturn]] void line(std::size_t number, const std::string& what) const {
-    throw UserError(fmt::format("{}:{}: {}", name_, number, what));
-  }
-
- private:
-  std::string name_;
-};
-
-std::vector<std::string_view> words(std::string_view line) {
-  std::vector<std::string_view> result;
-  while (true) {
-    const std::size_t first = line.find_first_not_of(" \t\r");
-    if (first == std::string_view::npos) return result;
-    line.remove_prefix(first);
-    const std::size_t length = std::min(line.find_first_of(" \t\r"), line.size());
-    result.push_back(line.substr(0, length));
-    line.remove_prefix(length);
-  }
-}
-
-Type parse_type(std::string_view word, std::size_t line, const Failure& fail) {
-  constexpr std::pair<std::string_view, Type> kTypes[] = {
-      {"char", Type::int8},      {"int8", Type::int8},       {"uchar", Type::uint8},
-      {"uint8", Type::uint8},    {"short", Type::int16},     {"int16", Type::int16},
-      {"ushort", Type::uint16},  {"uint16", Type::uint16},   {"int", Type::int32},
-      {"int32", Type::int32},    {"uint", Type::uint32},     {"uint32", Type::uint32},
-      {"float", Type::float32},  {"float32", Type::float32}, {"double", Type::float64},
-      {"float64", Type::float64}};
-  for (const auto& [name, type] : kTypes)
-    if (name == word) return type;
-  fail.line(line,
-            fmt::format("unknown property type '{}'; PLY has char uchar short ushort int uint float double",
-                        one_line(word)));
-}
-
-Header parse_header(std::string_view text, const Failure& fail) {
-  Header header;
-  bool has_format = false;
-  std::size_t position = 0;
-  for (std::size_t number = 1;; ++number) {
-    const std::size_t end = text.find('\n', position);
-    if (number == 1 && text.substr(0, 3) != "ply") fail("not a PLY file: it does not begin with 'ply'");
-    if (end == std::string_view::npos)
-      fail("the PLY header has no 'end_header' line; the file is truncated or broken");
-    const auto word = words(text.substr(position, end - position));
-    position = end + 1;
-    if (word.empty() || word[0] == "ply" || word[0] == "comment" || word[0] == "obj_info") continue;
-    if (word[0] == "end_header") break;
-    if (word[0] == "format" && word.size() >= 2) {
-      has_format = true;
-      if (word[1] == "ascii")
-        header.format = Format::ascii;
-      else if (word[1] == "binary_little_endian")
-        header.format = Format::little_endian;
-      else if (word[1] == "binary_big_endian")
-        header.format = Format::big_endian;
-      else
-        fail.line(number,
-                  fmt::format("unknown format '{}'; PLY has ascii, binary_little_endian, binary_big_endian",
-                              one_line(word[1])));
-    } else if (word[0] == "element" && word.size() == 3) {
-      Element element{.name = std::string(word[1]), .count = 0, .properties = {}};
-      const auto [p, error] = std::from_chars(word[2].data(), word[2].data() + word[2].size(), element.count);
-      if (error != std::errc{} || p != word[2].data() + word[2].size())
-        fail.line(number, fmt::format("the number of elements '{}' is no whole number", one_line(word[2])));
-      header.elements.push_back(std::move(element));
-    } else if (word[0] == "property" && !header.elements.empty() && word.size() >= 3) {
-      Property property;
-      if (word[1] == "list") {
-        if (word.size() != 5) fail.line(number, "a list property is 'property list COUNT_TYPE TYPE NAME'");
-        property.is_list = true;
-        property.count_type = parse_type(word[2], number, fail);
-        if (property.count_type >= Type::float32)
-          fail.line(number, "a list's count cannot be a floating-point number");
-        property.type = parse_type(word[3], number, fail);
-      } else {
-        property.type = parse_type(word[1], number, fail);
-      }
-      property.name = std::string(word.back());
-      header.elements.back().properties.push_back(std::move(property));
-    } else {
-      fail.line(number, fmt::format("unknown PLY header line '{}'", one_line(word[0])));
-    }
-  }
-  if (!has_format) fail("the PLY header has no 'format' line");
-  header.bytes = position;
-  return header;
-}
+using ply::Element;
+using ply::Failure;
+using ply::Format;
+using ply::Property;
+using ply::Type;
 
 /// Reads one number after the other, binary or ASCII, and never beyond the end.
 class Cursor {
@@ -361,7 +240,7 @@ void read_materials(const std::filesystem::path& path, Scene& scene, const Failu
 Scene read_ply(const std::filesystem::path& path) {
   const Failure fail(path);
   const FileBytes bytes(path);
-  const Header header = parse_header(bytes.text(), fail);
+  const ply::Header header = ply::parse_header(bytes.text(), fail);
   Cursor cursor(bytes.text().substr(header.bytes), header.format, fail);
   Scene scene;
   std::vector<std::array<float, 2>> texture;

@@ -53,7 +53,7 @@ class SceneFile {
     if (root["environment"]) read_environment(root["environment"]);
     if (root["lights"]) {
       file_.check_list(root["lights"], "lights");
-      for (const YAML::Node& node : root["lights"]) scene_.lights.push_back(light(node));
+      for (const YAML::Node& node : root["lights"]) scene_.lights.push_back(file_.light(node));
     }
     read_meshes(file_.need(root, "meshes", "the scene"));
     lay_out(root["instances"]);
@@ -97,39 +97,6 @@ class SceneFile {
     const std::filesystem::path image = file_.beside(file_.text(node["image"], "environment image"));
     scene_.environment = at(node["image"], [&] { return mean_radiance(read_radiance(image)); });
     scene_.environment_image = image.string();
-  }
-
-  Light light(const YAML::Node& node) {
-    if (!node.IsMap()) file_.fail(node, "a light must be a map with a 'type'");
-    const std::string type = file_.text(file_.need(node, "type", "a light"), "a light's type");
-    Light light;
-    if (type == "point") {
-      file_.check_keys(node, "a point light", {"type", "position", "intensity"});
-    } else if (type == "directional") {
-      light.type = Light::Type::directional;
-      file_.check_keys(node, "a directional light", {"type", "direction", "intensity"});
-    } else if (type == "spot") {
-      light.type = Light::Type::spot;
-      file_.check_keys(node, "a spot light", {"type", "position", "direction", "intensity", "cone_degrees"});
-    } else {
-      const std::vector<std::string> types{"point", "directional", "spot"};
-      file_.fail(node["type"], unknown_name_message("light type", one_line(type), types));
-    }
-    if (light.type != Light::Type::directional)
-      light.position = file_.vec3(file_.need(node, "position", "a " + type + " light"), "a light's position");
-    if (light.type != Light::Type::point) {
-      light.direction =
-          file_.vec3(file_.need(node, "direction", "a " + type + " light"), "a light's direction");
-      if (light.direction == Vec3f{0, 0, 0})
-        file_.fail(node["direction"], "a light's direction must not be zero");
-    }
-    if (node["intensity"]) light.intensity = file_.color(node["intensity"], "a light's intensity");
-    if (node["cone_degrees"]) {
-      light.cone_degrees = float(file_.number(node["cone_degrees"], "cone_degrees"));
-      if (!(light.cone_degrees > 0.0f && light.cone_degrees <= 180.0f))
-        file_.fail(node["cone_degrees"], "cone_degrees must lie within (0, 180]");
-    }
-    return light;
   }
 
   void read_meshes(const YAML::Node& node) {

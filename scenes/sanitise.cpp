@@ -1,20 +1,15 @@
 #include "scenes/sanitise.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "scenes/layout.h"
 
 namespace arboretum {
 namespace {
-
-bool is_in_range(Vec3f v) noexcept {
-  return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate &&
-         std::abs(v.z) <= kMaxCoordinate;
-}
 
 /// Why a triangle cannot be traced. Zero area: in every key frame; the others: in any.
 struct Faults {

@@ -134,4 +134,35 @@ Camera YamlFile::camera(const YAML::Node& node) const {
   return camera;
 }
 
+Light YamlFile::light(const YAML::Node& node) const {
+  if (!node.IsMap()) fail(node, "a light must be a map with a 'type'");
+  const std::string type = text(need(node, "type", "a light"), "a light's type");
+  Light light;
+  if (type == "point") {
+    check_keys(node, "a point light", {"type", "position", "intensity"});
+  } else if (type == "directional") {
+    light.type = Light::Type::directional;
+    check_keys(node, "a directional light", {"type", "direction", "intensity"});
+  } else if (type == "spot") {
+    light.type = Light::Type::spot;
+    check_keys(node, "a spot light", {"type", "position", "direction", "intensity", "cone_degrees"});
+  } else {
+    const std::vector<std::string> types{"point", "directional", "spot"};
+    fail(node["type"], unknown_name_message("light type", one_line(type), types));
+  }
+  if (light.type != Light::Type::directional)
+    light.position = vec3(need(node, "position", "a " + type + " light"), "a light's position");
+  if (light.type != Light::Type::point) {
+    light.direction = vec3(need(node, "direction", "a " + type + " light"), "a light's direction");
+    if (light.direction == Vec3f{0, 0, 0}) fail(node["direction"], "a light's direction must not be zero");
+  }
+  if (node["intensity"]) light.intensity = color(node["intensity"], "a light's intensity");
+  if (node["cone_degrees"]) {
+    light.cone_degrees = float(number(node["cone_degrees"], "cone_degrees"));
+    if (!(light.cone_degrees > 0.0f && light.cone_degrees <= 180.0f))
+      fail(node["cone_degrees"], "cone_degrees must lie within (0, 180]");
+  }
+  return light;
+}
+
 }  // namespace arboretum

@@ -46,6 +46,8 @@ class YamlFile {
   [[nodiscard]] Vec3f color(const YAML::Node& node, std::string_view what) const;
   /// `{position, look_at, up, vertical_fov, mirror_x, resolution, aperture_radius, focus_distance}`.
   [[nodiscard]] Camera camera(const YAML::Node& node) const;
+  /// `{type, position, direction, intensity, cone_degrees}`, of which each type has its own.
+  [[nodiscard]] Light light(const YAML::Node& node) const;
 
  private:
   std::filesystem::path path_;

@@ -86,6 +86,29 @@ class Structures {
   return occluded;
 }
 
+/// What rows of the table answer to the same rays, each asked once however many others are held against it.
+class Answers {
+ public:
+  struct Both {
+    std::vector<Hit> closest;
+    std::vector<std::uint8_t> any;
+  };
+
+  Answers(Structures& structures, std::span<const Ray> rays) : structures_(structures), rays_(rays) {}
+
+  /// `row`: a row of kernel_table() itself.
+  [[nodiscard]] const Both& of(const KernelRow& row) {
+    const auto [entry, is_new] = known_.try_emplace(&row);
+    if (is_new) entry->second = {closest_hit(row, structures_.get(row), rays_), any_hit(row, structures_.get(row), rays_)};
+    return entry->second;
+  }
+
+ private:
+  Structures& structures_;
+  std::span<const Ray> rays_;
+  std::map<const KernelRow*, Both> known_;
+};
+
 /// A hit for a message.
 [[nodiscard]] inline std::string text(const Hit& hit) {
   std::ostringstream out;

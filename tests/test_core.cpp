@@ -1,13 +1,16 @@
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 
 #include "core/arena.h"
 #include "core/bounds.h"
+#include "core/coordinates.h"
 #include "core/isa.h"
 #include "core/memory_meter.h"
 #include "core/names.h"
 #include "core/random.h"
 #include "core/ray.h"
+#include "core/rounding.h"
 #include "tests/catch.h"
 
 using namespace arboretum;
@@ -29,6 +32,47 @@ TEST_CASE("an empty box has no area and contains nothing") {
   CHECK(box.area() == 0.0);
   box.extend(Vec3f{2, 4, 6});
   CHECK(box.area() == 2.0 * (1 * 2 + 2 * 3 + 3 * 1));
+}
+
+TEST_CASE("directed rounding gives the neighbouring floats, of either sign, at zero and at the ends of the range") {
+  const float inf = std::numeric_limits<float>::infinity(), most = std::numeric_limits<float>::max();
+  for (const float f : {0.0f, -0.0f, 1e-45f, -1e-45f, 0x1p-126f, 1.0f, -1.0f, 0x1.fffffep0f, -3.7f, most, -most}) {
+    CAPTURE(f);
+    CHECK(next_below(f) == std::nextafter(f, -inf));
+    CHECK(next_above(f) == std::nextafter(f, inf));
+    CHECK(rounded_down(f) == f);
+    CHECK(rounded_up(f) == f);
+    // A little to either side of f, where doubles still tell it from f.
+    const double above = std::nextafter(double(f), double(inf)), below = std::nextafter(double(f), -double(inf));
+    CHECK(rounded_down(above) == f);
+    CHECK(rounded_up(above) == std::nextafter(f, inf));
+    CHECK(rounded_down(below) == std::nextafter(f, -inf));
+    CHECK(rounded_up(below) == f);
+  }
+  CHECK(rounded_down(1e300) == most);
+  CHECK(rounded_up(1e300) == inf);
+  CHECK(rounded_down(-1e300) == -inf);
+  CHECK(rounded_up(-1e300) == -most);
+  CHECK(rounded_down(double(inf)) == inf);
+  CHECK(rounded_up(-double(inf)) == -inf);
+  CHECK(std::isnan(rounded_down(std::nan(""))));
+  CHECK(std::isnan(rounded_up(std::nan(""))));
+}
+
+TEST_CASE("the largest coordinate is of either corner, and a mesh holds what is finite and within the range") {
+  CHECK(largest_coordinate(Vec3f{1, -7, 3}) == 7.0f);
+  CHECK(largest_coordinate(Bounds3f{}) == 0.0f);
+  CHECK(largest_coordinate(Bounds3f{{-9, 0, 0}, {1, 2, 3}}) == 9.0f);
+  CHECK(largest_coordinate(Bounds3f{{-1, 0, 0}, {1, 2, 4}}) == 4.0f);
+  const float beyond = next_above(kMaxCoordinate), nan = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const float wrong : {beyond, -beyond, Bounds3f::kInfinity, nan}) {
+      Vec3f p{kMaxCoordinate, -kMaxCoordinate, 0};
+      CHECK(is_in_range(p));
+      p[axis] = wrong;
+      CHECK_FALSE(is_in_range(p));
+    }
+  }
 }
 
 TEST_CASE("a ray is valid only with finite numbers, a direction and a non-empty interval") {

@@ -12,6 +12,7 @@
 #include "core/random.h"
 #include "structures/accel.h"
 #include "structures/end_point_overlap.h"
+#include "structures/grid/cell_counts.h"
 #include "structures/grid/grid_builder.h"
 #include "structures/leaves/triangle_overlap.h"
 #include "structures/octree/octree.h"

@@ -1,10 +1,14 @@
 // The kd-tree's rays: those in planes, flat cells and star-shaped scenes get the brute force's answers, and a packet's go where they would go alone.
+#include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <memory>
 #include <set>
 #include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "oracle/oracle.h"
@@ -91,11 +95,29 @@ std::vector<KernelRow> packet_rows() {
   return rows;
 }
 
+/// The trees of one mesh, each built once.
+class Trees {
+ public:
+  explicit Trees(const TriangleMesh& mesh) : mesh_(mesh) {}
+  [[nodiscard]] const Accel& get(const char* builder, std::string_view leaf) {
+    std::unique_ptr<Accel>& accel = built_[{builder, leaf}];
+    if (!accel) accel = build(mesh_, builder, leaf);
+    return *accel;
+  }
+
+ private:
+  const TriangleMesh& mesh_;
+  std::map<std::pair<std::string_view, std::string_view>, std::unique_ptr<Accel>> built_;
+};
+
 }  // namespace
 
 TEST_CASE("with padded planes both builders' trees give the brute force's answers, bit for bit") {
   for (const Scene& scene : hard_scenes()) {
     const std::vector<Ray> rays = rays_for(scene.mesh, 400);
+    test::Structures structures(scene.mesh);
+    test::Answers brute_force(structures, rays);
+    Trees trees(scene.mesh);
     for (const KernelRow& row : runnable_rows()) {
       if (row.structure != "kdtree" || row.box != "padded" || row.leaf == "triangle1" || row.leaf == "triangle16") continue;
       // The others are wrong by more than planes are padded: where triangles are small beside the scene, and on triangles seen along their
@@ -104,18 +126,15 @@ TEST_CASE("with padded planes both builders' trees give the brute force's answer
       if (row.intersector != "watertight" && (name == "outlier" || name == "split regression")) continue;
       const KernelRow* reference = find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
       if (!reference) continue;
-      test::Structures structures(scene.mesh);
-      const std::vector<Hit> want = closest_hit(*reference, structures.get(*reference), rays);
-      const std::vector<std::uint8_t> occluded = any_hit(*reference, structures.get(*reference), rays);
+      const auto& [want, occluded] = brute_force.of(*reference);
       for (const char* builder : kBuilders) {
-        const auto accel = build(scene.mesh, builder, row.leaf);
-        const std::vector<Hit> got = closest_hit(row, *accel, rays);
-        for (std::size_t i = 0; i < rays.size(); ++i) {
-          INFO(scene.name << ", " << builder << ": " << name_of(row) << ": ray " << i << ": t " << got[i].t << ", primitive " << got[i].primitive
-                          << "; brute force: t " << want[i].t << ", primitive " << want[i].primitive);
-          REQUIRE(same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)));
-        }
-        CHECK(any_hit(row, *accel, rays) == occluded);
+        const Accel& accel = trees.get(builder, row.leaf);
+        INFO(scene.name << ", " << builder << ": " << name_of(row));
+        const std::vector<Hit> got = closest_hit(row, accel, rays);
+        test::require_each(
+            rays.size(), [&](std::size_t i) { return same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)); },
+            [&](std::size_t i) { return test::text(got[i]) + "; brute force: " + test::text(want[i]); });
+        CHECK(any_hit(row, accel, rays) == occluded);
       }
     }
   }
@@ -134,15 +153,14 @@ TEST_CASE("a ray in a split plane sees the triangles of both sides") {
     for (int i = 0; i < 64; ++i) rays.push_back({{zero, 0.25f, float(i) - 0.5f}, 0, {zero, zero, 1}, kInfinity});
     rays.push_back({{zero, 0.25f, 70}, 0, {zero, zero, -1}, kInfinity});
   }
+  Trees trees(mesh);
   for (const KernelRow& row : runnable_rows()) {
     if (row.structure != "kdtree") continue;
-    const auto accel = build(mesh, "sweep_sah", row.leaf);
-    const std::vector<Hit> hits = closest_hit(row, *accel, rays);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      INFO(name_of(row) << " ray " << i);
-      const std::size_t k = i % 65;
-      CHECK(hits[i].primitive == std::uint32_t(k == 64 ? 63 : k));
-    }
+    INFO(name_of(row));
+    const std::vector<Hit> hits = closest_hit(row, trees.get("sweep_sah", row.leaf), rays);
+    test::require_each(
+        rays.size(), [&](std::size_t i) { return hits[i].primitive == std::uint32_t(std::min<std::size_t>(i % 65, 63)); },
+        [&](std::size_t i) { return test::text(hits[i]); });
   }
 }
 
@@ -157,6 +175,12 @@ TEST_CASE("a packet's rays visit just what they visit alone, and get the same bi
     for (const auto& others : {extreme_rays(scene.mesh), test::invalid_rays()})
       for (const Ray& ray : others) rays.insert(rays.begin() + std::ptrdiff_t(place % rays.size()), ray), place += 11;
     test::Structures structures(scene.mesh);
+    struct Alone {
+      std::vector<Hit> hits;
+      std::vector<std::uint8_t> occluded;
+      Counters counters[2];  ///< of closest and of any hit
+    };
+    std::map<std::pair<const KernelRow*, std::size_t>, Alone> known;  // of single rays, by the size of the batch
     for (const KernelRow& row : packet_rows()) {
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
@@ -165,11 +189,15 @@ TEST_CASE("a packet's rays visit just what they visit alone, and get the same bi
       for (std::size_t size : {std::size_t(1), width - 1, width, 2 * width + 3, rays.size()}) {
         INFO(scene.name << ": " << name_of(row) << ", batch of " << size);
         const std::span<const Ray> batch = std::span(rays).first(std::min(size, rays.size()));
-        Counters alone[2], together[2];
-        const std::vector<Hit> want = closest_hit(*single, accel, batch, &alone[0]), got = closest_hit(row, accel, batch);
-        REQUIRE(same_bits(got, want));
+        const auto [entry, is_new] = known.try_emplace({single, batch.size()});
+        if (is_new) {
+          entry->second.hits = closest_hit(*single, accel, batch, &entry->second.counters[0]);
+          entry->second.occluded = any_hit(*single, accel, batch, &entry->second.counters[1]);
+        }
+        const auto& [want, occluded, alone] = entry->second;
+        Counters together[2];
+        REQUIRE(same_bits(closest_hit(row, accel, batch), want));
         REQUIRE(same_bits(closest_hit(row, accel, batch, &together[0]), want));
-        const std::vector<std::uint8_t> occluded = any_hit(*single, accel, batch, &alone[1]);
         REQUIRE(any_hit(row, accel, batch) == occluded);
         REQUIRE(any_hit(row, accel, batch, &together[1]) == occluded);
         for (int any : {0, 1}) {

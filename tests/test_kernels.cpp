@@ -2,7 +2,6 @@
 // where none is promised, the same answers from any hit, counting kernels, batches of any size and other
 // structures.
 #include <iostream>
-#include <map>
 #include <set>
 
 #include "oracle/oracle.h"
@@ -198,7 +197,7 @@ TEST_CASE("with padded boxes every structure gives the brute force's answers, bi
     }
     Structures structures(scene.mesh);
     std::size_t compared = 0;
-    std::map<const KernelRow*, std::vector<Hit>> wanted;
+    Answers brute_force(structures, rays);
     for (const KernelRow& row : runnable_rows()) {
       if (row.box != "padded" || row.structure == "embree" || row.structure == "brute_force") continue;
       const KernelRow* reference =
@@ -209,8 +208,7 @@ TEST_CASE("with padded boxes every structure gives the brute force's answers, bi
       if (scene.name == "two scales" && !row.intersector.starts_with("watertight") && !row.intersector.ends_with("_double")) continue;
       INFO(scene.name << ": " << name_of(row));
       ++compared;
-      std::vector<Hit>& want = wanted[reference];
-      if (want.empty()) want = closest_hit(*reference, structures.get(*reference), rays);
+      const std::vector<Hit>& want = brute_force.of(*reference).closest;
       const std::vector<Hit> got = closest_hit(row, structures.get(row), rays);
       require_each(
           rays.size(), [&](std::size_t i) { return same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)); },
@@ -251,6 +249,7 @@ TEST_CASE("every way of traversal gives the single ray's answers, bit for bit") 
     std::size_t place = 0;
     for (const Ray& ray : invalid_rays()) rays.insert(rays.begin() + std::ptrdiff_t(place), ray), place += 7;
     Structures structures(scene.mesh);
+    Answers singles(structures, rays);
     for (const KernelRow& row : runnable_rows()) {
       if (row.traversal == "single" || row.structure == "embree") continue;
       traversals.insert(row.traversal);
@@ -258,12 +257,14 @@ TEST_CASE("every way of traversal gives the single ray's answers, bit for bit") 
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
       const Accel& accel = structures.get(row);
+      const auto& [alone, occluded] = singles.of(*single);
       for (std::size_t size : {std::size_t(0), std::size_t(1), std::size_t(5), std::size_t(33), rays.size()}) {
         INFO("batch of " << size);
-        const std::vector<Ray> batch(rays.begin(), rays.begin() + std::ptrdiff_t(size));
-        const std::vector<Hit> hits = closest_hit(row, accel, batch), alone = closest_hit(*single, accel, batch);
-        REQUIRE((same_bits(hits, alone) || (reorders(row) && nearly_same(hits, alone, extent))));
-        REQUIRE(any_hit(row, accel, batch) == any_hit(*single, accel, batch));
+        const std::span<const Ray> batch = std::span(rays).first(size);
+        const std::span<const Hit> want = std::span(alone).first(size);
+        const std::vector<Hit> hits = closest_hit(row, accel, batch);
+        REQUIRE((same_bits(hits, want) || (reorders(row) && nearly_same(hits, want, extent))));
+        REQUIRE(std::ranges::equal(any_hit(row, accel, batch), std::span(occluded).first(size)));
       }
     }
   }
@@ -279,14 +280,14 @@ TEST_CASE("streams of one to many groups give the single ray's answers, bit for 
     std::size_t place = 1;
     for (const Ray& ray : invalid_rays()) rays[place] = ray, place += 11;
     Structures structures(mesh);
+    Answers singles(structures, rays);
     for (const KernelRow& row : runnable_rows()) {
       if (!row.traversal.starts_with("stream") || row.box != "padded") continue;
       INFO(name_of(row));
       const Accel& accel = structures.get(row);
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
-      const std::vector<Hit> alone = closest_hit(*single, accel, rays);
-      const std::vector<std::uint8_t> occluded = any_hit(*single, accel, rays);
+      const auto& [alone, occluded] = singles.of(*single);
       for (std::size_t size : sizes) {
         INFO("batch of " << size);
         const std::span<const Ray> batch = std::span(rays).first(size);
@@ -327,6 +328,7 @@ TEST_CASE("rays that end in one place are occluded in packets as they are alone"
       }
     }
     Structures structures(mesh);
+    Answers singles(structures, rays);
     std::set<std::string_view> traversals;
     for (const KernelRow& row : runnable_rows()) {
       if (!row.traversal.starts_with("packet") && !row.traversal.starts_with("hybrid") && row.traversal != "auto") continue;
@@ -335,7 +337,7 @@ TEST_CASE("rays that end in one place are occluded in packets as they are alone"
       const Accel& accel = structures.get(row);
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
-      const std::vector<std::uint8_t> alone = any_hit(*single, accel, rays);
+      const std::vector<std::uint8_t>& alone = singles.of(*single).any;
       const auto hits = std::ranges::count(alone, 1);
       REQUIRE((hits > 200 && hits < std::ptrdiff_t(rays.size()) - 200));
       REQUIRE(any_hit(row, accel, rays) == alone);
@@ -368,6 +370,7 @@ TEST_CASE("rays of one origin get in packets what they get alone, bit for bit") 
     }
   }
   Structures structures(mesh);
+  Answers singles(structures, rays);
   std::set<std::string_view> traversals;
   for (const KernelRow& row : runnable_rows()) {
     if ((!row.traversal.starts_with("packet") && row.traversal != "auto") || row.box != "padded" || depends_on_neighbours(row)) continue;
@@ -375,7 +378,7 @@ TEST_CASE("rays of one origin get in packets what they get alone, bit for bit") 
     const Accel& accel = structures.get(row);
     const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
     REQUIRE(single);
-    const std::vector<Hit> alone = closest_hit(*single, accel, rays);
+    const std::vector<Hit>& alone = singles.of(*single).closest;
     REQUIRE(std::ranges::count_if(alone, &Hit::is_hit) > std::ptrdiff_t(rays.size() / 2));
     REQUIRE(same_bits(closest_hit(row, accel, rays), alone));
     traversals.insert(row.traversal);

@@ -50,6 +50,44 @@ TEST_CASE("the plan knows what moves and what can stand below, and gives reasons
   CHECK(skipped(plan, "waving_cloth-600/two_level/", "two_level holds one moment, and the scene moves") > 0);
 }
 
+TEST_CASE("a scene that was loaded before its turn is not loaded again; whose turn it is not is let go") {
+  const Folder folder;
+  const Registry registry = this_registry();
+  folder.write("triangle.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const auto read = [&](const std::string& scenes) {
+    return read_experiment(folder.write("sweep.yaml", "scenes: " + scenes + R"(
+axes: {structure: [bvh2], isa: [scalar], intersector: [watertight]}
+measure: {repetitions: 1, warmup: 0, min_time: 0.001, resolution: [8, 8]}
+metrics: [build]
+)"), registry);
+  };
+  const Experiment one = read("[{file: triangle.obj}]"), two = read("[{generate: city, triangles: 1000}, {file: triangle.obj}]");
+  const auto run = [&](const Experiment& experiment, LoadedScene loaded) {
+    const Plan plan = make_plan(experiment, registry);
+    Journal journal(folder.path(), "hash", plan, false);
+    return run_plan(experiment, plan, registry, journal, {}, std::move(loaded));
+  };
+  const auto load = [](const Experiment& experiment, std::size_t index) {
+    return LoadedScene{index, std::make_unique<SceneData>(experiment.scenes[index], experiment.measure)};
+  };
+  CHECK(run(two, load(two, 1)).results.size() == 2);
+  LoadedScene only = load(one, 0), second = load(two, 1);
+  fs::remove(folder.path() / "triangle.obj");
+  const RunOutcome kept = run(one, std::move(only)), let_go = run(two, std::move(second)), not_loaded = run(one, {});
+  CHECK(kept.error.empty());
+  REQUIRE(kept.results.size() == 1);
+  CHECK(kept.results[0].fact("triangles") == 1);
+  CHECK(let_go.results.size() == 1);
+  CHECK(let_go.error.find("triangle.obj") != std::string::npos);
+  CHECK(not_loaded.error.find("triangle.obj") != std::string::npos);
+  // What its loader has to say waits for someone to say it to.
+  std::vector<std::string> notes;
+  SceneData data(two.scenes[0], two.measure);
+  data.note_to([&](const std::string& line) { notes.push_back(line); });
+  REQUIRE(notes.size() == 1);
+  CHECK(notes[0].starts_with("city-1000: "));
+}
+
 TEST_CASE("both are measured, journalled, resumed and written as CSV") {
   const Folder folder;
   const Registry registry = this_registry();

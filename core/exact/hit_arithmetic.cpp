@@ -13,6 +13,7 @@
 #include <emmintrin.h>
 
 #include "core/exact/exact_predicate.h"
+#include "core/rounding.h"
 
 namespace arboretum {
 namespace {
@@ -79,15 +80,6 @@ inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
   if (!(det_error < 0x1p-9)) return {t, std::numeric_limits<double>::infinity(), low(uv), high(uv), 1.0};
   return {t, scale * size_1 * size_2 * size_s + std::fabs(t) * (det_error + 0x1p-50), low(uv), high(uv),
           scale * size_d * size_s * std::max(size_1, size_2) + det_error + 0x1p-50};
-}
-
-float rounded_down(double x) {
-  const float f = static_cast<float>(x);
-  return double(f) > x ? std::nextafter(f, -kInfinity) : f;
-}
-float rounded_up(double x) {
-  const float f = static_cast<float>(x);
-  return double(f) < x ? std::nextafter(f, kInfinity) : f;
 }
 
 float weight(double w) {

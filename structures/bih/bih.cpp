@@ -1,9 +1,9 @@
 #include "structures/bih/bih.h"
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
@@ -155,7 +155,7 @@ void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildRe
     throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
   if (mesh.size() >= (1u << 30)) throw UserError("bih takes at most 2^30 - 1 triangles");
   LeafLists lists;
-  nodes_.clear(), bounds_ = mesh.bounds(), stack_entries_ = 1, max_coordinate_ = 0.0f;
+  nodes_.clear(), bounds_ = mesh.bounds(), stack_entries_ = 1, max_coordinate_ = largest_coordinate(bounds_);
   if (mesh.size() == 0) {  // an empty leaf, behind an empty box
     nodes_.push_back({{0.0f, 0.0f}, Node::kLeaf});
     lists.begin.assign(2, 0);
@@ -170,8 +170,6 @@ void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildRe
       nodes_.shrink_to_fit();
       report.phases.emplace_back("planes", wall_seconds() - start);
     });
-    for (std::size_t a = 0; a < 3; ++a)
-      max_coordinate_ = std::max({max_coordinate_, std::fabs(bounds_.lower[a]), std::fabs(bounds_.upper[a])});
   }
   const double start = wall_seconds();
   MeteredVector<LeafCode> codes(lists.size());

@@ -21,15 +21,10 @@ class BinnedSah {
 
   void build(BuildReport& report) {
     const std::size_t n = mesh_.size();
-    double start = wall_seconds();
-    const auto phase = [&](const char* name) {
-      const double now = wall_seconds();
-      report.phases.emplace_back(name, now - start);
-      start = now;
-    };
+    PhaseClock phase(report);
     references_[0].resize(n), references_[1].resize(n);
     const sah::Bounds bounds = sah::make_references(mesh_, references_[0].data());
-    phase("references");
+    phase.ends("references");
     sah::TreeWriter writer(tree_, n, references_[0].data());
     writer_ = &writer;
     {
@@ -50,7 +45,7 @@ class BinnedSah {
     });
     tree_.primitives.resize(n);
     writer.finish();
-    phase("splits");
+    phase.ends("splits");
   }
 
  private:

@@ -18,9 +18,9 @@
 
 #include "core/isa.h"
 #include "core/mesh.h"
-#include "core/timer.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/clip.h"
+#include "structures/builders/phase_clock.h"
 
 #include "simd/target.h"
 #include "simd/target_begin.h"

@@ -1,20 +1,12 @@
 #include "structures/builders/clip.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
+
+#include "core/rounding.h"
 
 namespace arboretum {
 namespace {
-
-/// The largest float below x, and of zero the smallest negative one; x is finite.
-[[nodiscard]] float next_below(float x) noexcept {
-  if (x == 0.0f) return -std::bit_cast<float>(1u);
-  const auto bits = std::bit_cast<std::uint32_t>(x);
-  return std::bit_cast<float>(x > 0.0f ? bits - 1 : bits + 1);
-}
-[[nodiscard]] float next_above(float x) noexcept { return -next_below(-x); }
 
 /// Adds the point where the edge from a to b passes p[axis] = plane, which lies strictly between the two.
 void extend_by_crossing(Bounds3f& box, Vec3f a, Vec3f b, int axis, float plane) noexcept {

@@ -10,7 +10,6 @@
 #include <array>
 #include <atomic>
 #include <bit>
-#include <cmath>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -20,11 +19,12 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/memory_meter.h"
-#include "core/timer.h"
 #include "structures/builders/clip.h"
 #include "structures/builders/linked_tree.h"
+#include "structures/builders/phase_clock.h"
 
 namespace arboretum {
 namespace {
@@ -132,12 +132,7 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
            BuildReport& report) {
   const std::size_t n = mesh.size();
   if (n == 0) return;
-  double start = wall_seconds();
-  const auto phase = [&](const char* name) {
-    const double now = wall_seconds();
-    report.phases.emplace_back(name, now - start);
-    start = now;
-  };
+  PhaseClock phase(report);
   const bool spatial = quality == RTC_BUILD_QUALITY_HIGH;
   const std::size_t capacity = spatial ? n + std::size_t(double(n) * parameters.duplication_budget) : n;
   MeteredVector<RTCBuildPrimitive> primitives(capacity);
@@ -145,14 +140,12 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kGrain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const Bounds3f b = mesh.bounds(i);
-      for (int axis = 0; axis < 3; ++axis) {
-        if (std::max(std::fabs(b.lower[std::size_t(axis)]), std::fabs(b.upper[std::size_t(axis)])) > kLargest) too_large = true;
-      }
+      if (largest_coordinate(b) > kLargest) too_large = true;
       primitives[i] = {b.lower.x, b.lower.y, b.lower.z, 0, b.upper.x, b.upper.y, b.upper.z, std::uint32_t(i)};
     }
   });
   if (too_large) throw UserError("embree's builders take coordinates up to 1.8e18; scale the scene or take one of our builders");
-  phase("references");
+  phase.ends("references");
 
   const std::unique_ptr<std::remove_pointer_t<RTCDevice>, void (*)(RTCDevice)> device(rtcNewDevice("set_affinity=0"), &rtcReleaseDevice);
   if (!device) throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
@@ -174,12 +167,12 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
     arguments.userPtr = const_cast<TriangleMesh*>(&mesh);
     auto* root = static_cast<Node*>(rtcBuildBVH(&arguments));  // works in the caller's arena
     if (!root) throw std::runtime_error("embree: rtcBuildBVH failed, error " + std::to_string(int(rtcGetDeviceError(device.get()))));
-    phase("embree");
+    phase.ends("embree");
     Reader(*root, linked);
   }
   linked.duplicates = spatial;
   tree = lay_out(linked, leaf_width);
-  phase("layout");
+  phase.ends("layout");
 }
 
 }  // namespace

@@ -6,11 +6,11 @@
 
 #include <tbb/parallel_invoke.h>
 
-#include "core/timer.h"
 #include "structures/builders/box4.h"
 #include "structures/builders/fast_builders.h"
 #include "structures/builders/morton_order.h"
 #include "structures/builders/node_pool.h"
+#include "structures/builders/phase_clock.h"
 
 namespace arboretum {
 namespace {
@@ -86,12 +86,11 @@ void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters,
                   BuildReport& report) {
   check_morton_bits(parameters.morton_bits);
   if (mesh.size() == 0) return;
-  double start = wall_seconds();
+  PhaseClock phase(report);
   MortonOrder order(mesh, parameters.morton_bits, mesh.size() <= kSmall ? 21 : MortonOrder::kAtOnce);
-  report.phases.emplace_back("order", wall_seconds() - start);
-  start = wall_seconds();
+  phase.ends("order");
   Lbvh(mesh, order, leaf_width, tree).build();
-  report.phases.emplace_back("tree", wall_seconds() - start);
+  phase.ends("tree");
 }
 
 }  // namespace arboretum

@@ -13,10 +13,10 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
-#include "core/timer.h"
 #include "structures/builders/fast_builders.h"
 #include "structures/builders/linked_tree.h"
 #include "structures/builders/morton_order.h"
+#include "structures/builders/phase_clock.h"
 
 namespace arboretum {
 namespace {
@@ -184,22 +184,17 @@ void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, u
     throw UserError("ploc_radius: " + std::to_string(parameters.ploc_radius) + " is not within 1 .. " + std::to_string(kMaxRadius));
   }
   if (mesh.size() == 0) return;
-  double start = wall_seconds();
-  const auto phase = [&](const char* name) {
-    const double now = wall_seconds();
-    report.phases.emplace_back(name, now - start);
-    start = now;
-  };
+  PhaseClock phase(report);
   LinkedTree clusters;
   {
     MortonOrder order(mesh, parameters.morton_bits, MortonOrder::kAtOnce);
     order.refine_runs(kShortRun);
-    phase("order");
+    phase.ends("order");
     Ploc(mesh, order, parameters.ploc_radius, clusters).run();
   }
-  phase("clusters");
+  phase.ends("clusters");
   tree = lay_out(clusters, leaf_width);
-  phase("layout");
+  phase.ends("layout");
 }
 
 }  // namespace arboretum

@@ -21,17 +21,12 @@ class SpatialSah {
 
   void build(BuildReport& report) {
     const std::size_t n = mesh_.size(), room = n + std::size_t(double(n) * double(parameters_.duplication_budget));
-    double start = wall_seconds();
-    const auto phase = [&](const char* name) {
-      const double now = wall_seconds();
-      report.phases.emplace_back(name, now - start);
-      start = now;
-    };
+    PhaseClock phase(report);
     references_[0].reserve(room), references_[1].reserve(room);
     references_[0].hand_out(room), references_[1].hand_out(room);
     const sah::Bounds bounds = sah::make_references(mesh_, references_[0].data());
     root_area_ = sah::half_area_or_0(bounds.boxes);
-    phase("references");
+    phase.ends("references");
     sah::TreeWriter writer(tree_, room, references_[0].data());
     writer_ = &writer;
     sah::TreeWriter::Pool pool;
@@ -39,7 +34,7 @@ class SpatialSah {
     references_[1].clear();
     tree_.primitives.resize(used), tree_.duplicates = used > n;
     writer.finish();
-    phase("splits");
+    phase.ends("splits");
   }
 
  private:

@@ -13,8 +13,8 @@
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_sort.h>
 
-#include "core/timer.h"
 #include "structures/builders/fast_builders.h"
+#include "structures/builders/phase_clock.h"
 
 namespace arboretum {
 namespace {
@@ -27,19 +27,14 @@ class SweepSah {
 
   void build(BuildReport& report) {
     const std::size_t n = mesh_.size();
-    double start = wall_seconds();
-    const auto phase = [&](const char* name) {
-      const double now = wall_seconds();
-      report.phases.emplace_back(name, now - start);
-      start = now;
-    };
+    PhaseClock phase(report);
     boxes_.resize(n), is_left_.resize(n), scratch_.resize(2 * n), right_cost_.resize(3 * n);
     tbb::parallel_for(std::size_t{0}, (n + kParallel - 1) / kParallel, [&](std::size_t chunk) {
       for (std::size_t i = chunk * kParallel; i < std::min(n, (chunk + 1) * kParallel); ++i) boxes_[i] = mesh_.bounds(i);
     });
-    phase("references");
+    phase.ends("references");
     sort();
-    phase("sort");
+    phase.ends("sort");
     tree_.nodes.reserve(2 * n + 1), tree_.first.reserve(2 * n + 1), hand_out(1);
     Bounds3f all;
     for (const Bounds3f& b : boxes_) all.extend(b);
@@ -47,7 +42,7 @@ class SweepSah {
     tree_.node_count = next_.load();
     for (int axis : {1, 2}) MeteredVector<std::uint32_t>().swap(order_[axis]);  // an assignment would keep the memory
     tree_.primitives = std::move(order_[0]);
-    phase("splits");
+    phase.ends("splits");
   }
 
  private:

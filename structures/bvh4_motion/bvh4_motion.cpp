@@ -18,8 +18,10 @@
 
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/memory_meter.h"
+#include "core/rounding.h"
 #include "core/timer.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
@@ -30,12 +32,6 @@ namespace {
 
 using Block = IndexBlock<4>;
 using bvh::NodeReference;
-
-float rounded_down(double x) noexcept {
-  const auto f = float(x);
-  return double(f) > x ? std::nextafter(f, -Bounds3f::kInfinity) : f;
-}
-float rounded_up(double x) noexcept { return -rounded_down(-x); }
 
 constexpr std::size_t round_up(std::size_t bytes) noexcept { return (bytes + 31) / 32 * 32; }
 
@@ -178,11 +174,7 @@ void Bvh4Motion::build(const TriangleMesh& mesh, const BuildSettings& settings, 
   std::size_t next = 0;
   root_ = converter.write(arena_.data(), still.root(), next, bounds_);
   stack_entries_ = still.stack_entries();
-  max_coordinate_ = 0.0f;
-  for (const Bounds3f& box : {bounds_.at0, bounds_.at1}) {
-    for (std::size_t axis = 0; axis < 3 && mesh.size() > 0; ++axis)
-      max_coordinate_ = std::max({max_coordinate_, std::fabs(box.lower[axis]), std::fabs(box.upper[axis])});
-  }
+  max_coordinate_ = std::max(largest_coordinate(bounds_.at0), largest_coordinate(bounds_.at1));
   report.phases.emplace_back("moving boxes", wall_seconds() - start);
 }
 

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
+#include "structures/grid/cell_counts.h"
 #include "structures/grid/grid_builder.h"
 
 namespace arboretum::grid {

@@ -1,93 +1,18 @@
 #include "structures/grid/grid_builder.h"
 
+#include <algorithm>
 #include <atomic>
-#include <limits>
 
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
-#include "core/timer.h"
+#include "structures/builders/phase_clock.h"
+#include "structures/grid/cell_counts.h"
 #include "structures/grid/cell_ranges.h"
 
 namespace arboretum::grid {
 namespace {
-
-using Extent = std::array<double, 3>;
-
-/// Cells on each axis so that there are about `wanted` nearly cubic cells, none narrower than `least`.
-Index3 choose_counts(const Extent& extent, double wanted, double least) {
-  double low = 1e-60, high = 1e60;  // the cell's side: more cells than wanted, fewer
-  for (int i = 0; i < 96; ++i) {
-    const double side = std::sqrt(low * high);
-    double cells = 1;
-    for (double e : extent) cells *= std::max(1.0, e / side);
-    (cells > wanted ? low : high) = side;
-  }
-  Index3 counts;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double most = std::clamp(std::floor(extent[a] / least), 1.0, 65536.0);
-    counts[a] = std::uint32_t(std::clamp(std::round(extent[a] / high), 1.0, most));
-  }
-  return counts;
-}
-
-/// A level of `counts` cells whose box holds [lower, lower + extent].
-Level make_level(const Vec3f& lower, const Extent& extent, const Index3& counts) {
-  Level level{};
-  for (std::size_t a = 0; a < 3; ++a) {
-    level.lower[a] = lower[a];
-    float cell = float(extent[a] / counts[a]);
-    while (double(cell) * counts[a] < extent[a])
-      cell = std::nextafter(cell, std::numeric_limits<float>::infinity());
-    level.cell[a] = cell, level.inverse[a] = 1.0f / cell, level.last[a] = float(counts[a] - 1);
-  }
-  return level;
-}
-
-/// Sums from which the expected number of cells that triangles touch follows for any cell size: of a convex
-/// body put down at random on a lattice that number is the volume of the body and the cell added (Minkowski),
-/// for a triangle 1 + width / cell on each axis + projected area / cell face on each plane.
-struct Sizes {
-  Extent width{}, area{};  ///< area[a]: projected along axis a
-  double triangles = 0;
-
-  void add(const std::array<Vec3f, 3>& c, const Extent& most) {
-    double e[2][3];
-    for (std::size_t a = 0; a < 3; ++a) {
-      e[0][a] = double(c[1][a]) - c[0][a], e[1][a] = double(c[2][a]) - c[0][a];
-      const double w = double(std::max({c[0][a], c[1][a], c[2][a]})) - std::min({c[0][a], c[1][a], c[2][a]});
-      width[a] += std::min(w, most[a]);
-    }
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::size_t p = (a + 1) % 3, q = (a + 2) % 3;
-      area[a] += std::min(0.5 * std::abs(e[0][p] * e[1][q] - e[0][q] * e[1][p]), most[p] * most[q]);
-    }
-    ++triangles;
-  }
-  void add(const Sizes& s) {
-    for (std::size_t a = 0; a < 3; ++a) width[a] += s.width[a], area[a] += s.area[a];
-    triangles += s.triangles;
-  }
-  [[nodiscard]] double references(const Extent& extent, const Index3& counts) const {
-    Extent cell;
-    for (std::size_t a = 0; a < 3; ++a) cell[a] = extent[a] / counts[a];
-    double sum = triangles;
-    for (std::size_t a = 0; a < 3; ++a) {
-      if (counts[a] > 1) sum += width[a] / cell[a];
-      const std::size_t p = (a + 1) % 3, q = (a + 2) % 3;
-      if (counts[p] > 1 && counts[q] > 1) sum += area[a] / (cell[p] * cell[q]);
-    }
-    return sum;
-  }
-};
-
-/// The most cells up to `wanted` with which no more than `limit` references are expected.
-Index3 counts_within(const Sizes& sizes, const Extent& extent, double wanted, double least, double limit) {
-  for (;; wanted *= 0.7) {
-    const Index3 counts = choose_counts(extent, wanted, least);
-    if (wanted <= 1.0 || sizes.references(extent, counts) <= limit) return counts;
-  }
-}
 
 constexpr std::size_t kChunk = 4096;
 
@@ -299,30 +224,13 @@ void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& paramete
 
 }  // namespace
 
-double wanted_cells(const BuilderParameters& parameters, double triangles, double share) {
-  return std::min(double(parameters.grid_density) * triangles * share, kMostCells);
-}
-
-double expected_steps(const Level& level) {
-  const double x = level.cell[0], y = level.cell[1], z = level.cell[2];
-  const double nx = level.cells_on(0), ny = level.cells_on(1), nz = level.cells_on(2);
-  const double whole = nx * x * ny * y + ny * y * nz * z + nz * z * nx * x;
-  return whole > 0 ? double(level.size()) * (x * y + y * z + z * x) / whole : 1.0;
-}
-
 void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, bool two_level,
                  unsigned leaf_width, Cells& cells, BuildReport& report) {
-  double start = wall_seconds();
-  const auto phase = [&](const char* name) {
-    const double now = wall_seconds();
-    report.phases.emplace_back(name, now - start), start = now;
-  };
+  PhaseClock phase(report);
   const Bounds3f bounds = mesh.bounds();
-  double largest = 0, reach = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    largest = std::max({largest, std::abs(double(bounds.lower[a])), std::abs(double(bounds.upper[a]))});
-    reach = std::max(reach, double(bounds.upper[a]) - bounds.lower[a]);
-  }
+  const double largest = largest_coordinate(bounds);
+  double reach = 0;
+  for (std::size_t a = 0; a < 3; ++a) reach = std::max(reach, double(bounds.upper[a]) - bounds.lower[a]);
   reach = std::max(reach, largest / 64);
   cells.max_coordinate = float(largest), cells.reach = float(reach);
   cells.pad = std::max(float(0x1p-20 * largest + 0x1p-16 * reach), 0x1p-100f);
@@ -344,10 +252,10 @@ void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, 
     if (fill_lists(mesh, cells.levels[0], pad, limit, cells.lists)) break;
   }
   cells.codes.assign(cells.levels[0].size(), kEmptyLeaf);
-  phase("outer grid");
+  phase.ends("outer grid");
   if (two_level) {
     add_inner_grids(mesh, parameters, leaf_width, cells);
-    phase("inner grids");
+    phase.ends("inner grids");
   }
 }
 

@@ -8,7 +8,7 @@
 #include <emmintrin.h>
 #include <tbb/parallel_for.h>
 
-#include "core/timer.h"
+#include "structures/builders/phase_clock.h"
 #include "structures/kdtree/builders.h"
 
 namespace arboretum::kdtree {
@@ -214,13 +214,12 @@ class Binned {
 
 void build_binned(const TriangleMesh& mesh, const BuilderParameters& parameters, const CostModel& model, const Limits& limits,
                   const Bounds3f& cell, Part& out, BuildReport& report) {
-  double start = wall_seconds();
+  PhaseClock phase(report);
   Binned::State root{make_references(mesh)};
-  report.phases.emplace_back("references", wall_seconds() - start);
-  start = wall_seconds();
+  phase.ends("references");
   const Binned method(mesh, model, parameters.bins);
   TopDown<Binned>(method, model, limits).build(std::move(root), cell, out);
-  report.phases.emplace_back("splits", wall_seconds() - start);
+  phase.ends("splits");
 }
 
 }  // namespace arboretum::kdtree

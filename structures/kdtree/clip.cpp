@@ -1,9 +1,10 @@
 #include "structures/kdtree/clip.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 #include <limits>
+
+#include "core/rounding.h"
 
 namespace arboretum::kdtree {
 namespace {
@@ -36,16 +37,6 @@ void clip(const Polygon& in, int axis, double plane, double sign, Polygon& out) 
   }
 }
 
-/// The next float below or above a finite one. (std::nextafter is a call.)
-[[nodiscard]] inline float next_below(float f) noexcept {
-  const auto bits = std::bit_cast<std::uint32_t>(f);
-  return f == 0.0f ? -std::numeric_limits<float>::denorm_min() : std::bit_cast<float>(f > 0 ? bits - 1 : bits + 1);
-}
-[[nodiscard]] inline float round_down(double x) noexcept {
-  const float f = float(x);
-  return double(f) <= x ? f : next_below(f);
-}
-
 /// Bounds that grow by points, in double; -upper in the place of upper, so that both are minima.
 struct Extent {
   Point lower{kNone, kNone, kNone}, neg_upper{kNone, kNone, kNone};
@@ -58,8 +49,8 @@ struct Extent {
     if (lower[0] == kNone) return {};
     Bounds3f bounds;
     for (std::size_t k = 0; k < 3; ++k) {
-      bounds.lower[k] = std::max(box.lower[k], round_down(lower[k]));
-      bounds.upper[k] = std::min(box.upper[k], -round_down(neg_upper[k]));
+      bounds.lower[k] = std::max(box.lower[k], rounded_down(lower[k]));
+      bounds.upper[k] = std::min(box.upper[k], -rounded_down(neg_upper[k]));
     }
     return bounds;
   }

@@ -5,6 +5,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
@@ -52,10 +53,7 @@ void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, Buil
   const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
     leaf_ = settings.leaf, vertices_ = mesh.vertices.data();
     bounds_ = mesh.size() == 0 ? Bounds3f{{0, 0, 0}, {0, 0, 0}} : mesh.bounds();
-    max_coordinate_ = 0.0f;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      max_coordinate_ = std::max({max_coordinate_, std::fabs(bounds_.lower[axis]), std::fabs(bounds_.upper[axis])});
-    }
+    max_coordinate_ = largest_coordinate(bounds_);
     Part tree;
     if (mesh.size() == 0) {
       tree.nodes.push_back({0.0f, 3, 0, 0});

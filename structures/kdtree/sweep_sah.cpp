@@ -6,7 +6,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "core/timer.h"
+#include "structures/builders/phase_clock.h"
 #include "structures/kdtree/builders.h"
 
 namespace arboretum::kdtree {
@@ -179,15 +179,14 @@ class Sweep {
 
 void build_sweep(const TriangleMesh& mesh, const BuilderParameters&, const CostModel& model, const Limits& limits, const Bounds3f& cell,
                  Part& out, BuildReport& report) {
-  double start = wall_seconds();
+  PhaseClock phase(report);
   Sweep::State root;
   root.references = make_references(mesh);
   Sweep::start(root);
-  report.phases.emplace_back("sort", wall_seconds() - start);
-  start = wall_seconds();
+  phase.ends("sort");
   const Sweep method(mesh, model);
   TopDown<Sweep>(method, model, limits).build(std::move(root), cell, out);
-  report.phases.emplace_back("splits", wall_seconds() - start);
+  phase.ends("splits");
 }
 
 }  // namespace arboretum::kdtree

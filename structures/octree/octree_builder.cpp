@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <limits>
 
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
-#include "core/timer.h"
+#include "structures/builders/phase_clock.h"
 #include "structures/leaves/triangle_overlap.h"
 
 namespace arboretum::octree {
@@ -172,11 +172,11 @@ class Layout {
 
 void build_tree(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
                 Tree& tree, BuildReport& report) {
-  double start = wall_seconds();
+  PhaseClock phase(report);
   const Bounds3f bounds = mesh.bounds();
-  float largest = 0, side = 0x1p-100f;
+  const float largest = largest_coordinate(bounds);
+  float side = 0x1p-100f;
   for (std::size_t a = 0; a < 3; ++a) {
-    largest = std::max({largest, std::abs(bounds.lower[a]), std::abs(bounds.upper[a])});
     tree.cube.lower[a] = bounds.lower[a];
     side = std::max(side, bounds.upper[a] - bounds.lower[a]);
     while (bounds.lower[a] + side < bounds.upper[a])
@@ -196,11 +196,10 @@ void build_tree(const TriangleMesh& mesh, const BuilderParameters& parameters, u
     throw UserError("octree: " + std::to_string(whole.ids.size()) +
                     " references pass 2^32: use a smaller max_depth or wider leaf blocks");
   }
-  report.phases.emplace_back("tree", wall_seconds() - start);
-  start = wall_seconds();
+  phase.ends("tree");
   Layout(whole, tree);
   tree.lists.ids = std::move(whole.ids);
-  report.phases.emplace_back("layout", wall_seconds() - start);
+  phase.ends("layout");
 }
 
 }  // namespace arboretum::octree

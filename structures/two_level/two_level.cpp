@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
@@ -14,13 +15,6 @@ namespace arboretum::two_level {
 namespace {
 
 constexpr std::string_view kTopLeaf = "triangle1i";
-
-float largest_coordinate(const Bounds3f& box) {
-  float largest = 0.0f;
-  for (std::size_t axis = 0; axis < 3 && !box.empty(); ++axis)
-    largest = std::max({largest, std::fabs(box.lower[axis]), std::fabs(box.upper[axis])});
-  return largest;
-}
 
 bool has(const std::vector<std::string_view>& list, std::string_view name) {
   return std::ranges::find(list, name) != list.end();

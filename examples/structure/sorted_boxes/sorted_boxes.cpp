@@ -1,11 +1,11 @@
 #include "sorted_boxes.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
@@ -91,9 +91,7 @@ void SortedBoxes::build(const TriangleMesh& mesh, const BuildSettings& settings,
   });
   if (!known) throw UserError("sorted_boxes has no leaf " + settings.leaf);
 
-  leaf_ = settings.leaf, bounds_ = mesh.bounds(), vertices_ = mesh.vertices.data(), max_coordinate_ = 0.0f;
-  for (std::size_t axis = 0; axis < 3 && !bounds_.empty(); ++axis)
-    max_coordinate_ = std::max({max_coordinate_, std::abs(bounds_.lower[axis]), std::abs(bounds_.upper[axis])});
+  leaf_ = settings.leaf, bounds_ = mesh.bounds(), vertices_ = mesh.vertices.data(), max_coordinate_ = largest_coordinate(bounds_);
 }
 
 bool SortedBoxes::visit(StructureVisitor& visitor) const {

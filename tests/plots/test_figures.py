@@ -1,0 +1,214 @@
+"""Tests of plots/: figures from whole, thin and broken results, and a report that escapes what it shows."""
+
+import json
+import sys
+import unittest
+from html.parser import HTMLParser
+
+sys.dont_write_bytecode = True
+
+from made_results import HARD, PLOTS, PUBLISHED, SEEN, Folder, build, everything, hard, other, trace, whole  # noqa: E402
+
+import report  # noqa: E402
+import tables  # noqa: E402
+from figures import ALL, published_ratios  # noqa: E402
+from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
+from figures.leak_lines import without  # noqa: E402
+from figures.leak_picture import by_test  # noqa: E402
+from results import load  # noqa: E402
+
+
+class Strict(HTMLParser):
+    """Fails on a tag that is closed without having been opened, and keeps the text."""
+
+    EMPTY = {"meta", "img", "input", "br"}
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.text, self.tags = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open[-1] != tag:
+            raise AssertionError(f"</{tag}> closes {self.open[-1:]}")
+        self.open.pop()
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+class Hard(unittest.TestCase):
+    def test_accuracy_is_of_hard_rays_and_time_of_ordinary_ones(self):
+        results = load(Folder(whole() + hard()).path)
+        points = hard_points(results, "rays_per_cpu_second")
+        self.assertEqual({(c["workload"], h["workload"]) for c, _, h in points}, {("diffuse", "hard")})
+        self.assertTrue(all(h["intersector"] == c["intersector"] and h["box"] == c["box"] for c, _, h in points))
+        watertight = next(p for p in points if p[0]["intersector"] == "watertight")
+        self.assertEqual(watertight[2].per_million("wrong_answers"), 10000)
+        self.assertAlmostEqual(watertight[1], 1e9 / watertight[0].value("rays_per_cpu_second"))
+
+    def test_accuracy_of_ordinary_rays_by_instruction_set(self):
+        import matplotlib.pyplot as plt
+
+        def points(wrong, error):
+            rows = [other("primary", isa=i, structure=s, wrong_answers=wrong, t_error_ulp_p99=error) for i in ("sse", "avx2") for s in ("bvh4", "bvh8")]
+            return [(c, 100.0) for c in load(Folder(rows).path).traces]
+
+        for wrong, error, measure, said in ((3, 2.0, "wrong_answers", ""), (0, 2.0, "t_error_ulp_p99", "No wrong answer in 4 checked cells; upwards: the error of t"),
+                                            (0, None, "wrong_answers", "No wrong answer in 4 checked cells")):
+            with self.subTest(measure=measure, error=error):
+                name, label, told = measure_of([c for c, _ in points(wrong, error)])
+                self.assertEqual((name, told), (measure, said))
+                figure = draw_workloads(points(wrong, error))
+                self.assertEqual([a.get_title() for a in figure.axes], ["bunny, primary, sse", "bunny, primary, avx2"])
+                self.assertEqual("".join(t.get_text() for t in figure.texts), said)
+                self.assertEqual({a.get_ylabel() for a in figure.axes}, {label})
+                plt.close(figure)
+
+    def test_scenes_without_a_part_of_their_placing(self):
+        self.assertEqual(without("ball:size=100:offset=1e4", "offset"), ("ball:size=100", True))
+        self.assertEqual(without("ball:size=100", "offset"), ("ball:size=100", False))
+
+    def test_a_panel_of_the_picture_is_a_test_with_both_boxes(self):
+        cells = load(Folder(hard()).path).traces
+        panels = by_test([c for c in cells if c["workload"] == "camera_edges"])
+        self.assertEqual(list(panels), sorted(panels))
+        self.assertEqual({k: list(v) for k, v in panels.items() if k[0] == ""}, {("", "a_new_one"): ["padded"], ("", "moller_trumbore"): ["fast"],
+                                                                               ("", "watertight"): ["padded"]})
+
+    def test_a_scale_with_a_place_for_zero(self):
+        import matplotlib.pyplot as plt
+        from style import log_with_zero, plain
+        figure, axis = plt.subplots()
+        axis.plot([1, 2, 3], [0, 15, 2e6])
+        log_with_zero(axis, "y", [0, 15, 2e6])
+        at = [axis.transData.transform((1, v))[1] for v in (0, 15, 2e6)]
+        self.assertTrue(axis.bbox.y0 < at[0] < at[1] < at[2] < axis.bbox.y1)
+        figure.canvas.draw()
+        self.assertEqual([t.get_text() for t in axis.get_yticklabels()][:2], ["0", "10"])
+        log_with_zero(axis, "x", [0, 0])
+        log_with_zero(axis, "y", [0, 1.9e5, 2.3e5])  # within a decade: ticks between the powers of ten
+        self.assertEqual(list(axis.get_yticks()), [0, 1e5, 2e5, 5e5])
+        plt.close(figure)
+        self.assertEqual([plain(v) for v in (0, 0.01, 1, 1000, 1e5, 2e5)], ["0", "0.01", "1", "1000", "$10^{5}$", r"$2\cdot10^{5}$"])
+
+
+class Drawing(unittest.TestCase):
+    def test_every_figure_of_whole_results(self):
+        whole_folder = Folder(everything(), {"experiment": PUBLISHED, "plots": [n for n in ALL if n not in HARD]}, files={"effective.yaml": "experiment: quick\n"})
+        hard_folder = Folder(hard() + [trace(intersector="watertight", rate=4e6)], {"plots": ["accuracy_vs_time", *HARD]}, files=SEEN)
+        for folder in (whole_folder, hard_folder):
+            done = folder.plot()
+            self.assertEqual((done.returncode, done.stderr), (0, ""), done.stderr)
+            for name in load(folder.path).context["plots"]:
+                self.assertEqual((folder.path / f"{name}.png").read_bytes()[:4], b"\x89PNG", name)
+                self.assertIn("</svg>", (folder.path / f"{name}.svg").read_text(), name)
+
+    def test_published_ratios(self):
+        folder = Folder(everything(), {"experiment": PUBLISHED})
+        results = load(folder.path)
+        table = json.loads((PLOTS / "published" / f"{PUBLISHED}.json").read_text())
+        rows = [published_ratios.rows_of(results, c, "rays_per_cpu_second") for c in table["comparisons"]]
+        self.assertEqual([len(r) for r in rows], [1, 1, 0])  # no hybrid was measured, and nothing on the dragon
+        place, published, ours = rows[1][0]
+        self.assertEqual(place, "crown\nprimary")
+        self.assertAlmostEqual(published, 41.5 / 32.0)
+        self.assertAlmostEqual(ours["bvh4"][0], 2.5, places=5)
+        self.assertLessEqual(ours["bvh4"][1], 2.5)
+        self.assertTrue(ours["bvh4"][3])  # each of these cells has a wrong answer
+        self.assertIn("nothing published", Folder(whole()).plot("--no-report", "--only", "published_ratios").stdout)
+
+    def test_thin_results_never_crash(self):
+        cases = {
+            "nothing": [],
+            "one cell": [trace()],
+            "one build": [build()],
+            "embree alone": [trace("embree"), build("embree")],
+            "no accuracy": [{k: v for k, v in trace().items() if k != "wrong_answers"}],
+            "no field but the name": [{"name": trace()["name"], "rays_per_second": 1.0}],
+            "zero rays and speed": [trace(rate=0.0, rays=0)],
+            "not finite": [trace(rate=float("nan")), trace("bvh4"), build(sah_cost=float("inf"))],
+            "text for a number": [trace(rate="fast"), trace("bvh4", wrong_answers="none")],
+            "hard rays without ordinary ones": [other("hard", t_error_ulp_p99=1.0)],
+            "one place": [other("hard_edge", "ball:offset=1", cracks=2, offset=1)],
+            "leaks nowhere": [other("camera_edges", "ball", cracks=0, leak_points=[])],
+            "one way": [other("diffuse", self_intersection="none", self_hits_per_million=1.0)],
+            "strange names": [trace("$x_1$ <&>"), build("$x_1$ <&>"), trace("bvh8", intersector="$")],
+        }
+        for case, rows in cases.items():
+            with self.subTest(case):
+                folder = Folder(rows)
+                done = folder.plot()
+                self.assertEqual((done.returncode, done.stderr), (0, ""), f"{case}: {done.stderr}")
+                self.assertTrue((folder.path / "report.html").is_file())
+        self.assertIn("rays_per_second: left out, ", Folder([]).plot("--no-report").stdout)
+
+    def test_report_is_well_formed_and_escaped(self):
+        evil = "<script>alert(1)</script>&\"'"
+        folder = Folder(everything() + [trace(evil)], {"experiment": PUBLISHED, "cpu": evil, "warnings": [evil], "command": f"./arboretum run {evil}", "git_revision": "abc"},
+                        [{"name": evil, "reason": "no avx512"}, {"name": "b", "reason": "no avx512"}, {"name": "c", "reason": evil}],
+                        {"effective.yaml": f"experiment: {evil}\n"})
+        self.assertEqual(folder.plot().returncode, 0)
+        page = (folder.path / "report.html").read_text()
+        reader = Strict()
+        reader.feed(page)
+        self.assertEqual(reader.open, [])
+        self.assertEqual(reader.tags.count("script"), 1)
+        self.assertEqual(reader.tags.count("img"), len(ALL) - len(HARD))
+        shown = "".join(reader.text)
+        self.assertGreaterEqual(shown.count(evil), 6)
+        self.assertEqual(shown.count(tables.SAH_STEP), 2)  # below both figures that set SAH costs side by side
+        for words in ("25 50 25 0 0", "(2 cells)", "git checkout abc", "wrong per million", "× embree", "SAH cost: a visit of a node counts as one step whatever the number of its children"):
+            self.assertIn(words, shown)
+        self.assertNotIn("http", page.replace("http://www.w3.org", ""))
+
+    def test_report_says_what_was_checked(self):
+        unchecked = {k: v for k, v in other("primary").items() if k != "wrong_answers"}
+        right = other("shadow", wrong_answers=0)
+        for rows, cells, said in (
+                ([unchecked, build()], "2 cells measured (1 of rays, 1 of builds)", "Answers were not checked."),
+                ([right, right, build()], "2 cells measured (1 of rays, 1 of builds)", "No wrong answer in 1 checked cell."),
+                ([right, unchecked], "2 cells measured,", "No wrong answer in 1 checked cell. <strong>The answers of 1 cell were not checked.</strong>"),
+                ([right, unchecked, trace()], "3 cells measured,", "1 wrong answer, in 1 of 2 checked cells"),
+                ([build()], "1 cell measured,", "No rays were traced.")):
+            with self.subTest(said):
+                results = load(Folder(rows).path)
+                self.assertIn(cells, report.measured(results))
+                self.assertIn(said, report.answers(results))
+        self.assertNotIn("rong answer", report.answers(load(Folder([unchecked, build()]).path)))
+        self.assertNotIn("not checked", report.answers(load(Folder([right]).path)))
+
+    def test_only_some(self):
+        folder = Folder(whole())
+        self.assertEqual(folder.plot("--only", "sah_cost").returncode, 0)
+        self.assertTrue((folder.path / "sah_cost.png").is_file())
+        self.assertFalse((folder.path / "build_time.png").exists())
+        self.assertFalse((folder.path / "report.html").exists())
+        folder = Folder(whole(), {"plots": ["sah_vs_time"]})
+        self.assertEqual(folder.plot().returncode, 0)
+        self.assertEqual([p.stem for p in folder.path.glob("*.png")], ["sah_vs_time"])
+        page = (folder.path / "report.html").read_text()
+        for other_figure in ("sah_cost", "leak_picture"):  # one with data, one without
+            self.assertIn("report.html: left as it is", folder.plot("--only", other_figure).stdout)
+            self.assertEqual((folder.path / "report.html").read_text(), page)
+        folder.plot("--only", "sah_cost,sah_vs_time")
+        self.assertEqual((folder.path / "report.html").read_text().count("<img"), 2)
+
+    def test_errors_are_one_line(self):
+        cases = ((Folder(whole()), ["--only", "sah_costs"], "the nearest is 'sah_cost'"), (Folder(), [], "neither results.json"),
+                 (Folder(files={"results.json": "{"}), [], "results.json: not the JSON"),
+                 (Folder(files={"results.json": "[]"}), [], "results.json: not the JSON"))
+        for folder, words, message in cases:
+            with self.subTest(message):
+                done = folder.plot(*words)
+                self.assertEqual(done.returncode, 2)
+                self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+                self.assertIn(message, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,171 @@
+"""Tests of plots/: what is reckoned and read, from results as they are, thin or cut off."""
+
+import json
+import sys
+import unittest
+from pathlib import Path
+
+sys.dont_write_bytecode = True
+
+from made_results import Folder, build, trace  # noqa: E402
+
+import style  # noqa: E402
+from figures import build_time, rays_by_builder, rays_per_second, squares, traversal_ratios  # noqa: E402
+from figures.accuracy_vs_time import pareto_front  # noqa: E402
+from figures.modes import Modes  # noqa: E402
+from figures.sah_vs_time import linear_fit  # noqa: E402
+from results import Cell, Results, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
+
+
+class Numbers(unittest.TestCase):
+    def test_estimate(self):
+        for values, median in (([5.0], 5.0), ([1.0, 3.0], 2.0), ([1.0, 2.0, 900.0], 2.0)):
+            found = estimate(values)
+            self.assertEqual(found.median, median)
+            self.assertLessEqual(found.low, median)
+            self.assertGreaterEqual(found.high, median)
+        self.assertEqual(estimate([5.0]).low, 5.0)
+        self.assertEqual(estimate([3.0, 1.0, 2.0, 7.0]), estimate([3.0, 1.0, 2.0, 7.0]))
+
+    def test_linear_fit(self):
+        slope, offset, r2 = linear_fit([1, 2, 3, 4], [3, 5, 7, 9])
+        self.assertAlmostEqual(slope, 2)
+        self.assertAlmostEqual(offset, 1)
+        self.assertAlmostEqual(r2, 1)
+        self.assertLess(linear_fit([1, 2, 3, 4], [1, 9, 1, 9])[2], 0.5)
+        for x, y in (([1, 2], [1, 2]), ([2, 2, 2], [1, 2, 3]), ([1, 2, 3], [5, 5, 5])):
+            self.assertIsNone(linear_fit(x, y))
+
+    def test_pareto_front(self):
+        self.assertEqual(pareto_front([(3, 0), (1, 9), (2, 9), (2, 4), (4, 0)]), [(1, 9), (2, 4), (3, 0)])
+        self.assertEqual(pareto_front([]), [])
+
+    def test_ratios_of_traversals(self):
+        rates = {("bvh8", "single", "bunny"): 2e6, ("bvh8", "packet8", "bunny"): 6e6, ("embree", "single", "bunny"): 3e6, ("embree", "stream", "bunny"): 4e6,
+                 ("bvh8", "single", "city"): 5e6, ("bvh8", "packet8", "city"): 10e6}
+        cells = [Cell(dict(zip(("structure", "traversal", "scene"), k), workload="diffuse", isa="avx2"), [{"rays_per_second": v}]) for k, v in rates.items()]
+        modes = Modes(cells)
+        table = traversal_ratios.ratios(cells, modes, "rays_per_second")
+        self.assertEqual(table["bvh8", "packet8"], {("diffuse", "bunny"): 1.5, ("diffuse", "city"): 2.0})  # Embree's best; without Embree, single rays
+        self.assertEqual(table["embree", "single"], {("diffuse", "bunny"): 0.75})
+        fastest = traversal_ratios.fastest_cells([*cells, Cell(cells[0].axes, [{"rays_per_second": 1e6}])], modes, "rays_per_second")
+        self.assertIs(fastest["bvh8", "single"]["diffuse", "bunny"], cells[0])
+        self.assertAlmostEqual(traversal_ratios.value_at(table["bvh8", "packet8"], "diffuse", traversal_ratios.MEAN), 3 ** 0.5)
+        self.assertIsNone(traversal_ratios.value_at(table["embree", "single"], "primary", traversal_ratios.MEAN))
+        self.assertEqual(traversal_ratios.columns_of(cells), [("diffuse", "bunny"), ("diffuse", "city"), ("diffuse", "mean")])
+
+    def test_squares_for_many_bars(self):
+        import matplotlib.pyplot as plt
+
+        bars = [Cell({"structure": s, "builder": b, "scene": "bunny"}, [{"sah_cost": 10.0 + i}])
+                for i, (s, b) in enumerate((s, b) for s in ("bvh2", "bvh4", "bvh8", "bvh16", "bih") for b in map("builder{}".format, range(9)))]
+        self.assertTrue(squares.are_due([bars], ["builder"]))
+        self.assertFalse(squares.are_due([bars[:squares.MOST_BARS]], ["builder"]))
+        self.assertFalse(squares.are_due([bars], ["builder", "isa"]))  # a square would stand for two cells
+        figure = squares.square_panels([("bunny", bars), ("city", bars[:12])], lambda c: (c.value("sah_cost"),) * 3, str, "SAH cost", higher_is_better=False)
+        first, second = figure.axes
+        self.assertEqual([t.get_text() for t in first.get_yticklabels()], ["bih", "bvh2", "bvh4", "bvh8", "bvh16"])
+        written = [[t.get_text() for t in axis.texts if t.get_text() != "–"] for axis in (first, second)]
+        self.assertEqual(list(map(len, written)), [45, 12])
+        self.assertEqual([len(first.texts), len(second.texts)], [45, 18])  # two structures of nine builders: six squares are empty, and say so
+        self.assertLess(min(squares.SHADES(0.0)), 0.92)  # the worst is not white, as nothing is
+        self.assertEqual([t.get_text() for t in first.texts if t.get_fontweight() == "bold"], ["10.0"])
+        plt.close(figure)
+
+    def test_wrong_answers_are_marked(self):
+        import matplotlib.pyplot as plt
+        from matplotlib.colors import to_hex
+
+        def of(structure, builder, wrong, **more):
+            axes = {"scene": "bunny", "workload": "diffuse", "isa": "avx2", "structure": structure, "builder": builder, "threads": "1", **more}
+            return Cell(axes, [{"rays_per_second": 1e6 + len(builder), "rays": 1000, **({} if wrong is None else {"wrong_answers": wrong})}])
+
+        def red(figure):
+            return [t.get_text() for a in figure.axes for t in a.texts if to_hex(t.get_color()) == style.WRONG.lower()]
+
+        def legend(figure):
+            return [t.get_text() for each in figure.legends for t in each.get_texts()]
+
+        self.assertEqual([style.wrong_text(of("bvh8", "x", n)) for n in (1, 190, 1000)], ["1,000", "190,000", "1,000,000"])
+        self.assertEqual(style.wrong_text(Cell({}, [{"wrong_answers": 1, "rays": 2_500_000}])), "0.4")
+        cells = [of("bvh8", "x", 0), of("bvh8", "long", 190), of("bvh4", "x", 0), of("grid", "x", None)]
+        results = Results(Path(), {}, cells, [], [], "", True, 4)
+        for module in (rays_per_second, rays_by_builder):
+            figure = module.draw(results)
+            self.assertEqual(red(figure)[:1], ["190,000"], module.TITLE)
+            self.assertTrue(any("some wrong" in t for t in legend(figure)))
+            self.assertIn("1 of 4 cells not checked", legend(figure))
+            plt.close(figure)
+        right = Results(Path(), {}, [cells[0], cells[2], of("bvh8", "long", 0)], [], [], "", True, 3)
+        for module in (rays_per_second, rays_by_builder):
+            figure = module.draw(right)
+            self.assertEqual([t for t in legend(figure) if "wrong" in t or "checked" in t] + red(figure), [])
+            plt.close(figure)
+        many = [of(f"bvh{s}", f"b{b}", 7 if (s, b) == (2, 3) else 0) for s in range(5) for b in range(9)]
+        figure = rays_by_builder.draw(Results(Path(), {}, many, [], [], "", True, 45))
+        (axis,) = figure.axes
+        self.assertEqual([(round(p.get_x() + p.get_width() / 2), round(p.get_y() + p.get_height() / 2)) for p in axis.patches], [(3, 2)])
+        self.assertEqual(axis.get_xlabel(), "framed: up to 7,000\nwrong answers per million")
+        plt.close(figure)
+
+    def test_shades_of_squares(self):
+        shade = squares.shades([1.0, 10.0, 100.0], higher_is_better=True)
+        self.assertEqual([round(shade(v), 6) for v in (1, 10, 100)], [0, 0.5, 1])
+        shade = squares.shades([0.0, 1e-9, 10.0, 100.0], higher_is_better=False)  # what is next to nothing does not take the colours from the others
+        self.assertEqual([round(shade(v), 3) for v in (0, 1e-9, 10, 100)], [1, 1, 0.5, 0])
+        self.assertEqual(squares.shades([0.0, 0.0], higher_is_better=False)(0.0), 0)
+
+    def test_phases_of_a_build_make_up_the_median(self):
+        # One disturbed repetition: the means add up to 44, the median is 20.
+        repetitions = [(0.02, 0.015, 0.005), (0.02, 0.01, 0.01), (0.092, 0.059, 0.033)]
+        cell = Cell({}, [{"build_seconds": total, "phase_seconds": {"splits": a, "leaves": b}} for total, a, b in repetitions])
+        found = dict(build_time.phases(cell))
+        self.assertAlmostEqual(sum(found.values()), 20.0)
+        self.assertAlmostEqual(found["splits"], 20.0 * 84 / 132)
+        self.assertEqual(build_time.phases(Cell({}, [{"build_seconds": 0.0, "phase_seconds": {"splits": 0.0}}])), [])
+        self.assertEqual(build_time.phases(Cell({}, [{"build_seconds": 1.0}])), [])
+
+    def test_order(self):
+        self.assertEqual(ordered(["bvh16", "embree", "bvh4", "octree"], "structure"), ["bvh4", "bvh16", "octree", "embree"])
+        self.assertEqual(ordered(["avx512", "sse", "scalar", "avx2"], "isa"), ["scalar", "sse", "avx2", "avx512"])
+        self.assertEqual(ordered(["diffuse", "primary"], "workload"), ["primary", "diffuse"])
+
+    def test_axes_from_the_name(self):
+        axes = axes_of({"name": "trace/bunny/bvh8/binned_sah/triangle8/watertight/padded/single/avx2/diffuse/threads:2"})
+        self.assertEqual((axes["scene"], axes["isa"], axes["workload"], axes["threads"]), ("bunny", "avx2", "diffuse", "2"))
+        self.assertEqual(axes_of({"name": build()["name"]})["workload"], "")
+
+    def test_what_tells_cells_apart(self):
+        cells = [Cell({"structure": s, "builder": b, "isa": i}) for s, b in (("bvh8", "x"), ("embree", "y")) for i in "ab"]
+        self.assertEqual(swept_axes(cells), {"isa"})
+        self.assertEqual(undetermined_axes(cells, ("structure", "builder", "isa")), ["structure", "isa"])
+        self.assertEqual(Modes(cells).labels, ["one mode"])
+
+
+class Loading(unittest.TestCase):
+    def test_repetitions_are_one_cell(self):
+        folder = Folder([trace(rate=r, repetition=k) for k, r in enumerate((1e6, 2e6, 9e6))] + [build()])
+        results = load(folder.path)
+        self.assertEqual(len(results.traces), 1)
+        self.assertEqual(results.traces[0].value("rays_per_second"), 2e6)
+        self.assertEqual(results.traces[0].per_million("wrong_answers"), 1000)
+        self.assertEqual(results.structure_value(results.traces[0], "sah_cost"), 31.5)
+
+    def test_aggregates_are_no_repetitions(self):
+        aggregate = {**trace(rate=77.0), "run_type": "aggregate", "aggregate_name": "median"}
+        self.assertEqual(load(Folder([trace(), aggregate]).path).traces[0].value("rays_per_second"), 10e6)
+        self.assertEqual(load(Folder([aggregate]).path).traces[0].value("rays_per_second"), 77.0)
+
+    def test_a_run_that_was_cut_off(self):
+        cell = {k: v for k, v in trace().items() if not k.startswith("rays_per")}
+        cell["repetitions"] = [{"rays_per_second": 1e6, "rays_per_cpu_second": 1e6}, {"rays_per_second": 3e6}]
+        folder = Folder(files={"cells.jsonl": json.dumps(cell) + '\n{"name": "trace/bun'})
+        results = load(folder.path)
+        self.assertFalse(results.complete)
+        self.assertEqual(results.traces[0].value("rays_per_second"), 2e6)
+        self.assertEqual(folder.plot().returncode, 0)
+        self.assertIn("--resume", (folder.path / "report.html").read_text())
+
+
+if __name__ == "__main__":
+    unittest.main()
