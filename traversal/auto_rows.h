@@ -14,8 +14,8 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// `Family` as in traversal/packet_rows.h; `CompiledPackets`: a TypeList of the leaves that its packets have compiled in. `Incoherent` and `Alone` (traversal/kernel_rows.h): the other way, and
-/// the one for batches of a few rays.
-template <class Family, class CompiledPackets, class Incoherent, class Alone = Incoherent>
+/// the one for batches of a few rays. `MayFallApart`: packets that let too many of their rays go on alone lose to the other way, also where rays are coherent: to streams, not to rays in flight.
+template <class Family, class CompiledPackets, class Incoherent, class Alone = Incoherent, bool MayFallApart = !std::is_same_v<Incoherent, Alone>>
 struct AutoFunctions {
   static constexpr std::size_t kTile = 64;
   /// Of the directions' own length, the half extent of those that still count as coherent. Rays towards a light fan out the more the nearer it is, and
@@ -32,9 +32,6 @@ struct AutoFunctions {
   static constexpr int kThreshold = 6;  ///< packet64's
   /// Smaller batches are too few to share anything; runs of tiles below the second too few for streams.
   static constexpr std::size_t kFew = 8, kShort = 96;
-  /// Packets may lose to the other way on coherent rays.
-  static constexpr bool kMayFallApart = !std::is_same_v<Incoherent, Alone>;
-
   /// Of `count` rays' directions or origins, of which some `samples` are looked at: the largest extent along an axis, and the largest |coordinate|.
   struct Spread {
     float extent, largest;
@@ -73,7 +70,7 @@ struct AutoFunctions {
           other_way -= count;
         } else {
           count = std::min(count, next_packets);
-          if (float(packets(begin, count)) > kTimesAlone * float(count) && kMayFallApart) {
+          if (float(packets(begin, count)) > kTimesAlone * float(count) && MayFallApart) {
             other_way = next_other;
             next_other = std::min(2 * next_other, kMostOther), next_packets = kProbe;
           } else {

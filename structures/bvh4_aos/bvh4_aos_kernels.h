@@ -95,7 +95,7 @@ inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows)
   add_queued_rows<Structure, BvhNodeQueue<AosNodeTest>::Of, Single>(rows, BatchLeaves{});
   add_packet_rows<Structure, Packets>(rows, TypeList<>{});
   using Incoherent = IncoherentInFlight<BvhNodeQueue<AosNodeTest>::Of, Single, 4>;
-  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single>>(rows, "auto", BatchLeaves{});
+  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single, false>>(rows, "auto", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

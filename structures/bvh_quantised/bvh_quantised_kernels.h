@@ -150,7 +150,7 @@ void add_kernels(std::type_identity<bvh::WideBvh<bvh_quantised::QuantisedNodes<N
   add_queued_rows<Structure, Queue::template Of, Single>(rows, BatchLeaves{});
   add_packet_rows<Structure, Packets>(rows, TypeList<>{});
   using Incoherent = IncoherentInFlight<Queue::template Of, Single, N>;
-  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single>>(rows, "auto", BatchLeaves{});
+  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single, false>>(rows, "auto", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
