@@ -2,12 +2,14 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "structures/grid/grid.h"
 
 namespace arboretum::grid {
 
 using Extent = std::array<double, 3>;
+using Index3 = std::array<std::uint32_t, 3>;
 
 /// Cells that a level has at most, but for rounding: their number takes 32 bits.
 inline constexpr double kMostCells = 1e9;

@@ -6,12 +6,10 @@
 #include <cmath>
 #include <cstdint>
 
-#include "structures/grid/grid.h"
+#include "structures/grid/cell_counts.h"
 #include "structures/leaves/triangle_overlap.h"
 
 namespace arboretum::grid {
-
-using Index3 = std::array<std::uint32_t, 3>;
 
 /// A level's geometry in double, as cells are filled: face i of an axis lies at lower + i * cell.
 class CellGeometry {
