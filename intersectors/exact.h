@@ -3,7 +3,7 @@
 // decides the others. The idea of a filter is Shewchuk's (Adaptive Precision, 1997); its form is the sheared one of Woop, Benthin
 // and Wald (JCGT 2(1) 2013), as in watertight.h.
 //
-// The bound. u = 2^-24; p = (x, y, z) a vertex as seen from the origin, permuted so that |d_z| is the largest; S = d_x / d_z, so
+// The bound. u = 2^-24; p = (x, y, z) a vertex as seen from the origin (or its opposite, which has the same errors), permuted so that |d_z| is the largest; S = d_x / d_z, so
 // |S| <= 1; x' = x - S z (y' likewise) the exact sheared vertex, x^ the computed one; Z, L the largest |z^| and |x^|, |y^| of a
 // triangle. z^ and the difference x are off by u of themselves, S by u / 2; |x| <= |x'| + |z|. So the shear is off by
 //   u (L + Z) + u Z + u Z / 2 + u L = u (2 L + 2.5 Z) < delta = u (2 L + 3 Z)   fused (what underflow adds, 2^-150, is less than
@@ -47,7 +47,7 @@ struct Exact {
     CornersInFours best;
 
     ARBORETUM_INLINE explicit RayData(const Ray& ray) : ShearedRay(ray), origin(ray.origin), towards(ray.direction), best_low(ray.tfar) {
-      // Where 1 / d_z is not within u of itself: NaN leaves every lane to exact arithmetic.
+      // Where -1 / d_z is not within u of itself: NaN leaves every lane to exact arithmetic.
       const float largest = __builtin_fabsf(direction[2]);
       if (__builtin_expect(!(largest >= 0x1p-120f && largest <= 0x1p120f), 0)) shear[0] = shear[2] = std::numeric_limits<float>::quiet_NaN();
     }

@@ -10,7 +10,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 /// Axes x, y, z of which the last is `axis`, the others following in turn.
 struct AxisOrder {
-  alignas(16) std::uint8_t bytes[16];  ///< of four floats x y z w, where each comes from
+  alignas(32) std::uint8_t bytes[16];  ///< of four floats x y z w, where each comes from
   std::uint32_t x, y, z, unused;       ///< 16 times the axes
 
   static constexpr AxisOrder of(unsigned axis) {
@@ -30,26 +30,27 @@ struct AxisOrder {
 };
 inline constexpr AxisOrder kAxisOrders[3] = {AxisOrder::of(0), AxisOrder::of(1), AxisOrder::of(2)};
 
-/// The axis along which |direction| is largest; of equal ones the last, but x, y and z alike: z.
-ARBORETUM_INLINE unsigned largest_axis(vf<4> direction) {
+/// The order for the axis along which |direction| is largest; of equal ones the last, but x, y and z alike: z.
+ARBORETUM_INLINE const AxisOrder& largest_last(vf<4> direction) {
+  // By whether x > y, x > z and y > z; two of the eight cannot be.
+  static constexpr AxisOrder kOrders[8] = {AxisOrder::of(2), AxisOrder::of(2), AxisOrder::of(2), AxisOrder::of(0),
+                                           AxisOrder::of(1), AxisOrder::of(2), AxisOrder::of(1), AxisOrder::of(0)};
   const vf<4> size = abs(direction);
-  const unsigned x_y_x_z_y_z = (permute_in_fours<0, 0, 1, 1>(size) > permute_in_fours<1, 2, 2, 2>(size)).bits() & 7u;
-  constexpr unsigned kAxes = 2u | 2u << 2 | 2u << 4 | 0u << 6 | 1u << 8 | 2u << 10 | 1u << 12 | 0u << 14;
-  return kAxes >> 2 * x_y_x_z_y_z & 3u;
+  return kOrders[(permute_in_fours<0, 0, 1, 3>(size) > permute_in_fours<1, 2, 2, 3>(size)).bits()];
 }
 
 struct ShearedRay {
-  alignas(16) float back[4];       ///< the origin with its signs turned: a block's coordinates are then added from memory; tnear, turned
-  alignas(16) float shear[4];      ///< dx/dz, dy/dz, 1/dz
+  alignas(16) float from[4];       ///< the origin; tnear
+  alignas(16) float shear[4];      ///< dx/dz, dy/dz, -1/dz
   alignas(16) float direction[4];
-  std::uint32_t x, y, z;           ///< 16 times the axes
+  const AxisOrder* order;
 
-  ARBORETUM_INLINE explicit ShearedRay(const Ray& ray) : ShearedRay(ray, largest_axis(vf<4>::load(&ray.direction))) {
+  ARBORETUM_INLINE explicit ShearedRay(const Ray& ray) : ShearedRay(ray, largest_last(vf<4>::load(&ray.direction))) {
     const vf<4> d = vf<4>::load(direction);
-    (one_for_z(d) / permute_in_fours<2, 2, 2, 2>(d)).store(shear);
+    (minus_one_for_z(d) / permute_in_fours<2, 2, 2, 2>(d)).store(shear);
   }
   /// With shear constants known.
-  ARBORETUM_INLINE ShearedRay(const Ray& ray, unsigned axis, float shear_x, float shear_y, float shear_z) : ShearedRay(ray, axis) {
+  ARBORETUM_INLINE ShearedRay(const Ray& ray, unsigned axis, float shear_x, float shear_y, float shear_z) : ShearedRay(ray, kAxisOrders[axis]) {
     shear[0] = shear_x, shear[1] = shear_y, shear[2] = shear_z;
   }
 
@@ -62,31 +63,31 @@ struct ShearedRay {
 #endif
     return *p;
   }
-  [[nodiscard]] ARBORETUM_INLINE float tnear() const { return -back[3]; }
-  /// Row of a block's coordinates along an axis, x, y or z.
+  [[nodiscard]] ARBORETUM_INLINE float tnear() const { return from[3]; }
+  /// Row of a block's coordinates along an axis, x, y or z of an AxisOrder.
   template <int W>
   [[nodiscard]] static ARBORETUM_INLINE const float* row(const float (&p)[3][W], std::uint32_t axis) {
-    return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(p) + (W < 4 ? axis / (4 / W) : axis * (W / 4)));
+    return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(p) + (W < 4 ? std::size_t(axis) / (4 / W) : std::size_t(axis) * (W / 4)));
   }
 
  private:
-  ARBORETUM_INLINE ShearedRay(const Ray& ray, unsigned axis) {
-    const AxisOrder& order = kAxisOrders[axis];
-    (-order(vf<4>::load(&ray.origin))).store(back);
-    order(vf<4>::load(&ray.direction)).store(direction);
-    x = order.x, y = order.y, z = order.z;
+  ARBORETUM_INLINE ShearedRay(const Ray& ray, const AxisOrder& axes) : order(&axes) {
+    axes(vf<4>::load(&ray.origin)).store(from);
+    axes(vf<4>::load(&ray.direction)).store(direction);
   }
-  static ARBORETUM_INLINE vf<4> one_for_z(vf<4> d) {
+  static ARBORETUM_INLINE vf<4> minus_one_for_z(vf<4> d) {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
-    d.lane[2] = 1.0f;
+    d.lane[2] = -1.0f;
     return d;
 #else
-    return vf<4>(_mm_blend_ps(d.v, _mm_set1_ps(1.0f), 4));
+    return vf<4>(_mm_blend_ps(d.v, _mm_set1_ps(-1.0f), 4));
 #endif
   }
 };
 
-/// The three vertices of a block's triangles, sheared: x and y so that the ray is the z axis, z along it.
+/// The three vertices of a block's triangles, sheared: x and y so that the ray is the z axis, z along it. All with their signs turned, as the
+/// origin is seen from them, since the origin is in a register and they are in memory; products of two of them are what they would be, and a
+/// product with -1/dz is a distance.
 template <int W>
 struct ShearedVertices {
   using F = vf<W>;
@@ -94,14 +95,15 @@ struct ShearedVertices {
 
   template <class Block>
   ARBORETUM_INLINE ShearedVertices(const ShearedRay& ray, const Block& block) {
-    const F ox(ray.back[0]), oy(ray.back[1]), oz(ray.back[2]), sx(ray.shear[0]), sy(ray.shear[1]);
+    const F ox(ray.from[0]), oy(ray.from[1]), oz(ray.from[2]), sx(ray.shear[0]), sy(ray.shear[1]);
+    const AxisOrder& axes = *ray.order;
     const auto shear = [&](const float(&p)[3][W]) {
-      const F pz = F::load(ShearedRay::row(p, ray.z)) + oz;
-      return vf3<W>{nmadd(sx, pz, F::load(ShearedRay::row(p, ray.x)) + ox), nmadd(sy, pz, F::load(ShearedRay::row(p, ray.y)) + oy), pz};
+      const F pz = oz - F::load(ShearedRay::row(p, axes.z));
+      return vf3<W>{nmadd(sx, pz, ox - F::load(ShearedRay::row(p, axes.x))), nmadd(sy, pz, oy - F::load(ShearedRay::row(p, axes.y))), pz};
     };
     a = shear(block.v0), b = shear(block.v1), c = shear(block.v2);
   }
-  /// Of one ray a lane: points as seen from their origins.
+  /// Of one ray a lane: points as their origins are seen from them.
   ARBORETUM_INLINE ShearedVertices(F sx, F sy, vf3<W> p0, vf3<W> p1, vf3<W> p2) {
     const auto shear = [&](vf3<W> p) { return vf3<W>{nmadd(sx, p.z, p.x), nmadd(sy, p.z, p.y), p.z}; };
     a = shear(p0), b = shear(p1), c = shear(p2);

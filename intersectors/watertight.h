@@ -22,6 +22,7 @@
 
 #include "intersectors/sheared_ray.h"
 #include "intersectors/triangle_hits.h"
+#include "simd/double.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -55,7 +56,7 @@ struct Watertight {
     return inside;
   }
 
-  /// What a packet keeps beside its rays: their shears. Those of a group have the same kz.
+  /// What a packet keeps beside its rays: their shears (ShearedRay). Those of a group have the same kz.
   struct PacketData {
     static constexpr int kGroups = 3;
     alignas(64) float sx[PacketRays::kMost], sy[PacketRays::kMost], sz[PacketRays::kMost];
@@ -72,7 +73,7 @@ struct Watertight {
       const F dz = select(by_x, x, select(by_y, y, z));
       (select(by_x, y, select(by_y, z, x)) / dz).store(sx + k);
       (select(by_x, z, select(by_y, x, y)) / dz).store(sy + k);
-      (F(1.0f) / dz).store(sz + k);
+      (F(-1.0f) / dz).store(sz + k);
       of_axis[0] |= std::uint64_t(by_x.bits()) << k, of_axis[1] |= std::uint64_t(by_y.bits()) << k, of_axis[2] |= std::uint64_t((~(by_x | by_y)).bits()) << k;
     }
     [[nodiscard]] std::uint64_t group(int kz) const { return of_axis[kz]; }
@@ -89,7 +90,7 @@ struct Watertight {
     using F = vf<W>;
     const int kx = kz == 2 ? 0 : kz + 1, ky = kx == 2 ? 0 : kx + 1;
     const vf3<W> o{F::load(rays.origin[kx] + k), F::load(rays.origin[ky] + k), F::load(rays.origin[kz] + k)};
-    const auto seen = [&](const float(&p)[3][Block::kWidth]) { return vf3<W>{F(p[kx][i]), F(p[ky][i]), F(p[kz][i])} - o; };
+    const auto seen = [&](const float(&p)[3][Block::kWidth]) { return o - vf3<W>{F(p[kx][i]), F(p[ky][i]), F(p[kz][i])}; };
     const Edges<W> e(ShearedVertices<W>(F::load(shears.sx + k), F::load(shears.sy + k), seen(block.v0), seen(block.v1), seen(block.v2)));
     const vm<W> inside = e.inside();
     again = vm<W>(false);
@@ -102,28 +103,30 @@ struct Watertight {
   struct Edges {
     using F = vf<W>;
     ShearedVertices<W> p;
-    F u, v, w, least, most;
+    F u, v, w;
+    F sides;  ///< the least of the three times the largest: negative where they have different signs
 
     ARBORETUM_INLINE explicit Edges(const ShearedVertices<W>& vertices) : p(vertices) {
       u = p.c.x * p.b.y - p.c.y * p.b.x, v = p.a.x * p.c.y - p.a.y * p.c.x, w = p.b.x * p.a.y - p.b.y * p.a.x;
-      least = min_x86(min_x86(u, v), w), most = max_x86(max_x86(u, v), w);
+      sides = min_x86(min_x86(u, v), w) * max_x86(max_x86(u, v), w);
     }
-    ARBORETUM_INLINE vm<W> inside() const { return (least >= F(0.0f)) | (most <= F(0.0f)); }
-    /// Of lanes inside, those in which an edge is met.
-    ARBORETUM_INLINE vm<W> ties() const { return least * most == F(0.0f); }
+    /// Also lanes in which the product has underflowed, on whichever side: ties(), which doubles decide. Of triangles below some 1e-11 those are most.
+    ARBORETUM_INLINE vm<W> inside() const { return sides >= F(0.0f); }
+    /// Of lanes inside, those in which an edge is met, or may be.
+    ARBORETUM_INLINE vm<W> ties() const { return sides == F(0.0f); }
 
     /// Sets the hits; returns the lanes that, if inside, are decided: no edge is met, and t is as right as it must be.
     ARBORETUM_INLINE vm<W> hits(F tnear, F sz, TriangleHits<W>& out) const {
       const F det = u + v + w, za = sz * p.a.z, zb = sz * p.b.z, zc = sz * p.c.z;
       out.t = (u * za + v * zb + w * zc) / det;
       out.u_numerator = v, out.v_numerator = w, out.denominator = det;
-      return (least * most != F(0.0f)) & clear(tnear, za, zb, zc, det, out.t);
+      return (sides != F(0.0f)) & clear(tnear, za, zb, zc, det, out.t);
     }
     /// Lanes whose t need not be computed again in double; none where it has overflowed.
     ARBORETUM_INLINE vm<W> clear(F tnear, F za, F zb, F zc, F det, F t) const {
       const F spread = max_x86(max_x86(za, zb), zc) - min_x86(min_x86(za, zb), zc), area = abs(det);
-      const auto squares = [](F x, F y, F z) { return madd(x, x, madd(y, y, z * z)); };
-      const F size = squares(p.a.x, p.a.y, p.a.z) + squares(p.b.x, p.b.y, p.b.z) + squares(p.c.x, p.c.y, p.c.z);
+      const auto squares = [](const vf3<W>& q) { return madd(q.x, q.x, madd(q.y, q.y, q.z * q.z)); };
+      const F size = squares(p.a) + squares(p.b) + squares(p.c);
       const F beyond = (t - madd(t, F(0.0f), tnear)) * area, error = F(0x1p-19f) * size;  // NaN of an infinite t
       return min_x86(madd(spread, error, beyond), msub(spread, max_x86(error, F(0x1p-10f) * area), beyond)) < F(0.0f);
     }
@@ -166,29 +169,29 @@ struct Watertight {
   template <class Block>
   static __attribute__((noinline)) vf<Block::kWidth> plane_distances_in_double(unsigned lanes, const ShearedRay& ray, const Block& block,
                                                                                vf<Block::kWidth> distances) {
-    constexpr int W = Block::kWidth;
-    float t[W];
-    distances.store(t);
-    const std::uint32_t axes[3] = {ray.x, ray.y, ray.z};
-    const double d[3] = {ray.direction[0], ray.direction[1], ray.direction[2]};
-    for (unsigned rest = lanes; rest; rest &= rest - 1) {
-      const int i = __builtin_ctz(rest);
-      double a[3], e1[3], e2[3];
-      for (int j = 0; j < 3; ++j) {
-        const double v0 = ShearedRay::row(block.v0, axes[j])[i];
-        a[j] = v0 + ray.back[j], e1[j] = ShearedRay::row(block.v1, axes[j])[i] - v0, e2[j] = ShearedRay::row(block.v2, axes[j])[i] - v0;
-      }
-      const double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
-      const double along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
-      if (along == 0) continue;
-      const double plane = (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]) / along;
+    constexpr int W = Block::kWidth, D = kDoubleLanes<W>;
+    using F = vd<D>;
+    const AxisOrder& axes = *ray.order;
+    const vd3<D> o{double(ray.from[0]), double(ray.from[1]), double(ray.from[2])}, d{double(ray.direction[0]), double(ray.direction[1]), double(ray.direction[2])};
+    F t[W / D];
+    for (int k = 0; k < W / D; ++k) {
+      t[k] = 0.0;
+      const unsigned asked = lanes >> k * D & ((1u << D) - 1u);
+      if (asked == 0) continue;
+      const auto corner = [&](const float(&p)[3][W]) {
+        return load3<D>(ShearedRay::row(p, axes.x) + k * D, ShearedRay::row(p, axes.y) + k * D, ShearedRay::row(p, axes.z) + k * D);
+      };
+      const vd3<D> v0 = corner(block.v0), a = v0 - o, e1 = corner(block.v1) - v0, e2 = corner(block.v2) - v0;
+      // Not fused: most of these products are exact, and what is 0 then comes out as 0, as of a ray that starts in the plane.
+      const auto dot_unfused = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
+      const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
+      const F along = dot_unfused(n, d);
       // Rounded division keeps the order: those of the nearest and the farthest corner are the least and the greatest.
-      const double b = a[2] + e1[2], c = a[2] + e2[2];
-      const double low = b < c ? b : c, high = b < c ? c : b, lowest = a[2] < low ? a[2] : low, highest = a[2] > high ? a[2] : high;
-      const double least = (d[2] > 0 ? lowest : highest) / d[2], most = (d[2] > 0 ? highest : lowest) / d[2];
-      t[i] = float(plane < least ? least : plane > most ? most : plane);
+      const F b = a.z + e1.z, c = a.z + e2.z, low = min_x86(min_x86(a.z, b), c) / d.z, high = max_x86(max_x86(a.z, b), c) / d.z;
+      t[k] = max_x86(min_x86(dot_unfused(n, a) / along, max_x86(low, high)), min_x86(low, high));
+      lanes &= ~((asked & ~(along != F(0.0))) << k * D);
     }
-    return vf<W>::load(t);
+    return select(vm<W>::from_bits(lanes), to_floats<W>(t), distances);
   }
 };
 

@@ -122,6 +122,17 @@ template <int W> ARBORETUM_INLINE vd<W> abs(vd<W> a) { return flip_sign(a, a); }
 template <int W> ARBORETUM_INLINE vd3<W> load3(const float* x, const float* y, const float* z) {
   return {vd<W>::load(x), vd<W>::load(y), vd<W>::load(z)};
 }
+/// All of them, rounded. In registers where it can be: a load of what two stores have written waits for them.
+template <int W, int D> ARBORETUM_INLINE vf<W> to_floats(const vd<D> (&a)[W / D]) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+  if constexpr (W == 4 && D == 2) return vf<W>(_mm_movelh_ps(_mm_cvtpd_ps(a[0].v), _mm_cvtpd_ps(a[1].v)));
+#elif ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
+  if constexpr (W == 8 && D == 4) return vf<W>(_mm256_set_m128(_mm256_cvtpd_ps(a[1].v), _mm256_cvtpd_ps(a[0].v)));
+#endif
+  alignas(64) float out[W];
+  for (int k = 0; k < W / D; ++k) a[k].store(out + k * D);
+  return vf<W>::load(out);
+}
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -89,7 +89,8 @@ template <int W>
 [[nodiscard]] std::string why_no_traversal(std::string_view structure, std::string_view traversal) {
   if (const StructureEntry* entry = find_structure(structure)) {
     if (!entry->info.only_single_rays.empty()) return std::string(entry->info.only_single_rays);
-    if (traversal.starts_with("stream") && !entry->info.no_streams.empty()) return std::string(entry->info.no_streams);
+    const bool ours = traversal == "stream" || traversal == "stream_sorted" || traversal == "stream_lists";  // others are Embree's
+    if (ours && !entry->info.no_streams.empty()) return std::string(entry->info.no_streams);
   }
   const std::string owners = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.traversal == traversal; });
   return owners.empty() ? "no structure of this build has it on this machine" : "that is for" + owners;

@@ -10,7 +10,7 @@
 //   Walk(const Accel&, const KernelRow&)
 //   std::size_t stack_entries() const;
 //   void start(void* state, const Ray&, Entry* stack) const;      makes a State with members `best` (NearestHit) and `data` (Leaves::RayData)
-//   Target first(const State&) const;
+//   Target first(State&) const;
 //   static unsigned kind(Target);                                   0 a node, 1 a leaf, 2 nothing is left
 //   void prefetch(Target) const;
 //   Target node(State&, Target) const;                              what comes after this step
@@ -62,8 +62,9 @@ class QueuedRays {
     Target target;
   };
 
-  /// Stacks lie an odd number of cache lines apart, so that they do not share sets of the cache.
+  /// Stacks lie an odd number of cache lines apart where entries fill lines, and nearly so where they do not, so that they do not share sets of the cache.
   [[nodiscard]] static std::size_t stride_of(std::size_t entries) {
+    static_assert(sizeof(Entry) <= 64);
     constexpr std::size_t line = 64 / sizeof(Entry);
     return ((entries + line - 1) / line | 1) * line;
   }
