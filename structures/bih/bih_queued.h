@@ -11,8 +11,9 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 template <class Leaves, bool AnyHit>
-class BihQueuedWalk : public ListedQueuedLeaves<Leaves, AnyHit> {
-  using Base = ListedQueuedLeaves<Leaves, AnyHit>;
+class BihQueuedWalk : public ListedQueuedWalk<bih::Bih, Leaves, AnyHit> {
+  using Base = ListedQueuedWalk<bih::Bih, Leaves, AnyHit>;
+  using Base::tree_;
 
  public:
   using typename Base::Target;
@@ -25,14 +26,12 @@ class BihQueuedWalk : public ListedQueuedLeaves<Leaves, AnyHit> {
     typename Leaves::RayData data;
   };
 
-  BihQueuedWalk(const Accel& accel, const KernelRow& row) : BihQueuedWalk(static_cast<const bih::Bih&>(accel), row) {}
+  BihQueuedWalk(const Accel& accel, const KernelRow& row) : Base(accel, row) {}
 
   std::size_t stack_entries() const { return tree_.stack_entries(); }
 
   ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
-    const float m = tree_.max_coordinate();
-    State& s = *new (state) State{padded_ ? IntervalRay(BoxRay<2, true>(ray, m)) : IntervalRay(BoxRay<2, false>(ray, m)), stack, stack, ray.tnear, ray.tfar, ray.tnear,
-                                  NearestHit{ray.tfar}, Base::leaves_.prepare(ray)};
+    State& s = *new (state) State{Base::template constants<IntervalRay, 2>(ray), stack, stack, ray.tnear, ray.tfar, ray.tnear, NearestHit{ray.tfar}, Base::leaves_.prepare(ray)};
     clip_to_scene(tree_, s.interval, s.low, s.high);
   }
   ARBORETUM_INLINE Target first(const State& s) const { return s.low <= s.high ? Target{0, Target::kNode} : Base::kEnd; }
@@ -68,15 +67,8 @@ class BihQueuedWalk : public ListedQueuedLeaves<Leaves, AnyHit> {
     const std::uint32_t next = pop_bih<AnyHit>(s.top, s.stack, s.low, s.high, s.best.t);
     return next != kNoNode ? Target{next, Target::kNode} : Base::kEnd;
   }
-
- private:
-  BihQueuedWalk(const bih::Bih& tree, const KernelRow& row) : Base(row, tree.leaves()), tree_(tree), padded_(row.box == "padded") {}
-
-  const bih::Bih& tree_;
-  const bool padded_;
 };
 
-/// `fast` and `padded` are one walk with other constants.
 template <class Leaves, bool, bool AnyHit>
 using BihQueued = QueuedRays<BihQueuedWalk<Leaves, AnyHit>>;
 

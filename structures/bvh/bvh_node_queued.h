@@ -14,36 +14,30 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// push() (bvh_queued.h), also where references lie `Stride` places apart, and of four children without a branch on AVX2, too.
 template <int Stride, bool AnyHit, int W>
 ARBORETUM_INLINE void push_children_of(const bvh::NodeReference* child, vf<W> entry, unsigned hit, StackEntry*& top) {
-#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE || ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
   if constexpr (W == 4) {
-    const __m128i distances = _mm_castps_si128(entry.v), references = _mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride]));
-#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
-    const __m128i from = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompressBytes.bytes[hit]));
-    const __m128i r = _mm_shuffle_epi8(references, from), k = _mm_shuffle_epi8(distances, from);
-    __m128d a = _mm_castsi128_pd(_mm_unpacklo_epi32(r, k)), b = _mm_castsi128_pd(_mm_unpackhi_epi32(r, k));
-    if constexpr (!AnyHit) sort_down(a, b);
-    _mm_storeu_pd(reinterpret_cast<double*>(top), a), _mm_storeu_pd(reinterpret_cast<double*>(top + 2), b);
-    top += __builtin_popcount(hit);
-#else
     const int count = __builtin_popcount(hit);
+    const __m128i references = _mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride]));
     const __m128i from = _mm_cvtepu8_epi32(_mm_cvtsi32_si128(int(std::uint32_t(kCompress.lanes[hit])))), present = _mm_cmpgt_epi32(_mm_set1_epi32(count), _mm_setr_epi32(0, 1, 2, 3));
     const auto together = [&](__m128i v) { return _mm_and_si128(_mm_castps_si128(_mm_permutevar_ps(_mm_castsi128_ps(v), from)), present); };
-    const __m128i r = together(references), k = together(distances);
+    const __m128i r = together(references), k = together(_mm_castps_si128(entry.v));
     const __m256d e = _mm256_castsi256_pd(_mm256_set_m128i(_mm_unpackhi_epi32(r, k), _mm_unpacklo_epi32(r, k)));
     _mm256_storeu_pd(reinterpret_cast<double*>(top), AnyHit ? e : sort_down(e));
     top += count;
-#endif
     return;
   }
 #endif
   if constexpr (Stride == 1) {
     push<W, AnyHit>(child, entry, hit, top);
   } else {
-    alignas(64) std::uint32_t key[W];
-    entry.store(key);
-    bvh::NodeReference references[W];
-    for (int i = 0; i < W; ++i) references[i] = child[i * Stride];
-    push_in_scalars<W, AnyHit>(references, key, hit, top);
+    alignas(16) bvh::NodeReference side_by_side[W];
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+    static_assert(W == 4);  // as one vector: a load that is wider than the stores before it waits for them
+    _mm_store_si128(reinterpret_cast<__m128i*>(side_by_side), _mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride])));
+#else
+    for (int i = 0; i < W; ++i) side_by_side[i] = child[i * Stride];
+#endif
+    push<W, AnyHit>(side_by_side, entry, hit, top);
   }
 }
 

@@ -1,8 +1,9 @@
-// What rays in flight (traversal/queued_rays.h) through structures with shared leaves (leaf_lists.h) have in common: leaves by their code, and
+// What rays in flight (traversal/queued_rays.h) through structures with shared leaves (leaf_lists.h) have in common: the tree, leaves by their code, and
 // targets that are a node's number, a leaf's code or the end.
 #pragma once
 
 #include "structures/leaves/leaf_lists.h"
+#include "traversal/box_test.h"
 #include "traversal/queued_rays.h"
 
 namespace arboretum {
@@ -14,8 +15,9 @@ struct ListedTarget {
   Kind kind;
 };
 
-template <class Leaves, bool AnyHit>
-class ListedQueuedLeaves {
+/// `Tree` has leaves() and max_coordinate(); `fast` and `padded` boxes are one walk with other constants.
+template <class Tree, class Leaves, bool AnyHit>
+class ListedQueuedWalk {
  public:
   static constexpr bool kAnyHit = AnyHit;
   using Target = ListedTarget;
@@ -29,7 +31,15 @@ class ListedQueuedLeaves {
   }
 
  protected:
-  ListedQueuedLeaves(const KernelRow& row, const LeafStore& store) : store_(store), leaves_(row, store.vertices()) {}
+  ListedQueuedWalk(const Accel& accel, const KernelRow& row)
+      : tree_(static_cast<const Tree&>(accel)), store_(tree_.leaves()), leaves_(row, store_.vertices()), padded_(row.box == "padded") {}
+
+  /// A ray's constants, made of those for N boxes.
+  template <class Constants, int N>
+  ARBORETUM_INLINE Constants constants(const Ray& ray) const {
+    const float m = tree_.max_coordinate();
+    return padded_ ? Constants(BoxRay<N, true>(ray, m)) : Constants(BoxRay<N, false>(ray, m));
+  }
 
   ARBORETUM_INLINE void prefetch_leaf(LeafCode code) const {
     constexpr int kLines = int((Leaves::kBytesAhead + 63 + 32) / 64);
@@ -52,8 +62,10 @@ class ListedQueuedLeaves {
 
   ARBORETUM_INLINE const std::byte* blocks_of(LongLeaf range) const { return store_.blocks() + range.first * leaves_.block_bytes(); }
 
+  const Tree& tree_;
   const LeafStore& store_;
   const Leaves leaves_;
+  const bool padded_;
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -11,8 +11,9 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 template <class Leaves, bool AnyHit>
-class OctreeQueuedWalk : public ListedQueuedLeaves<Leaves, AnyHit> {
-  using Base = ListedQueuedLeaves<Leaves, AnyHit>;
+class OctreeQueuedWalk : public ListedQueuedWalk<octree::Octree, Leaves, AnyHit> {
+  using Base = ListedQueuedWalk<octree::Octree, Leaves, AnyHit>;
+  using Base::tree_;
 
  public:
   using typename Base::Target;
@@ -27,14 +28,12 @@ class OctreeQueuedWalk : public ListedQueuedLeaves<Leaves, AnyHit> {
     typename Leaves::RayData data;
   };
 
-  OctreeQueuedWalk(const Accel& accel, const KernelRow& row) : OctreeQueuedWalk(static_cast<const octree::Octree&>(accel), row) {}
+  OctreeQueuedWalk(const Accel& accel, const KernelRow& row) : Base(accel, row) {}
 
   std::size_t stack_entries() const { return kMostOctreeCells; }
 
   ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
-    const float m = tree_.max_coordinate();
-    new (state) State{padded_ ? OctreeRay(BoxRay<8, true>(ray, m)) : OctreeRay(BoxRay<8, false>(ray, m)), {{{0, 0, 0, 0}, tree_.nodes()[0], 0}, 0.0f}, stack, stack, ray.tnear, kEmptyLeaf,
-                      NearestHit{ray.tfar}, Base::leaves_.prepare(ray)};
+    new (state) State{Base::template constants<OctreeRay, 8>(ray), {{{0, 0, 0, 0}, tree_.nodes()[0], 0}, 0.0f}, stack, stack, ray.tnear, kEmptyLeaf, NearestHit{ray.tfar}, Base::leaves_.prepare(ray)};
   }
   ARBORETUM_INLINE Target first(State& s) const { return next(s); }
 
@@ -57,8 +56,6 @@ class OctreeQueuedWalk : public ListedQueuedLeaves<Leaves, AnyHit> {
   }
 
  private:
-  OctreeQueuedWalk(const octree::Octree& tree, const KernelRow& row) : Base(row, tree.leaves()), tree_(tree), padded_(row.box == "padded") {}
-
   /// To the ray's cell, or to what waits where that is a leaf that the ray comes from.
   static ARBORETUM_INLINE Target next(State& s) {
     do {
@@ -69,12 +66,8 @@ class OctreeQueuedWalk : public ListedQueuedLeaves<Leaves, AnyHit> {
     return Base::kEnd;
   }
   static ARBORETUM_INLINE Target pop(State& s) { return pop_octree<AnyHit>(s.top, s.stack, s.cell, s.best.t) ? next(s) : Base::kEnd; }
-
-  const octree::Octree& tree_;
-  const bool padded_;
 };
 
-/// `fast` and `padded` are one walk with other constants.
 template <class Leaves, bool, bool AnyHit>
 using OctreeQueued = QueuedRays<OctreeQueuedWalk<Leaves, AnyHit>>;
 
