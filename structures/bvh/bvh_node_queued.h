@@ -123,36 +123,9 @@ struct BvhNodeQueue {
   using Of = QueuedRays<BvhNodeWalk<Nodes<Padded>, Leaves, AnyHit>>;
 };
 
-/// As `Queued` where a structure is so large that its rays wait for memory, else as `Single` (docs/performance.md, "Many rays in flight").
-template <class Queued, class Single>
-struct InFlightWhereLarge {
-  static constexpr std::size_t kLargeBytes = std::size_t{4} << 20;
-
-  template <class Leaves, bool Padded>
-  static RowFunctions timed() {
-    return chosen<&Queued::template timed<Leaves, Padded>, &Single::template timed<Leaves, Padded>>();
-  }
-  template <bool Padded>
-  static RowFunctions counting() {
-    return chosen<&Queued::template counting<Padded>, &Single::template counting<Padded>>();
-  }
-
- private:
-  template <RowFunctions (*Large)(), RowFunctions (*Small)()>
-  static RowFunctions chosen() {
-    return {[](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-              (is_large(accel) ? Large() : Small()).closest_hit(accel, row, rays, hits, counters);
-            },
-            [](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-              (is_large(accel) ? Large() : Small()).any_hit(accel, row, rays, occluded, counters);
-            }};
-  }
-  static bool is_large(const Accel& accel) { return accel.bytes() > kLargeBytes; }
-};
-
-/// How `auto` traces rays that share little: as rays in flight in large structures where N boxes are no more than a register, and that has been measured, else alone.
+/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register, and that has been measured (docs/performance.md), else alone.
 template <template <class, bool, bool> class Queue, class Single, int N>
-using IncoherentInFlight = std::conditional_t<kRegisterWidth == 8 || (kRegisterWidth == 4 && N == 4), InFlightWhereLarge<QueuedFunctions<Queue, Single, 32, 64>, Single>, Single>;
+using IncoherentInFlight = std::conditional_t<kRegisterWidth == 8 || (kRegisterWidth == 4 && N == 4), QueuedFunctions<Queue, Single, 32, 64>, Single>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum
