@@ -1,9 +1,11 @@
 #include "core/memory_meter.h"
 
 #include <atomic>
+#include <cstdint>
 #include <new>
 
 #include <sys/mman.h>
+#include <unistd.h>
 
 namespace arboretum {
 namespace {
@@ -32,6 +34,13 @@ void* allocate_uncounted(std::size_t bytes) {
 }
 
 void release_uncounted(void* data, std::size_t bytes) noexcept { ::operator delete(data, alignment_of(bytes)); }
+
+std::size_t give_back_pages(void* begin, void* end) noexcept {
+  static const std::uintptr_t page = std::uintptr_t(sysconf(_SC_PAGESIZE));
+  const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(begin) + page - 1) / page * page, last = reinterpret_cast<std::uintptr_t>(end) / page * page;
+  if (first >= last || madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED) != 0) return 0;
+  return last - first;
+}
 
 void* allocate_metered(std::size_t bytes) {
   void* data = allocate_uncounted(bytes);

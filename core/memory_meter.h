@@ -29,6 +29,8 @@ void release_metered(void* data, std::size_t bytes) noexcept;
 [[nodiscard]] void* allocate_uncounted(std::size_t bytes);
 /// Gives back what allocate_uncounted(bytes) gave.
 void release_uncounted(void* data, std::size_t bytes) noexcept;
+/// Hands the whole pages of [begin, end), a part of such an allocation whose values are needed no more, back to the system. Returns their bytes.
+std::size_t give_back_pages(void* begin, void* end) noexcept;
 
 /// For builders' arrays. Elements are default-initialised (left as they are for trivial types), since builders overwrite
 /// whole arrays.

@@ -1,7 +1,7 @@
 // ReservedArray: an array with room for the worst case, of which only the part in use is counted and takes memory.
 //
 // The system gives a page when it is first written, so address space for many elements costs nothing until they are used. A
-// builder reserves for the worst case, says how many elements it has handed out, and the MemoryMeter counts those.
+// builder reserves for the worst case, says how many elements it has handed out, and the MemoryMeter counts those; what it needs no more it may give back in parts.
 #pragma once
 
 #include <algorithm>
@@ -40,8 +40,15 @@ class ReservedArray {
   }
   /// Counts `n` more elements, size() at most in all. Thread-safe.
   void hand_out(std::size_t n) noexcept {
-    handed_out_.fetch_add(n, std::memory_order_relaxed);
+    counted_bytes_.fetch_add(n * sizeof(T), std::memory_order_relaxed);
     MemoryMeter::add(n * sizeof(T));
+  }
+  /// The elements [begin, end), which were handed out, are needed no more: their whole pages go back to the system and count no longer. Thread-safe for
+  /// ranges that do not overlap.
+  void give_back(std::size_t begin, std::size_t end) noexcept {
+    const std::size_t bytes = give_back_pages(data_ + begin, data_ + end);
+    counted_bytes_.fetch_sub(bytes, std::memory_order_relaxed);
+    MemoryMeter::remove(bytes);
   }
   /// `n` elements, all counted; the first ones keep their values.
   void resize(std::size_t n) {
@@ -52,12 +59,12 @@ class ReservedArray {
   }
   void clear() noexcept {
     if (data_) release_uncounted(data_, size_ * sizeof(T));
-    MemoryMeter::remove(handed_out_.exchange(0) * sizeof(T));
+    MemoryMeter::remove(counted_bytes_.exchange(0));
     data_ = nullptr, size_ = 0;
   }
   void swap(ReservedArray& other) noexcept {
     std::swap(data_, other.data_), std::swap(size_, other.size_);
-    handed_out_ = other.handed_out_.exchange(handed_out_.load());
+    counted_bytes_ = other.counted_bytes_.exchange(counted_bytes_.load());
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
@@ -74,7 +81,7 @@ class ReservedArray {
  private:
   T* data_ = nullptr;
   std::size_t size_ = 0;
-  std::atomic<std::size_t> handed_out_{0};
+  std::atomic<std::size_t> counted_bytes_{0};
 };
 
 }  // namespace arboretum

@@ -10,6 +10,7 @@
 #include "core/names.h"
 #include "core/random.h"
 #include "core/ray.h"
+#include "core/reserved_array.h"
 #include "core/rounding.h"
 #include "tests/catch.h"
 
@@ -100,6 +101,27 @@ TEST_CASE("the memory meter sees what arenas and vectors hold, and their peak") 
   }
   CHECK(MemoryMeter::current() == before);
   CHECK(MemoryMeter::peak() == before + (1 << 20) + 4000);
+}
+
+TEST_CASE("a reserved array counts what it has handed out, less the pages it gave back") {
+  const std::size_t before = MemoryMeter::current(), n = 1 << 20;
+  {
+    ReservedArray<std::uint32_t> array;
+    array.reserve(2 * n);
+    CHECK(MemoryMeter::current() == before);
+    array.hand_out(n);
+    std::fill_n(array.data(), n, 7u);
+    CHECK(MemoryMeter::current() == before + 4 * n);
+    array.give_back(n / 2, n);
+    CHECK(MemoryMeter::current() <= before + 2 * n + (1 << 16));
+    CHECK(MemoryMeter::current() >= before + 2 * n);
+    array.give_back(1, 3);  // less than a page
+    CHECK(MemoryMeter::current() >= before + 2 * n);
+    CHECK(std::all_of(array.data(), array.data() + n / 2, [](std::uint32_t v) { return v == 7; }));
+    ReservedArray<std::uint32_t> moved = std::move(array);
+    CHECK(array.empty());
+  }
+  CHECK(MemoryMeter::current() == before);
 }
 
 TEST_CASE("the nearest name to a misspelt one") {

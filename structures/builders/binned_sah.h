@@ -1,11 +1,10 @@
 // Binned SAH builder (Wald, "On fast construction of SAH-based bounding volume hierarchies", RT 2007): top down, all
 // three axes binned in one pass over the references, the cheapest plane taken.
 //
-// Partition is out of place, stable and branchless, and gathers the children's centroid bounds on its way. The work is cut
-// into chunks whose size does not depend on the number of threads: the tree is the same for any number of threads.
+// The work is cut into chunks whose size does not depend on the number of threads: the tree is the same for any number of threads.
 //
-// Two buffers of all references are needed for the upper levels alone. Ranges that one task builds are set aside until those are done; then the
-// second buffer goes, before most nodes are made, and each task has a small one of its own, which the caches hold.
+// The upper levels are partitioned in place. Ranges that one task builds are set aside until those are done; then each is built with a small second
+// buffer, which the caches hold, and the memory of its references is given back.
 #pragma once
 
 #include "structures/builders/object_split.h"
@@ -22,106 +21,116 @@ class BinnedSah {
   void build(BuildReport& report) {
     const std::size_t n = mesh_.size();
     PhaseClock phase(report);
-    references_[0].resize(n), references_[1].resize(n);
-    const sah::Bounds bounds = sah::make_references(mesh_, references_[0].data());
+    references_.reserve(n), references_.hand_out(n);
+    const sah::Bounds bounds = sah::make_references(mesh_, references_.data());
     phase.ends("references");
-    sah::TreeWriter writer(tree_, n, references_[0].data());
+    sah::TreeWriter writer(tree_, n);
     writer_ = &writer;
     {
-      sah::TreeWriter::Pool pool;
-      upper_levels({0, n, 0, bounds}, 0, pool);
+      sah::TreeWriter::Share share;
+      upper_levels({references_.data(), n, bounds}, 0, share);
     }
-    MeteredVector<sah::Reference>().swap(references_[1]);  // an assignment would keep the memory
     struct Workspace {
-      sah::TreeWriter::Pool pool;
+      sah::TreeWriter::Share share;
       MeteredVector<sah::Reference> references;
     };
     tbb::enumerable_thread_specific<Workspace> workspaces([n] { return Workspace{{}, MeteredVector<sah::Reference>(std::min(n, sah::kParallel))}; });
+    const auto begin_of = [this](const Subtree& subtree) { return std::size_t(subtree.range.references - references_.data()); };
     tbb::parallel_for(std::size_t{0}, set_aside_.size(), [&](std::size_t i) {
       const auto& [range, node] = set_aside_[i];
       Workspace& mine = workspaces.local();
-      const Buffers buffers{{references_[0].data() + range.begin, mine.references.data()}, range.begin};
-      recurse(buffers, {0, range.size(), 0, range.bounds}, node, mine.pool);
+      const std::size_t begin = begin_of(set_aside_[i]), id_bytes = range.size * sizeof(std::uint32_t);
+      recurse(range, mine.references.data(), {begin, reinterpret_cast<std::byte*>(range.references)}, node, mine.share);
+      references_.give_back(begin + (id_bytes + sizeof(sah::Reference) - 1) / sizeof(sah::Reference), begin + range.size);
     });
-    tree_.primitives.resize(n);
     writer.finish();
+    tree_.primitives.resize(n);
+    tbb::parallel_for(std::size_t{0}, set_aside_.size(), [&](std::size_t i) {
+      const Range& range = set_aside_[i].range;
+      std::memcpy(tree_.primitives.data() + begin_of(set_aside_[i]), range.references, range.size * sizeof(std::uint32_t));
+    });
     phase.ends("splits");
   }
 
  private:
-  /// References [begin, end) of buffer `side`.
   struct Range {
-    std::size_t begin, end;
-    int side;
+    sah::Reference* references;
+    std::size_t size;
     sah::Bounds bounds;
-    std::size_t size() const { return end - begin; }
   };
   struct Subtree {
     Range range;
     std::uint32_t node;
   };
-  /// Both hold a range of all references, which begins with the `first`.
-  struct Buffers {
-    sah::Reference* side[2];
+  /// Where a range's leaves stand among the tree's primitives, and where their ids are kept until the references are gone: at the beginning of the
+  /// references that one task builds from, where leaves that are done have left room.
+  struct Leaves {
     std::size_t first;
+    std::byte* ids;
+    [[nodiscard]] Leaves behind(std::size_t n) const { return {first + n, ids + n * sizeof(std::uint32_t)}; }
   };
 
   /// Splits a range whose centroids coincide in the middle of its order.
-  static void split_in_the_middle(const Buffers& buffers, const Range& range, Range& left, Range& right) {
-    const std::size_t middle = range.begin + range.size() / 2;
-    left = {range.begin, middle, range.side, sah::Bounds::none()}, right = {middle, range.end, range.side, sah::Bounds::none()};
-    for (Range* half : {&left, &right}) {
-      for (std::size_t i = half->begin; i < half->end; ++i) half->bounds.extend(buffers.side[range.side][i]);
+  static void split_in_the_middle(const Range& range, Range& left, Range& right) {
+    const std::size_t half = range.size / 2;
+    left = {range.references, half, sah::Bounds::none()}, right = {range.references + half, range.size - half, sah::Bounds::none()};
+    for (Range* side : {&left, &right})
+      for (std::size_t i = 0; i < side->size; ++i) side->bounds.extend(side->references[i]);
+  }
+
+  /// Splits a range: into as much room in `other`, or in place where that is nullptr. Returns true where the sides are in `other`. Not inlined: recurse() has to do without
+  /// room for bins in its frame.
+  __attribute__((noinline)) bool split(const Range& range, sah::Reference* other, Range& left, Range& right) const {
+    const sah::ObjectSplit object(range.references, range.references + range.size, range.bounds.centroids, max_bins_, leaf_width_);
+    if (!object.exists()) {
+      split_in_the_middle(range, left, right);
+      return false;
     }
+    sah::Reference* const out = other ? other : range.references;
+    left = {out, object.left_count(), {object.left(), {}}}, right = {out + left.size, range.size - left.size, {object.right(), {}}};
+    if (other) {
+      object.partition_to(left.references, right.references, left.bounds.centroids, right.bounds.centroids);
+    } else {
+      object.partition_in_place(out, left.bounds.centroids, right.bounds.centroids);
+    }
+    return other != nullptr;
   }
 
-  /// Not inlined: recurse() has to do without room for bins in its frame.
-  __attribute__((noinline)) void split(const Buffers& buffers, const Range& range, Range& left, Range& right) const {
-    const sah::Reference* r = buffers.side[range.side];
-    const sah::ObjectSplit object(r + range.begin, r + range.end, range.bounds.centroids, max_bins_, leaf_width_);
-    if (!object.exists()) return split_in_the_middle(buffers, range, left, right);
-    const std::size_t middle = range.begin + object.left_count();
-    left = {range.begin, middle, 1 - range.side, {object.left(), {}}}, right = {middle, range.end, 1 - range.side, {object.right(), {}}};
-    sah::Reference* out = buffers.side[1 - range.side];
-    object.partition_to(out + left.begin, out + right.begin, left.bounds.centroids, right.bounds.centroids);
-  }
-
-  /// Splits down to ranges that one task builds, and sets those aside in the first buffer.
-  void upper_levels(const Range& range, std::uint32_t index, sah::TreeWriter::Pool& pool) {
-    if (range.size() <= sah::kParallel) {
-      if (range.side == 1) std::copy_n(references_[1].data() + range.begin, range.size(), references_[0].data() + range.begin);
+  /// Splits down to ranges that one task builds, and sets those aside.
+  void upper_levels(const Range& range, std::uint32_t index, sah::TreeWriter::Share& share) {
+    if (range.size <= sah::kParallel) {
       const std::lock_guard lock(mutex_);
-      set_aside_.push_back({{range.begin, range.end, 0, range.bounds}, index});
+      set_aside_.push_back({range, index});
       return;
     }
     Range left, right;
-    split({{references_[0].data(), references_[1].data()}, 0}, range, left, right);
-    const std::uint32_t first = writer_->take_pair(pool);
-    writer_->node(index, range.bounds.boxes, range.size(), first);
-    if (left.size() > sah::kParallel && right.size() > sah::kParallel) {
+    split(range, nullptr, left, right);
+    const std::uint32_t first = writer_->take_pair(share);
+    writer_->node(index, range.bounds.boxes, range.size, first);
+    if (left.size > sah::kParallel && right.size > sah::kParallel) {
       tbb::parallel_invoke(
           [&] {
-            sah::TreeWriter::Pool own;
+            sah::TreeWriter::Share own;
             upper_levels(left, first, own);
           },
-          [&] { upper_levels(right, first + 1, pool); });
+          [&] { upper_levels(right, first + 1, share); });
     } else {
-      upper_levels(left, first, pool);
-      upper_levels(right, first + 1, pool);
+      upper_levels(left, first, share);
+      upper_levels(right, first + 1, share);
     }
   }
 
-  void recurse(const Buffers& buffers, const Range& range, std::uint32_t index, sah::TreeWriter::Pool& pool) {
-    if (range.size() <= leaf_width_) {
-      const sah::Reference* r = buffers.side[range.side];
-      return writer_->leaf(index, range.bounds.boxes, r + range.begin, r + range.end, buffers.first + range.begin);
+  /// `other` has room for as many references.
+  void recurse(const Range& range, sah::Reference* other, const Leaves& leaves, std::uint32_t index, sah::TreeWriter::Share& share) {
+    if (range.size <= leaf_width_) {
+      return writer_->leaf(index, range.bounds.boxes, range.references, range.references + range.size, leaves.first, leaves.ids);
     }
     Range left, right;
-    split(buffers, range, left, right);
-    const std::uint32_t first = writer_->take_pair(pool);
-    writer_->node(index, range.bounds.boxes, range.size(), first);
-    recurse(buffers, left, first, pool);
-    recurse(buffers, right, first + 1, pool);
+    sah::Reference* const free = split(range, other, left, right) ? range.references : other;
+    const std::uint32_t first = writer_->take_pair(share);
+    writer_->node(index, range.bounds.boxes, range.size, first);
+    recurse(left, free, leaves, first, share);
+    recurse(right, free + left.size, leaves.behind(left.size), first + 1, share);
   }
 
   const TriangleMesh& mesh_;
@@ -129,7 +138,7 @@ class BinnedSah {
   const unsigned leaf_width_;
   BinaryTree& tree_;
   sah::TreeWriter* writer_ = nullptr;
-  MeteredVector<sah::Reference> references_[2];
+  ReservedArray<sah::Reference> references_;
   std::mutex mutex_;
   MeteredVector<Subtree> set_aside_;
 };

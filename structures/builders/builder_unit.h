@@ -20,6 +20,7 @@
 #include "core/mesh.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/clip.h"
+#include "structures/builders/node_pool.h"
 #include "structures/builders/phase_clock.h"
 
 #include "simd/target.h"

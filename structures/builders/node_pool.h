@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <tbb/task_arena.h>
+
 #include "structures/builders/binary_tree.h"
 
 namespace arboretum {
@@ -17,9 +19,11 @@ class NodePool {
     std::uint32_t next = 0, end = 0;
   };
 
-  /// For a tree of n references, when a task is started only for subtrees of more than `grain` of them.
+  /// For a tree of n references, when a task is started only for subtrees of more than `grain` of them, or there is one a thread.
   NodePool(BinaryTree& tree, std::size_t n, std::size_t grain) : tree_(tree) {
-    tree.nodes.reserve(2 * n + (n / grain + 2) * kBlock), tree.first.reserve(tree.nodes.size());
+    // Fewer than n / grain + 1 shares (both sides of a split into tasks are larger than that) leave a block unfinished each, and one a thread.
+    const std::size_t shares = n / grain + 2 + std::size_t(tbb::this_task_arena::max_concurrency());
+    tree.nodes.reserve(2 * n + shares * kBlock), tree.first.reserve(tree.nodes.size());
     count(1);
   }
   NodePool(const NodePool&) = delete;
@@ -40,7 +44,7 @@ class NodePool {
   void finish() noexcept { tree_.node_count = next_.load(std::memory_order_relaxed); }
 
  private:
-  static constexpr std::uint32_t kBlock = 256;
+  static constexpr std::uint32_t kBlock = 64;
   void count(std::size_t n) noexcept { tree_.nodes.hand_out(n), tree_.first.hand_out(n); }
 
   BinaryTree& tree_;

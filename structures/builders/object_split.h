@@ -40,6 +40,47 @@ inline void partition_range(const Reference* r, const Reference* end, const BinM
   }
 }
 
+/// Brings references [r, r + n) to their sides of a split, the first `left_count` to the left: in two passes, which find what stands on the wrong side, chunk by chunk of
+/// either side, and exchange the k-th such reference of the left with the k-th of the right. Which is exchanged with which does not depend on the number of threads.
+inline void partition_in_place(Reference* r, std::size_t left_count, std::size_t n, const BinMap& map, const Split& split, Box& left_centroids, Box& right_centroids) {
+  struct Chunk {
+    std::size_t begin, misplaced, before;  ///< before: misplaced ones in the chunks of the same side in front of it
+    Box left_centroids, right_centroids;
+  };
+  static_assert(kChunk <= std::size_t{1} << 16);
+  const std::size_t left_chunks = (left_count + kChunk - 1) / kChunk, right_chunks = (n - left_count + kChunk - 1) / kChunk;
+  const auto for_each = [n](std::size_t count, const auto& f) {
+    if (n > kLarge) return tbb::parallel_for(std::size_t{0}, count, f);
+    for (std::size_t c = 0; c < count; ++c) f(c);
+  };
+  MeteredVector<Chunk> chunks(left_chunks + right_chunks);
+  MeteredVector<std::uint16_t> places(n);  // of a chunk's misplaced references, in the chunk
+  for_each(chunks.size(), [&](std::size_t c) {
+    const bool left = c < left_chunks;
+    Chunk& chunk = chunks[c];
+    chunk.begin = left ? c * kChunk : left_count + (c - left_chunks) * kChunk;
+    const std::size_t end = std::min(chunk.begin + kChunk, left ? left_count : n);
+    chunk.misplaced = find_misplaced(r + chunk.begin, end - chunk.begin, map, split, left, places.data() + chunk.begin, chunk.left_centroids, chunk.right_centroids);
+  });
+  left_centroids = right_centroids = empty_box();
+  for (std::size_t c = 0; c < chunks.size(); ++c) {
+    chunks[c].before = c == 0 || c == left_chunks ? 0 : chunks[c - 1].before + chunks[c - 1].misplaced;
+    left_centroids = max_x86(chunks[c].left_centroids, left_centroids), right_centroids = max_x86(chunks[c].right_centroids, right_centroids);
+  }
+  for_each(left_chunks, [&](std::size_t c) {
+    const Chunk& from = chunks[c];
+    if (from.misplaced == 0) return;
+    const Chunk* to = &*std::upper_bound(chunks.begin() + std::ptrdiff_t(left_chunks), chunks.end(), from.before, [](std::size_t k, const Chunk& chunk) { return k < chunk.before; }) - 1;
+    std::size_t j = from.before - to->before;
+    for (std::size_t i = 0; i < from.misplaced; ++i, ++j) {
+      for (; j == to->misplaced; ++to) j = 0;
+      Reference &a = r[from.begin + places[from.begin + i]], &b = r[to->begin + places[to->begin + j]];
+      const Box left = Box::load(&a), right = Box::load(&b);
+      right.store(&a), left.store(&b);
+    }
+  });
+}
+
 /// The best object split of a range, and all that its partition needs: small ranges on the stack, large ones in chunks for several tasks.
 class ObjectSplit {
  public:
@@ -66,6 +107,10 @@ class ObjectSplit {
   void partition_to(Reference* left_out, Reference* right_out, Box& left_centroids, Box& right_centroids) const {
     if (chunks_.empty()) return partition(r_, end_, map_, split_, left_out, right_out, left_centroids, right_centroids);
     partition_range(r_, end_, map_, split_, chunks_, left_out, right_out, left_centroids, right_centroids);
+  }
+  /// The same within the range itself, [r, r + n), in an order of its own.
+  void partition_in_place(Reference* r, Box& left_centroids, Box& right_centroids) const {
+    sah::partition_in_place(r, split_.left_count, std::size_t(end_ - r_), map_, split_, left_centroids, right_centroids);
   }
 
  private:

@@ -231,28 +231,62 @@ void child_bounds(const B& bins, unsigned n, const Split& split, Box& left, Box&
   for (unsigned b = split.bin; b < n; ++b) right = max_x86(bins.box[0][split.axis][b], right);
 }
 
+/// Whether a reference lies left of a split.
+struct LeftOf {
+  float lower, scale;
+  int axis;
+  std::int32_t bin;
+  LeftOf(const BinMap& map, const Split& split) : lower(lane_of(map.lower, split.axis)), scale(lane_of(map.scale, split.axis)), axis(split.axis), bin(std::int32_t(split.bin)) {}
+  ARBORETUM_INLINE bool operator()(const Reference& r) const { return std::int32_t((r.upper[axis] - r.neg_lower[axis] - lower) * scale) < bin; }
+};
+
+/// Bounds of the centroids on the two sides of a split, gathered without branches.
+class SideBounds {
+ public:
+  ARBORETUM_INLINE SideBounds() {
+    for (vf<4>& b : bounds_) b = vf<4>(-std::numeric_limits<float>::infinity());
+  }
+  ARBORETUM_INLINE void extend(const Reference& r, bool left) {
+    const vf<4> c = centroid(r), none = -std::numeric_limits<float>::infinity();
+    const vm<4> is_left(left);
+    bounds_[0] = max_x86(select(is_left, -c, none), bounds_[0]), bounds_[1] = max_x86(select(is_left, c, none), bounds_[1]);
+    bounds_[2] = max_x86(select(is_left, none, -c), bounds_[2]), bounds_[3] = max_x86(select(is_left, none, c), bounds_[3]);
+  }
+  [[nodiscard]] Box left() const { return both_halves(bounds_[0], bounds_[1]); }
+  [[nodiscard]] Box right() const { return both_halves(bounds_[2], bounds_[3]); }
+
+ private:
+  vf<4> bounds_[4];
+};
+
 /// Moves references [r, end) to left_out and right_out, in order; returns the sides' centroid bounds.
 inline void partition(const Reference* r, const Reference* end, const BinMap& map, const Split& split, Reference* left_out,
                       Reference* right_out, Box& left_centroids, Box& right_centroids) {
-  vf<4> bounds[4] = {-std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
-                     -std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
-  const vf<4> none = -std::numeric_limits<float>::infinity();
-  const float lower = lane_of(map.lower, split.axis), scale = lane_of(map.scale, split.axis);
+  SideBounds bounds;
+  const LeftOf is_left(map, split);
   for (; r < end; ++r) {
-    const vf<4> c = centroid(*r);
-    const float position = r->upper[split.axis] - r->neg_lower[split.axis];
-    const bool left = std::int32_t((position - lower) * scale) < std::int32_t(split.bin);
-    const Box box = Box::load(r);
-    box.store(left ? left_out : right_out);
+    const bool left = is_left(*r);
+    Box::load(r).store(left ? left_out : right_out);
     left_out += left, right_out += !left;
-    const vm<4> is_left(left);
-    const vf<4> l = select(is_left, c, none), neg_l = select(is_left, -c, none);
-    const vf<4> h = select(is_left, none, c), neg_h = select(is_left, none, -c);
-    bounds[0] = max_x86(neg_l, bounds[0]), bounds[1] = max_x86(l, bounds[1]);
-    bounds[2] = max_x86(neg_h, bounds[2]), bounds[3] = max_x86(h, bounds[3]);
+    bounds.extend(*r, left);
   }
-  left_centroids = both_halves(bounds[0], bounds[1]);
-  right_centroids = both_halves(bounds[2], bounds[3]);
+  left_centroids = bounds.left(), right_centroids = bounds.right();
+}
+
+/// Writes the places in [r, r + count), at most kChunk, of references that are not on the side `wanted_left` says; returns their number, and the centroid bounds of either side.
+inline std::size_t find_misplaced(const Reference* r, std::size_t count, const BinMap& map, const Split& split, bool wanted_left, std::uint16_t* places,
+                                  Box& left_centroids, Box& right_centroids) {
+  SideBounds bounds;
+  const LeftOf is_left(map, split);
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool left = is_left(r[i]);
+    places[found] = std::uint16_t(i);
+    found += left != wanted_left;
+    bounds.extend(r[i], left);
+  }
+  left_centroids = bounds.left(), right_centroids = bounds.right();
+  return found;
 }
 
 }  // namespace sah

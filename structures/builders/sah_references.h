@@ -49,32 +49,16 @@ inline Bounds make_references(const TriangleMesh& mesh, Reference* out) {
   return all;
 }
 
-/// Gives out nodes and leaves of a tree that tasks build side by side. Node numbers depend on scheduling, the tree does not.
+/// Nodes and leaves of a tree that tasks build side by side.
 class TreeWriter {
  public:
-  /// Node indices that one task may give out, so that a task's nodes lie together and the array's used part stays dense.
-  struct Pool {
-    std::uint32_t next = 0, end = 0;
-  };
+  using Share = NodePool::Share;
 
-  /// For at most `references` references; `ids` are the bytes of a reference buffer, where leaves keep their ids until finish().
-  TreeWriter(BinaryTree& tree, std::size_t references, Reference* ids) : tree_(tree), ids_(ids) {
-    // Fewer than n / kParallel + 1 pools (both sides of a split into tasks are larger than that) leave a block unfinished each, and one a thread
-    // where ranges that were set aside are built.
-    const std::size_t pools = references / kParallel + 2 + std::size_t(tbb::this_task_arena::max_concurrency());
-    tree.nodes.reserve(2 * references + pools * kBlock), tree.first.reserve(tree.nodes.size());
-    hand_out(1);
-  }
+  /// For at most `references` references.
+  TreeWriter(BinaryTree& tree, std::size_t references) : tree_(tree), pool_(tree, references, kParallel) {}
 
   /// Two neighbouring nodes.
-  std::uint32_t take_pair(Pool& pool) {
-    if (pool.next + 2 > pool.end) {
-      pool.next = next_.fetch_add(kBlock, std::memory_order_relaxed), pool.end = pool.next + kBlock;
-      hand_out(kBlock);
-    }
-    pool.next += 2;
-    return pool.next - 2;
-  }
+  [[nodiscard]] std::uint32_t take_pair(Share& share) noexcept { return pool_.take_pair(share); }
 
   void node(std::uint32_t index, Box box, std::size_t count, std::uint32_t left) {
     alignas(32) float b[8];
@@ -82,47 +66,23 @@ class TreeWriter {
     tree_.nodes[index] = {{0.0f - b[0], 0.0f - b[1], 0.0f - b[2]}, left, {b[4], b[5], b[6]}, std::uint32_t(count)};
   }
 
-  /// A leaf of references [r, end). Their ids go to place `at` of the buffer of ids, of which [at, at + end - r) is theirs; the
-  /// references may lie in it, at `at` or behind.
-  void leaf(std::uint32_t index, Box box, const Reference* r, const Reference* end, std::size_t at) {
+  /// A leaf of references [r, end). Their ids go to `ids`, bytes in which the references themselves may lie, there or behind; `first` is what the leaf notes of that place.
+  void leaf(std::uint32_t index, Box box, const Reference* r, const Reference* end, std::size_t first, void* ids) {
     node(index, box, std::size_t(end - r), 0);
-    tree_.first[index] = std::uint32_t(at);
-    auto* out = reinterpret_cast<std::byte*>(ids_ + at);
+    tree_.first[index] = std::uint32_t(first);
+    auto* out = static_cast<std::byte*>(ids);
     for (; r < end; ++r, out += sizeof(r->id)) {
       const std::uint32_t id = r->id;
       std::memcpy(out, &id, sizeof id);
     }
   }
 
-  /// Lines up the leaves' ids in tree.primitives, which has room for them.
-  void finish() {
-    tree_.node_count = next_.load();
-    place(0, 0);
-  }
+  /// To be called when the tree is done.
+  void finish() noexcept { pool_.finish(); }
 
  private:
-  static constexpr std::uint32_t kBlock = 64;
-
-  void hand_out(std::size_t n) { tree_.nodes.hand_out(n), tree_.first.hand_out(n); }
-
-  void place(std::uint32_t index, std::uint32_t begin) {
-    const BinaryNode& node = tree_.nodes[index];
-    if (node.is_leaf()) {
-      std::memcpy(tree_.primitives.data() + begin, ids_ + tree_.first[index], node.count * sizeof(std::uint32_t));
-      tree_.first[index] = begin;
-      return;
-    }
-    const std::uint32_t right = begin + tree_.nodes[node.left].count;
-    if (node.count > kParallel) {
-      tbb::parallel_invoke([&] { place(node.left, begin); }, [&] { place(node.left + 1, right); });
-    } else {
-      place(node.left, begin), place(node.left + 1, right);
-    }
-  }
-
   BinaryTree& tree_;
-  Reference* ids_;
-  std::atomic<std::uint32_t> next_{1};  // 0 is the root
+  NodePool pool_;
 };
 
 }  // namespace sah

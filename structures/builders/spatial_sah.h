@@ -27,13 +27,14 @@ class SpatialSah {
     const sah::Bounds bounds = sah::make_references(mesh_, references_[0].data());
     root_area_ = sah::half_area_or_0(bounds.boxes);
     phase.ends("references");
-    sah::TreeWriter writer(tree_, room, references_[0].data());
+    sah::TreeWriter writer(tree_, room);
     writer_ = &writer;
-    sah::TreeWriter::Pool pool;
-    const std::size_t used = recurse({0, n, 0, room, 0, bounds}, 0, pool);
+    sah::TreeWriter::Share share;
+    const std::size_t used = recurse({0, n, 0, room, 0, bounds}, 0, share);
+    writer.finish();
     references_[1].clear();
     tree_.primitives.resize(used), tree_.duplicates = used > n;
-    writer.finish();
+    line_up(0, 0);
     phase.ends("splits");
   }
 
@@ -130,29 +131,45 @@ class SpatialSah {
   }
 
   /// Returns the number of references in the subtree's leaves.
-  std::size_t recurse(const Range& range, std::uint32_t index, sah::TreeWriter::Pool& pool) {
+  std::size_t recurse(const Range& range, std::uint32_t index, sah::TreeWriter::Share& share) {
     if (range.size() <= leaf_width_) {
       const sah::Reference* r = references_[range.side].data();
-      writer_->leaf(index, range.bounds.boxes, r + range.begin, r + range.end, range.room_begin);
+      writer_->leaf(index, range.bounds.boxes, r + range.begin, r + range.end, range.room_begin, references_[0].data() + range.room_begin);
       return range.size();
     }
     Range left, right;
     split(range, left, right);
-    const std::uint32_t first = writer_->take_pair(pool);
+    const std::uint32_t first = writer_->take_pair(share);
     std::size_t left_count = 0, right_count = 0;
     if (left.size() > sah::kParallel && right.size() > sah::kParallel) {
       tbb::parallel_invoke(
           [&] {
-            sah::TreeWriter::Pool own;
+            sah::TreeWriter::Share own;
             left_count = recurse(left, first, own);
           },
-          [&] { right_count = recurse(right, first + 1, pool); });
+          [&] { right_count = recurse(right, first + 1, share); });
     } else {
-      left_count = recurse(left, first, pool);
-      right_count = recurse(right, first + 1, pool);
+      left_count = recurse(left, first, share);
+      right_count = recurse(right, first + 1, share);
     }
     writer_->node(index, range.bounds.boxes, left_count + right_count, first);
     return left_count + right_count;
+  }
+
+  /// Brings the leaves' ids from where their references began in the first buffer into the tree's primitives, from `begin` on.
+  void line_up(std::uint32_t index, std::uint32_t begin) {
+    const BinaryNode& node = tree_.nodes[index];
+    if (node.is_leaf()) {
+      std::memcpy(tree_.primitives.data() + begin, references_[0].data() + tree_.first[index], node.count * sizeof(std::uint32_t));
+      tree_.first[index] = begin;
+      return;
+    }
+    const std::uint32_t right = begin + tree_.nodes[node.left].count;
+    if (node.count > sah::kParallel) {
+      tbb::parallel_invoke([&] { line_up(node.left, begin); }, [&] { line_up(node.left + 1, right); });
+    } else {
+      line_up(node.left, begin), line_up(node.left + 1, right);
+    }
   }
 
   const TriangleMesh& mesh_;
