@@ -27,6 +27,7 @@
 // the nearest candidate of a block is certainly hit, and its interval lies before all others: it is taken where the filter stands.
 #pragma once
 
+#include "core/exact/hit_arithmetic.h"
 #include "intersectors/leaf_block.h"
 #include "intersectors/round_later.h"
 #include "intersectors/sheared_ray.h"

@@ -1,6 +1,6 @@
 // Havel and Herout (IEEE TVCG 16(3) 2010): three planes a triangle, computed with the tree. With the triangle's plane n0.p = d0,
 // det = n0.d and t' = d0 - n0.o give t = t' / det and the hit point times det, D = det o + t' d; the other planes of D are u and v times det.
-// Nothing is divided but the t of a hit. 48 bytes a triangle. Ours scales the first plane by a power of two (structures/leaves/precomputed.h).
+// Nothing is divided but the t of a hit. 48 bytes a triangle. Ours scales the first plane by a power of two (intersectors/precomputed.h).
 //
 // Leaks along edges and vertices, more than any other here, since u and v of D cancel the products with det; t is off by no more than
 // 2^-21 (|o| + |v0| + |t d|) / (|N.d| / |N|max), sums of absolute components meant. Precise near the origin alone.

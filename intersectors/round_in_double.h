@@ -2,6 +2,7 @@
 // with pairs of doubles for machines without AVX. The same operations in the same order here, so the same bits.
 #pragma once
 
+#include "core/exact/hit_arithmetic.h"
 #include "intersectors/leaf_block.h"
 
 namespace arboretum {

@@ -2,6 +2,7 @@
 // lane that wins.
 #pragma once
 
+#include "intersectors/blocks.h"
 #include "simd/simd.h"
 
 namespace arboretum {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/error.h"
+#include "intersectors/blocks.h"
 #include "oracle/oracle.h"
 #include "structures/accel.h"
-#include "structures/leaves/blocks.h"
 #include "structures/leaves/leaf_form.h"
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"

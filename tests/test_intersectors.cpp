@@ -7,8 +7,8 @@
 
 #include "core/exact/exact_predicate.h"
 #include "intersectors/leaf_tests.h"
+#include "intersectors/precomputed.h"
 #include "structures/leaves/leaf_form.h"
-#include "structures/leaves/precomputed.h"
 #include "tests/catch.h"
 #include "tests/small_meshes.h"
 

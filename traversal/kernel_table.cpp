@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "core/error.h"
-#include "structures/leaves/blocks.h"
+#include "intersectors/blocks.h"
 #include "structures/leaves/leaf_form.h"
 #include "structures/registry.h"
 

@@ -34,11 +34,13 @@ class BinnedSah {
       sah::TreeWriter::Share share;
       MeteredVector<sah::Reference> references;
     };
-    tbb::enumerable_thread_specific<Workspace> workspaces([n] { return Workspace{{}, MeteredVector<sah::Reference>(std::min(n, sah::kParallel))}; });
+    // By the place that a thread has in the arena: there may be more threads in the course of time, but no two at once have the same one.
+    std::vector<Workspace> workspaces(std::size_t(tbb::this_task_arena::max_concurrency()));
     const auto begin_of = [this](const Subtree& subtree) { return std::size_t(subtree.range.references - references_.data()); };
     tbb::parallel_for(std::size_t{0}, set_aside_.size(), [&](std::size_t i) {
       const auto& [range, node] = set_aside_[i];
-      Workspace& mine = workspaces.local();
+      Workspace& mine = workspaces[std::size_t(tbb::this_task_arena::current_thread_index())];
+      if (mine.references.empty()) mine.references.resize(std::min(n, sah::kParallel));
       const std::size_t begin = begin_of(set_aside_[i]), id_bytes = range.size * sizeof(std::uint32_t);
       recurse(range, mine.references.data(), {begin, reinterpret_cast<std::byte*>(range.references)}, node, mine.share);
       references_.give_back(begin + (id_bytes + sizeof(sah::Reference) - 1) / sizeof(sah::Reference), begin + range.size);

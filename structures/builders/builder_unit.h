@@ -11,7 +11,6 @@
 #include <vector>
 
 #include <immintrin.h>
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>

@@ -24,7 +24,7 @@ inline constexpr unsigned kGroupsInTurn = 8;
 template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
 class Stream {
  public:
-  /// 1 to 2^32 - 1 rays.
+  /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
       : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
         order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * stack_entries_), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
@@ -295,8 +295,11 @@ struct StreamFunctions {
   }
   template <class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
   static ARBORETUM_INLINE void trace(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
-    if (rays.size() == 0) return;
-    Streams<N, Leaves, Padded, AnyHit, Counting>(static_cast<const bvh::Bvh<N>&>(a), row, rays, Counting(counters)).run(report);
+    constexpr std::size_t kAtOnce = std::size_t{1} << 31;  // a group numbers its rays in 32 bits
+    for (std::size_t begin = 0; begin < rays.size(); begin += kAtOnce) {
+      Streams<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row, rays.part(begin, std::min(kAtOnce, rays.size() - begin)), Counting(counters));
+      stream.run([&](std::size_t i, const NearestHit& best) { report(begin + i, best); });
+    }
     if constexpr (Counting::kCounting) counters->rays += rays.size();
   }
 };

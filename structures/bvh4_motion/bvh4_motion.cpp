@@ -23,9 +23,9 @@
 #include "core/memory_meter.h"
 #include "core/rounding.h"
 #include "core/timer.h"
+#include "intersectors/blocks.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
-#include "structures/leaves/blocks.h"
 
 namespace arboretum::bvh4_motion {
 namespace {

@@ -8,10 +8,10 @@
 #include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
+#include "intersectors/blocks.h"
 #include "structures/archive.h"
 #include "structures/kdtree/builders.h"
 #include "structures/kdtree/emit.h"
-#include "structures/leaves/blocks.h"
 
 namespace arboretum::kdtree {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <emmintrin.h>
 
+#include "intersectors/blocks.h"
 #include "structures/builders/box4.h"
-#include "structures/leaves/blocks.h"
 
 namespace arboretum {
 

@@ -14,7 +14,7 @@
 #include "core/arena.h"
 #include "core/memory_meter.h"
 #include "core/mesh.h"
-#include "structures/leaves/blocks.h"
+#include "intersectors/blocks.h"
 
 namespace arboretum {
 

@@ -7,9 +7,9 @@
 #include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
+#include "intersectors/blocks.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
-#include "structures/leaves/blocks.h"
 
 namespace arboretum::two_level {
 namespace {

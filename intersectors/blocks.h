@@ -4,7 +4,7 @@
 // triangleMv (VertexBlock): the three vertices as they are, what the crack-free intersectors need.
 // triangleMi (IndexBlock):  the indices of the three vertices in the mesh: 16 bytes a triangle instead of 40, one look-up more.
 // triangleMw (TransformBlock), triangleMh (PlaneBlock), triangleMp (ProjectionBlock): what baldwin_weber, havel_herout and wald_projection
-//   precompute (structures/leaves/precomputed.h), 48, 48 and 40 bytes a triangle beside the id.
+//   precompute (intersectors/precomputed.h), 48, 48 and 40 bytes a triangle beside the id.
 // A lane without a triangle, or with one of exactly zero area, holds NaN coordinates (every comparison false: never hit); without a triangle its
 // id is kNoPrimitive. Among indices an empty lane repeats the block's first triangle, id included, which changes no answer.
 #pragma once
@@ -22,7 +22,7 @@
 #include "core/ray.h"
 #include "core/type_list.h"
 #include "core/zero_area.h"
-#include "structures/leaves/precomputed.h"
+#include "intersectors/precomputed.h"
 
 namespace arboretum {
 

@@ -1,4 +1,4 @@
-#include "structures/leaves/precomputed.h"
+#include "intersectors/precomputed.h"
 
 #include <algorithm>
 #include <cmath>
