@@ -73,9 +73,9 @@ class Verify {
 
   // Cells.
 
-  void make_cells(const SceneChoice& scene, std::size_t triangles) {
+  void make_cells(const SceneChoice& scene, std::size_t triangles, bool instances = false) {
     plan_ = make_verify_plan(command_, scene, subject_ == Subject::scene && triangles > kBruteForceTriangles, registry_);
-    for (const Cell& cell : plan_.cells) cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box), {}, {}});
+    for (const Cell& cell : plan_.cells) cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box, instances), {}, {}});
   }
 
   ExitStatus nothing() const {
@@ -91,7 +91,7 @@ class Verify {
     const SceneChoice choice = scene_of_word(command_.subject);
     const Scene loaded = load_scene(choice.spec);
     const TriangleMesh& mesh = loaded.mesh;
-    make_cells(choice, mesh.size());
+    make_cells(choice, mesh.size(), mesh.instancing != nullptr);
     if (cells_.empty()) return;
     variants_.clear();
     for (double offset : command_.offsets.empty() ? std::vector<double>{0.0} : command_.offsets)

@@ -43,7 +43,7 @@ std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j,
 class Judge {
  public:
   Judge(const Cell& cell, const VerifyBatch& batch)
-      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box)), largest_(largest_coordinate(batch.mesh.bounds())) {}
+      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box, batch.mesh.instancing != nullptr)), largest_(largest_coordinate(batch.mesh.bounds())) {}
 
   void operator()(std::size_t i, const Hit& answer, AnyAnswer any, const Hit* reference, std::vector<VerifyTally>& tallies) const {
     const Ray& ray = batch_.rays.rays[i];

@@ -61,7 +61,7 @@ struct BoxRays : LaneRays {
         Box::template constants<false>(o[a], d[a], largest, F(max_coordinate), rs, fs, gs);
       }
       rs.store(r[a] + k), fs.store(near[a] + k), gs.store(far[a] + k);
-      overflows = overflows | Box::overflows(fs, gs);
+      overflows = overflows | Box::overflows(d[a], rs, fs, gs);
     }
     overflown |= std::uint64_t(overflows.bits()) << k;
   }

@@ -45,7 +45,7 @@ struct BoxRay {
     F rs, fs, gs;
     constants<Padded>(o, d, F(largest(ray.direction)), F(max_coordinate), rs, fs, gs);
     r = axes(rs), f = axes(fs), g = axes(gs);
-    if (__builtin_expect((overflows(fs, gs).bits() & 7u) != 0, 0)) leave_out(r.x, f.x, g.x), leave_out(r.y, f.y, g.y), leave_out(r.z, f.z, g.z);
+    if (__builtin_expect((overflows(d, rs, fs, gs).bits() & 7u) != 0, 0)) leave_out(ray.direction.x, r.x, f.x, g.x), leave_out(ray.direction.y, r.y, f.y, g.y), leave_out(ray.direction.z, r.z, f.z, g.z);
     octant = sign_mask(rs) & 7u;
   }
   /// Of constants that are known: those of such a BoxRay.
@@ -67,7 +67,7 @@ struct BoxRay {
       if (__builtin_expect(any(tiny), 0)) r = select(tiny, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       f = g = o * r;
       if constexpr (Pad) {
-        const F e = F(0x1p-21f) * (max_coordinate + abs(o)) * abs(r) + F(0x1p-100f);
+        const F e = F(0x1p-21f) * ((max_coordinate + abs(o)) * abs(r)) + F(0x1p-100f);  // in this order: 2^-21 of a tiny scene may be nothing
         f = f + e, g = g - e;
       }
     } else {
@@ -79,10 +79,15 @@ struct BoxRay {
       }
     }
   }
-  /// Where such constants are too large, or NaN, and must be mended.
+  /// Where the constants of such directions are too large, or NaN, and must be mended; so is an infinite reciprocal of anything but 0.
   template <class F>
-  static ARBORETUM_INLINE auto overflows(F f, F g) {
-    return ~(abs(f) + abs(g) < F(kTooLarge));
+  static ARBORETUM_INLINE auto overflows(F d, F r, F f, F g) {
+    const auto too_large = ~(abs(f) + abs(g) < F(kTooLarge));
+    if constexpr (kHasFma) {
+      return too_large;  // r is part of f
+    } else {
+      return too_large | ((abs(r) == F(std::numeric_limits<float>::infinity())) & (d != F(0.0f)));
+    }
   }
 
  private:
@@ -97,8 +102,9 @@ struct BoxRay {
   }
   /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN. Its interval becomes
   /// all t for boxes that exist, and stays empty for others.
-  static void leave_out(float& r, float& f, float& g) {
-    if (__builtin_fabsf(f) + __builtin_fabsf(g) < kTooLarge) return;
+  static void leave_out(float d, float& r, float& f, float& g) {
+    const bool infinite = !kHasFma && __builtin_fabsf(r) == std::numeric_limits<float>::infinity() && d != 0.0f;
+    if (!infinite && __builtin_fabsf(f) + __builtin_fabsf(g) < kTooLarge) return;
     constexpr float largest = std::numeric_limits<float>::max();
     r = __builtin_copysignf(1.0f, r);
     f = kHasFma ? largest : __builtin_copysignf(largest, r);

@@ -87,6 +87,7 @@ class ObjectSplit {
   ObjectSplit(const Reference* r, const Reference* end, const Box& centroids, unsigned max_bins, unsigned leaf_width)
       : r_(r), end_(end), map_(centroids, std::size_t(end - r), max_bins) {
     const std::size_t n = std::size_t(end - r);
+    if (!map_.finite) return;
     if (n <= kLarge) {
       Bins bins;
       bin(r, end, map_, bins);
@@ -97,7 +98,7 @@ class ObjectSplit {
       choose(total[0], leaf_width);
     }
   }
-  /// False where all centroids fall into one bin.
+  /// False where all centroids fall into one bin, or some are beyond float.
   [[nodiscard]] bool exists() const { return split_.axis >= 0; }
   [[nodiscard]] float cost() const { return split_.cost; }
   [[nodiscard]] std::size_t left_count() const { return split_.left_count; }

@@ -89,11 +89,13 @@ inline float lane_of(vf<4> v, int lane) {
 struct BinMap {
   vf<4> lower, scale;
   unsigned bins;
+  bool finite;  ///< else there are centroids, or distances between them, beyond float, and no bins for them
   BinMap(Box centroids, std::size_t n, unsigned max_bins) {
     bins = std::min(max_bins, n < 32 ? 8u : n < 512 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
     if (n > kLarge) bins = std::min(8 * bins, kManyBins);
     const vf<4> low = -low_half(centroids), extent = high_half(centroids) - low;
     lower = low;
+    finite = ((extent < vf<4>(std::numeric_limits<float>::infinity())).bits() & 7u) == 7u;
     // A flat axis, or one whose scale would overflow, gets scale 0: all in bin 0, and no split there.
     scale = select(extent > vf<4>(kFlat), vf<4>(float(bins) * 0.9999f) / extent, vf<4>(0.0f));
   }

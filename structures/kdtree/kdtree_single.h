@@ -47,7 +47,7 @@ struct KdRay {
       r = select(parallel, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       share = select(parallel, F(kPad), share), least = select(parallel, F(0x1p-100f), least);
     }
-    const F at = o * r, e = share * (F(max_coordinate) + abs(o)) * abs(r) + least;
+    const F at = o * r, e = share * ((F(max_coordinate) + abs(o)) * abs(r)) + least;
     enter = at + e, leave = at - e;
     const auto fits = abs(enter) + abs(leave) < F(kTooLarge);
     if (__builtin_expect(any(~fits), 0)) {

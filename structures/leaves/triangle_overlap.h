@@ -5,9 +5,11 @@
 //
 // Arithmetic is double on float32 inputs. A caller inflates its boxes by a pad well above 2^-45 of the
 // largest coordinate; then no triangle that touches the box itself is lost to rounding, degenerate triangles
-// included.
+// and needles included, whose normals may be all rounding: an edge leaves all three corners inside, and the plane is
+// as thick as the normal is uncertain.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -24,9 +26,14 @@ class TriangleOverlap {
     double edge[3][3];
     for (int i = 0; i < 3; ++i)
       for (int axis = 0; axis < 3; ++axis) edge[i][axis] = v[(i + 1) % 3][axis] - v[i][axis];
+    // A component of the normal is off by less than 2^-51 of the sum of its two products' sizes, at most a box's or a corner's coordinate from the corner that
+    // the plane goes through: the corners' largest counts twice in the plane's own thickness, what a box reaches beyond it in touches().
     for (int k = 0; k < 3; ++k) {
       const int p = (k + 1) % 3, q = (k + 2) % 3;
-      normal_[k] = edge[0][p] * edge[1][q] - edge[0][q] * edge[1][p];
+      const double ahead = edge[0][p] * edge[1][q], back = edge[0][q] * edge[1][p], error = 0x1p-50 * (std::abs(ahead) + std::abs(back));
+      normal_[k] = ahead - back;
+      size_[k] = std::abs(normal_[k]) + error;
+      thickness_ += 2.0 * error * std::max({std::abs(v[0][k]), std::abs(v[1][k]), std::abs(v[2][k])});
     }
     plane_ = normal_[0] * v[0][0] + normal_[1] * v[0][1] + normal_[2] * v[0][2];
     for (int k = 0; k < 3; ++k) {
@@ -34,7 +41,8 @@ class TriangleOverlap {
       const double sign = normal_[k] < 0 ? -1.0 : 1.0;
       for (int i = 0; i < 3; ++i) {
         edge_p_[k][i] = -sign * edge[i][q], edge_q_[k][i] = sign * edge[i][p];
-        offset_[k][i] = edge_p_[k][i] * v[i][p] + edge_q_[k][i] * v[i][q];
+        const auto at = [&](int corner) { return edge_p_[k][i] * v[corner][p] + edge_q_[k][i] * v[corner][q]; };
+        offset_[k][i] = std::min({at(0), at(1), at(2)});
       }
     }
   }
@@ -43,8 +51,7 @@ class TriangleOverlap {
   [[nodiscard]] bool touches(const std::array<double, 3>& center,
                              const std::array<double, 3>& half) const noexcept {
     const double distance = normal_[0] * center[0] + normal_[1] * center[1] + normal_[2] * center[2] - plane_;
-    const double reach =
-        std::abs(normal_[0]) * half[0] + std::abs(normal_[1]) * half[1] + std::abs(normal_[2]) * half[2];
+    const double reach = size_[0] * half[0] + size_[1] * half[1] + size_[2] * half[2] + thickness_;
     if (std::abs(distance) > reach) return false;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t p = (k + 1) % 3, q = (k + 2) % 3;
@@ -59,6 +66,7 @@ class TriangleOverlap {
 
  private:
   double normal_[3], plane_;
+  double size_[3], thickness_ = 0.0;  ///< |normal| at most; how far the plane may be off, times |normal|
   double edge_p_[3][3], edge_q_[3][3],
       offset_[3][3];  ///< inward normals of the edges, projected along axis k
 };
