@@ -51,9 +51,9 @@ class CaseReader {
   }
   float number(const Json& value, std::string_view what) const {
     if (value.is_number()) {
-      const double x = value.get<double>();
-      if (std::fabs(x) > std::numeric_limits<float>::max()) fail(fmt::format("{}: {} is beyond float32", what, value.dump()));
-      return static_cast<float>(x);
+      const float x = static_cast<float>(value.get<double>());  // the shortest decimal of a float may lie beyond it, as that of the largest does
+      if (!std::isfinite(x)) fail(fmt::format("{}: {} is beyond float32", what, value.dump()));
+      return x;
     }
     if (value == "inf") return std::numeric_limits<float>::infinity();
     if (value == "-inf") return -std::numeric_limits<float>::infinity();
@@ -95,6 +95,30 @@ class CaseReader {
   std::string id_, where_;
 };
 
+/// The file as JSON. A number beyond double ends the parser's work, so that no CaseReader sees it: it is told here, with the case.
+Json parse(const std::filesystem::path& file, std::istream& stream) {
+  constexpr int kInDocument = 1, kEntry = 2, kInEntry = 3;  // the parser's depths
+  std::size_t number = 1;
+  std::string id, list, key;
+  const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::key && depth == kInDocument) list = parsed;
+    if (event == Json::parse_event_t::key && depth == kInEntry) key = parsed;
+    if (event == Json::parse_event_t::value && depth == kInEntry && key == "id" && parsed.is_string()) id = parsed;
+    if (event == Json::parse_event_t::object_end && depth == kEntry) ++number, id.clear(), key.clear();
+    return true;
+  };
+  try {
+    return Json::parse(stream, watch);
+  } catch (const Json::out_of_range& e) {
+    const std::string what = e.what(), place = list == "cases" ? fmt::format(": case {}", id.empty() ? std::to_string(number) : id) : "";
+    const std::size_t quote = what.find('\'');
+    throw UserError(fmt::format("{}{}: {} is beyond float32", file.string(), place,
+                                quote == std::string::npos ? "a number" : what.substr(quote + 1, what.rfind('\'') - quote - 1)));
+  } catch (const Json::exception& e) {
+    throw UserError(fmt::format("{}: no JSON: {}", file.string(), e.what()));
+  }
+}
+
 /// The shortest decimal that is read back as the same float32.
 std::string decimal(float x) {
   if (std::isnan(x)) return "\"nan\"";
@@ -110,12 +134,7 @@ std::string decimal(Vec3f p) {
 std::vector<VerifyCase> read_case_file(const std::filesystem::path& file) {
   std::ifstream stream(file);
   if (!stream) throw UserError(fmt::format("{}: no such file, or it cannot be read", file.string()));
-  Json document;
-  try {
-    document = Json::parse(stream);
-  } catch (const Json::parse_error& e) {
-    throw UserError(fmt::format("{}: no JSON: {}", file.string(), e.what()));
-  }
+  const Json document = parse(file, stream);
   if (!document.is_object() || !document.contains("cases") || !document["cases"].is_array() || document["cases"].empty())
     throw UserError(fmt::format("{}: holds no {{\"cases\": [...]}}; docs/command-line.md shows the format", file.string()));
   std::vector<VerifyCase> cases;

@@ -408,6 +408,11 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
        "exact arithmetic finds a hit"},
       {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1], "t": 2}]})",
        "exact arithmetic finds 1"},
+      {R"({"cases": [{"id": "q", "triangles": [[[3.4028236e38,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1]}]})",
+       "case q: triangles: 3.4028236e+38 is beyond float32"},
+      {R"({"cases": [{"id": "p", "triangles": []}, {"id": "q", "triangles": [[[1e400,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1]}]})",
+       ".json: case q: 1e400 is beyond float32"},
+      {R"({"cases": [{"origin": [0,0,-1e999]}]})", ".json: case 1: -1e999 is beyond float32"},
   };
   for (const auto& fault : faults) {
     INFO(fault.text);
@@ -416,9 +421,10 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
     INFO(error);
     CHECK(error.find(fault.error) != std::string::npos);
   }
-  // What is written is read back.
+  // What is written is read back, the largest float included, whose shortest decimal lies beyond it.
   TriangleMesh mesh;
   add_triangle(mesh, {0.1f, 1e-30f, 1}, {1, 0, 1}, {0, 16777216, 1});
+  add_triangle(mesh, {std::numeric_limits<float>::max(), 0, 1}, {0, std::numeric_limits<float>::lowest(), 1}, {0x1p-149f, 0, 1});
   const Ray ray{{0.3f, 0.7f, 0}, 0.0f, {0, 0, 1}, 0x1.fp120f};
   const auto path = written("back.json", R"({"cases": [)" + case_json("back", "why", mesh, ray) + "]}");
   const VerifyCase back = read_case_file(path).front();
