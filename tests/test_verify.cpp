@@ -413,6 +413,9 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
       {R"({"cases": [{"id": "p", "triangles": []}, {"id": "q", "triangles": [[[1e400,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1]}]})",
        ".json: case q: 1e400 is beyond float32"},
       {R"({"cases": [{"origin": [0,0,-1e999]}]})", ".json: case 1: -1e999 is beyond float32"},
+      {R"({"cases": [{"id": 5}]})", "case 1: id must be a string, not 5"},
+      {R"({"cases": [{"id": "q", "tneer": 5}]})", "case q: unknown key 'tneer'; did you mean 'tnear'?"},
+      {R"({"cases": [{"id": "q", "hitt": false}]})", "case q: unknown key 'hitt'; did you mean 'hit'?"},
   };
   for (const auto& fault : faults) {
     INFO(fault.text);
@@ -421,6 +424,41 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
     INFO(error);
     CHECK(error.find(fault.error) != std::string::npos);
   }
+  // Each part of a wrong answer is told, whatever is given beside it: of two triangles at t = 1 and one behind them, and of a miss.
+  const std::string three = R"({"cases": [{"id": "q", "triangles": [[["nan",0,1],[0,0,1],[0,0,1]],[[0,0,1],[1,0,1],[0,1,1]],[[0,0,2],[1,0,2],[0,1,2]],[[0,0,1],[1,0,1],[0,1,1]]], )"
+                            R"("direction": [0,0,1], "origin": )";
+  const std::string hit = three + "[0.25,0.25,0], ", miss = three + "[5,0,0], ";
+  const struct {
+    const std::string& base;
+    const char* answer;
+    const char* error;  ///< empty: a right answer
+  } answers[] = {
+      {hit, R"("hit": true, "t": 1.0, "nearest_ids": [1,3], "closed_hits": 3)", ""},
+      {hit, R"("nearest_ids": [3,1])", ""},
+      {hit, R"("hit": true, "nearest_ids": [1])", "nearest_ids is [1], but exact arithmetic finds [1,3]"},
+      {hit, R"("nearest_ids": [1,2,3])", "exact arithmetic finds [1,3]"},
+      {hit, R"("nearest_ids": [])", "exact arithmetic finds [1,3]"},
+      {hit, R"("t": null)", "t is null, but exact arithmetic finds 1"},
+      {hit, R"("closed_hits": 2)", "exact arithmetic finds 3"},
+      {hit, R"("hit": "no")", "hit must be true or false, not \"no\""},
+      {hit, R"("nearest_ids": 0)", "nearest_ids must be a list of whole numbers, not 0"},
+      {hit, R"("nearest_ids": [1,-3])", "nearest_ids must be a list of whole numbers"},
+      {hit, R"("t": "inf")", "t must be a number, or null for a miss, not \"inf\""},
+      {hit, R"("closed_hits": 1.5)", "closed_hits must be a whole number, not 1.5"},
+      {miss, R"("hit": false, "t": null, "nearest_ids": [], "closed_hits": 0)", ""},
+      {miss, R"("hit": false, "t": 3)", "t is 3, but exact arithmetic finds a miss"},
+      {miss, R"("t": 3)", "t is 3, but exact arithmetic finds a miss"},
+      {miss, R"("hit": false, "nearest_ids": [0])", "nearest_ids is [0], but exact arithmetic finds []"},
+      {miss, R"("hit": true)", "exact arithmetic finds a miss"},
+  };
+  for (const auto& a : answers) {
+    INFO(a.answer);
+    std::string error;
+    CHECK(status_of(a.base + a.answer + "}]}", &error) == (*a.error ? 2 : 0));
+    INFO(error);
+    CHECK((*a.error ? error.find(a.error) != std::string::npos : error.empty()));
+  }
+  CHECK(read_case_file(kSource / "tests/hard_cases.json").size() == 96);
   // What is written is read back, the largest float included, whose shortest decimal lies beyond it.
   TriangleMesh mesh;
   add_triangle(mesh, {0.1f, 1e-30f, 1}, {1, 0, 1}, {0, 16777216, 1});
