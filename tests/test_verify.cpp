@@ -458,6 +458,23 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
     INFO(error);
     CHECK((*a.error ? error.find(a.error) != std::string::npos : error.empty()));
   }
+  // tnear below 0: where 0 would have the same answer.
+  const std::string wall = R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "direction": [0,0,1], "tnear": )";
+  const std::string refused = "case q: tnear -10 is below 0 and something lies there";
+  std::string error;
+  CHECK(status_of(wall + R"(-10, "origin": [0.25,0.25,0], "hit": true})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"(-10, "origin": [0.25,0.25,1], "hit": true})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"("-inf", "origin": [0.25,0.25,0], "hit": true})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"(-10, "tfar": -5, "origin": [0.25,0.25,4], "hit": false})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"(-10, "tfar": -5, "origin": [0.25,0.25,7]})" + "]}", &error) == 2);
+  CHECK(error.find(refused) != std::string::npos);
+  CHECK(status_of(wall + R"(-10, "origin": [0.25,0.25,4], "hit": true, "t": -3})" + "]}", &error) == 2);
+  CHECK(error.find(refused) != std::string::npos);
+  CHECK(error.find('\n') == std::string::npos);
+  VerifyCase behind;
+  add_triangle(behind.mesh, {0, 0, 1}, {1, 0, 1}, {0, 1, 1});
+  behind.ray = {{0.25f, 0.25f, 0}, -10.0f, {0, 0, 1}, 2.0f};
+  for (std::uint64_t i = 0; i < 20; ++i) CHECK(mutated_subject(behind.mesh, behind.ray, 1, i, 1).rays.rays[0].tnear == 0);
   CHECK(read_case_file(kSource / "tests/hard_cases.json").size() == 96);
   // What is written is read back, the largest float included, whose shortest decimal lies beyond it.
   TriangleMesh mesh;
