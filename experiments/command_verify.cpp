@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "core/instances.h"
 #include "core/names.h"
 #include "core/timer.h"
 #include "experiments/append_file.h"
@@ -97,6 +98,7 @@ class Verify {
     for (double offset : command_.offsets.empty() ? std::vector<double>{0.0} : command_.offsets)
       for (int exponent : command_.scales.empty() ? std::vector<int>{0} : command_.scales) variants_.push_back({offset, exponent});
     const std::uint64_t rays = command_.rays.value_or(100'000), each = (rays + variants_.size() - 1) / variants_.size();
+    expect_instances_stay(choice.name, mesh);
     title_ = fmt::format("{}: {} triangles", choice.name, mesh.size());
     Progress progress(variants_.size(), variants_.size() * each);
     for (std::size_t v = 0; v < variants_.size(); ++v) {
@@ -110,6 +112,15 @@ class Verify {
       trace(placed, v, each, progress, name);
       progress.cell_done(name, fmt::format("{} rays on {} cells in {}", each, cells_.size(), format_duration(wall_seconds() - begin)));
     }
+  }
+
+  /// moved_and_scaled() leaves instances out, and two_level would then be verified on one: an answer about something else.
+  void expect_instances_stay(const std::string& name, const TriangleMesh& mesh) const {
+    const bool moves = std::ranges::any_of(variants_, [](const VerifyVariant& v) { return v.offset != 0.0 || v.exponent != 0; });
+    const bool reads = std::ranges::any_of(cells_, [](const VerifiedCell& v) { return v.cell.structure == "two_level"; });
+    if (mesh.instancing && moves && reads)
+      throw UserError(fmt::format("verify: {}: --offset and --scale move its triangles and not its {} instances, which two_level is built over; "
+                                  "leave those out, or two_level by --skip two_level", name, mesh.instancing->instances.size()));
   }
 
   void trace(const TriangleMesh& mesh, std::size_t variant, std::uint64_t rays, Progress& progress, const std::string& name) {

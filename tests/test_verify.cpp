@@ -379,6 +379,25 @@ TEST_CASE("the command's verdicts and words") {
   }
 }
 
+TEST_CASE("a scene of instances is moved only for structures that do not read them") {
+  VerifyCommand command;
+  command.subject = "forest:2000", command.rays = 500, command.axes = {"isa=" + any_isa(), "structure=two_level,bvh8", "intersector=watertight"};
+  CHECK(verify(command).status == 0);
+  command.offsets = {0}, command.scales = {0};
+  CHECK(verify(command).status == 0);
+  command.offsets = {0, 1};
+  const Outcome moved = verify(command);
+  CHECK(moved.status == 2);
+  CHECK(moved.error.find("instances, which two_level is built over") != std::string::npos);
+  CHECK(moved.error.find('\n') == std::string::npos);
+  command.skip = "two_level";
+  CHECK(verify(command).status == 0);
+  command.skip.clear(), command.offsets.clear(), command.scales = {1};
+  CHECK(verify(command).status == 2);
+  command.subject = "sphere:200";
+  CHECK(verify(command).status == 0);
+}
+
 TEST_CASE("cases files: right ones are checked, wrong ones are named") {
   const std::string isa = "isa=" + any_isa();
   const std::string triangles = R"("triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0.25,0.25,0], "direction": [0,0,1])";
