@@ -182,9 +182,14 @@ class Verify {
     return t.wrong() + t.wrong_primitive + t.any_missed + t.any_false;
   }
 
-  /// Random meshes, or mutations of the cases given.
+  /// Random meshes, or mutations of the cases given that have a triangle.
   void random(const std::vector<VerifyCase>* given, std::uint64_t rays) {
-    if (!given) {
+    std::vector<const VerifyCase*> bases;
+    if (given) {
+      for (const VerifyCase& c : *given)
+        if (c.mesh.size() > 0) bases.push_back(&c);
+      if (bases.empty()) return Progress(1, 1).note("no case has a triangle of finite corners to mutate: each goes alone");
+    } else {
       make_cells({.spec = {}, .name = "random"}, 0);
       if (cells_.empty()) return;
     }
@@ -193,8 +198,7 @@ class Verify {
     Progress progress(1, subjects);
     for (std::uint64_t i = 0; i < subjects; ++i) {
       const std::size_t count = std::min<std::uint64_t>(kSubjectRays, rays - i * kSubjectRays);
-      const VerifyCase* base = given ? &(*given)[i % given->size()] : nullptr;
-      if (base && base->mesh.size() == 0) continue;
+      const VerifyCase* base = given ? bases[i % bases.size()] : nullptr;
       const RandomSubject subject =
           base ? mutated_subject(base->mesh, base->ray, command_.seed, i, count) : random_subject(command_.seed, i, count);
       small_subject(subject.mesh, subject.rays, total_rays_, fmt::format("{}-seed{}-{}", base ? base->id : "random", command_.seed, i));

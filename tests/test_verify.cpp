@@ -477,6 +477,19 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
     INFO(error);
     CHECK((*a.error ? error.find(a.error) != std::string::npos : error.empty()));
   }
+  // --rays: in all, the cases among them; no more than the cases where none can be mutated.
+  const auto rays_of = [&](const std::string& text, std::uint64_t rays) {
+    const auto file = written("rays.json", text);
+    VerifyCommand more = command;
+    more.subject = file.string(), more.rays = rays;
+    const std::string out = verify(more).out;
+    std::filesystem::remove(file);
+    return out.substr(0, out.find('\n'));
+  };
+  const std::string flat = R"("triangles": [[["nan",0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1])";
+  const std::string none = R"({"cases": [{"id": "a", )" + flat + R"(}, {"id": "b", )" + flat + "}]}", one = R"({"cases": [{"id": "a", )" + flat + "}, {" + triangles + "}]}";
+  CHECK(rays_of(none, 100).find("2 cases, 2 rays") != std::string::npos);
+  CHECK(rays_of(one, 100).find("2 cases and 2 random meshes, 100 rays") != std::string::npos);
   // tnear below 0: where 0 would have the same answer.
   const std::string wall = R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "direction": [0,0,1], "tnear": )";
   const std::string refused = "case q: tnear -10 is below 0 and something lies there";
