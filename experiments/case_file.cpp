@@ -12,11 +12,36 @@
 
 #include "core/error.h"
 #include "core/exact/exact_predicate.h"
+#include "core/names.h"
 
 namespace arboretum {
 namespace {
 
 using Json = nlohmann::json;
+
+/// Of all triangles, one by one.
+struct ExactAnswer {
+  std::vector<std::uint32_t> nearest;  ///< all that share the nearest t, ascending
+  double t = std::numeric_limits<double>::infinity();
+  std::size_t closed_hits = 0;
+  [[nodiscard]] bool hit() const { return !nearest.empty(); }
+};
+
+ExactAnswer exact_answer(const TriangleMesh& mesh, const Ray& ray) {
+  ExactAnswer answer;
+  if (!is_valid(ray)) return answer;
+  ExactPredicate predicate(ray);
+  for (std::uint32_t i = 0; i < mesh.size(); ++i) {
+    Enclosure t;
+    if (!predicate.meets(mesh.corners(i), t)) continue;
+    ++answer.closed_hits;
+    const int order = answer.hit() ? predicate.compare_t(mesh.corners(i), mesh.corners(answer.nearest[0])) : -1;
+    if (order < 0) answer.nearest.clear();
+    if (order <= 0) answer.nearest.push_back(i);
+  }
+  if (answer.hit()) answer.t = predicate.round(mesh.corners(answer.nearest[0])).t;
+  return answer;
+}
 
 /// Reads one case; every error names the file and the case.
 class CaseReader {
@@ -31,14 +56,17 @@ class CaseReader {
   VerifyCase read() {
     VerifyCase c;
     c.id = id_;
-    if (entry_.contains("why") && entry_["why"].is_string()) c.why = entry_["why"];
+    expect_known_keys();
+    if (entry_.contains("why")) c.why = entry_["why"];
     const Json& triangles = member("triangles");
     if (!triangles.is_array() || triangles.empty()) fail("triangles must be a list of [[x, y, z], [x, y, z], [x, y, z]]");
     for (std::uint32_t i = 0; i < triangles.size(); ++i) add_triangle(c, i, triangles[i]);
     c.ray.origin = point(member("origin"), "origin"), c.ray.direction = point(member("direction"), "direction");
     if (entry_.contains("tnear")) c.ray.tnear = number(entry_["tnear"], "tnear");
     if (entry_.contains("tfar")) c.ray.tfar = number(entry_["tfar"], "tfar");
-    expect_truth(c);
+    const ExactAnswer truth = exact_answer(c.mesh, c.ray);
+    expect_nothing_below_zero(c, truth);
+    expect_truth(c, truth);
     return c;
   }
 
@@ -51,9 +79,9 @@ class CaseReader {
   }
   float number(const Json& value, std::string_view what) const {
     if (value.is_number()) {
-      const double x = value.get<double>();
-      if (std::fabs(x) > std::numeric_limits<float>::max()) fail(fmt::format("{}: {} is beyond float32", what, value.dump()));
-      return static_cast<float>(x);
+      const float x = static_cast<float>(value.get<double>());  // the shortest decimal of a float may lie beyond it, as that of the largest does
+      if (!std::isfinite(x)) fail(fmt::format("{}: {} is beyond float32", what, value.dump()));
+      return x;
     }
     if (value == "inf") return std::numeric_limits<float>::infinity();
     if (value == "-inf") return -std::numeric_limits<float>::infinity();
@@ -73,27 +101,76 @@ class CaseReader {
     c.mesh.triangles.push_back({first, first + 1, first + 2});
     c.ids.push_back(id);
   }
-  void expect_truth(const VerifyCase& c) const {
-    const ExactHit truth = Oracle(c.mesh).closest_hit({&c.ray, 1}).front();
-    const bool hit = truth.hit.is_hit();
-    if (entry_.contains("hit") && entry_["hit"].is_boolean() && entry_["hit"] != hit)
-      fail(fmt::format("hit is {}, but exact arithmetic finds a {}; correct the file", entry_["hit"].dump(), hit ? "hit" : "miss"));
-    if (!hit) return;
-    if (entry_.contains("nearest_ids") && entry_["nearest_ids"].is_array()) {
-      const std::uint32_t lowest = c.ids[truth.hit.primitive];
-      if (entry_["nearest_ids"].empty() || entry_["nearest_ids"][0] != lowest)
-        fail(fmt::format("nearest_ids begins not with {}, which exact arithmetic finds; correct the file", lowest));
+  void expect_known_keys() const {
+    static const std::vector<std::string> known{"id",  "triangles", "origin",      "direction",   "tnear", "tfar",
+                                                "hit", "t",         "nearest_ids", "closed_hits", "why",   "source"};
+    for (const auto& [key, value] : entry_.items())
+      if (std::ranges::find(known, key) == known.end()) fail(unknown_name_message("key", key, known));
+    for (const char* name : {"id", "why", "source"})
+      if (entry_.contains(name) && !entry_[name].is_string()) fail(fmt::format("{} must be a string, not {}", name, entry_[name].dump()));
+  }
+  /// A tnear below 0 is no ray's (core/ray.h), and no kernel's answer to it is promised: it may stand where 0 would do.
+  void expect_nothing_below_zero(const VerifyCase& c, const ExactAnswer& truth) const {
+    if (!(c.ray.tnear < 0)) return;
+    Ray ray = c.ray;
+    ray.tnear = 0;
+    if (exact_answer(c.mesh, ray).nearest != truth.nearest)
+      fail(fmt::format("tnear {} is below 0 and something lies there; rays look from their origin on (core/ray.h)", c.ray.tnear));
+  }
+  /// The answer that the file gives must be the exact one, as far as it gives it.
+  void expect_truth(const VerifyCase& c, const ExactAnswer& truth) const {
+    const auto given = [&](const char* name, auto is_of_type, std::string_view type) -> const Json* {
+      if (!entry_.contains(name)) return nullptr;
+      if (!is_of_type(entry_[name])) fail(fmt::format("{} must be {}, not {}", name, type, entry_[name].dump()));
+      return &entry_[name];
+    };
+    const auto expect = [&](const char* name, bool holds, const std::string& found) {
+      if (!holds) fail(fmt::format("{} is {}, but exact arithmetic finds {}; correct the file", name, entry_[name].dump(), found));
+    };
+    const auto is_whole = [](const Json& j) { return j.is_number_unsigned(); };
+    if (const Json* hit = given("hit", [](const Json& j) { return j.is_boolean(); }, "true or false"))
+      expect("hit", *hit == truth.hit(), truth.hit() ? "a hit" : "a miss");
+    if (const Json* t = given("t", [](const Json& j) { return j.is_number() || j.is_null(); }, "a number, or null for a miss")) {
+      const bool holds = truth.hit() ? t->is_number() && std::fabs(t->get<double>() - truth.t) <= std::fabs(truth.t) * 0x1p-48 : t->is_null();
+      expect("t", holds, truth.hit() ? fmt::format("{}", truth.t) : "a miss");
     }
-    if (entry_.contains("t") && entry_["t"].is_number()) {
-      const double t = entry_["t"];
-      if (!(std::fabs(t - truth.t) <= std::fabs(truth.t) * 0x1p-48))
-        fail(fmt::format("t is {}, but exact arithmetic finds {}; correct the file", t, truth.t));
+    const auto is_list = [&](const Json& j) { return j.is_array() && std::ranges::all_of(j, is_whole); };
+    if (const Json* list = given("nearest_ids", is_list, "a list of whole numbers")) {
+      std::set<std::uint64_t> exact;
+      for (std::uint32_t i : truth.nearest) exact.insert(c.ids[i]);
+      expect("nearest_ids", list->get<std::set<std::uint64_t>>() == exact, fmt::format("[{}]", fmt::join(exact, ",")));
     }
+    if (const Json* count = given("closed_hits", is_whole, "a whole number"))
+      expect("closed_hits", *count == truth.closed_hits, std::to_string(truth.closed_hits));
   }
 
   const Json& entry_;
   std::string id_, where_;
 };
+
+/// The file as JSON. A number beyond double ends the parser's work, so that no CaseReader sees it: it is told here, with the case.
+Json parse(const std::filesystem::path& file, std::istream& stream) {
+  constexpr int kInDocument = 1, kEntry = 2, kInEntry = 3;  // the parser's depths
+  std::size_t number = 1;
+  std::string id, list, key;
+  const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::key && depth == kInDocument) list = parsed;
+    if (event == Json::parse_event_t::key && depth == kInEntry) key = parsed;
+    if (event == Json::parse_event_t::value && depth == kInEntry && key == "id" && parsed.is_string()) id = parsed;
+    if (event == Json::parse_event_t::object_end && depth == kEntry) ++number, id.clear(), key.clear();
+    return true;
+  };
+  try {
+    return Json::parse(stream, watch);
+  } catch (const Json::out_of_range& e) {
+    const std::string what = e.what(), place = list == "cases" ? fmt::format(": case {}", id.empty() ? std::to_string(number) : id) : "";
+    const std::size_t quote = what.find('\'');
+    throw UserError(fmt::format("{}{}: {} is beyond float32", file.string(), place,
+                                quote == std::string::npos ? "a number" : what.substr(quote + 1, what.rfind('\'') - quote - 1)));
+  } catch (const Json::exception& e) {
+    throw UserError(fmt::format("{}: no JSON: {}", file.string(), e.what()));
+  }
+}
 
 /// The shortest decimal that is read back as the same float32.
 std::string decimal(float x) {
@@ -110,12 +187,7 @@ std::string decimal(Vec3f p) {
 std::vector<VerifyCase> read_case_file(const std::filesystem::path& file) {
   std::ifstream stream(file);
   if (!stream) throw UserError(fmt::format("{}: no such file, or it cannot be read", file.string()));
-  Json document;
-  try {
-    document = Json::parse(stream);
-  } catch (const Json::parse_error& e) {
-    throw UserError(fmt::format("{}: no JSON: {}", file.string(), e.what()));
-  }
+  const Json document = parse(file, stream);
   if (!document.is_object() || !document.contains("cases") || !document["cases"].is_array() || document["cases"].empty())
     throw UserError(fmt::format("{}: holds no {{\"cases\": [...]}}; docs/command-line.md shows the format", file.string()));
   std::vector<VerifyCase> cases;
@@ -134,22 +206,11 @@ std::string case_json(const std::string& id, const std::string& why, const Trian
     const auto c = mesh.corners(i);
     triangles.push_back(fmt::format("[{},{},{}]", decimal(c[0]), decimal(c[1]), decimal(c[2])));
   }
-  const ExactHit truth = Oracle(mesh).closest_hit({&ray, 1}).front();
-  std::vector<std::uint32_t> nearest;
-  std::size_t closed_hits = 0;
-  if (is_valid(ray)) {
-    ExactPredicate predicate(ray);
-    for (std::uint32_t i = 0; i < mesh.size(); ++i) {
-      Enclosure t;
-      if (!predicate.meets(mesh.corners(i), t)) continue;
-      ++closed_hits;
-      if (predicate.compare_t(mesh.corners(i), mesh.corners(truth.hit.primitive)) == 0) nearest.push_back(i);
-    }
-  }
+  const ExactAnswer truth = exact_answer(mesh, ray);
   return fmt::format(
       R"({{"id":{},"triangles":[{}],"origin":{},"direction":{},"tnear":{},"tfar":{},"hit":{},"t":{},"nearest_ids":[{}],"closed_hits":{},"why":{},"source":"arboretum verify"}})",
       Json(id).dump(), fmt::join(triangles, ","), decimal(ray.origin), decimal(ray.direction), decimal(ray.tnear), decimal(ray.tfar),
-      truth.hit.is_hit(), truth.hit.is_hit() ? fmt::format("{}", truth.t) : "null", fmt::join(nearest, ","), closed_hits, Json(why).dump());
+      truth.hit(), truth.hit() ? fmt::format("{}", truth.t) : "null", fmt::join(truth.nearest, ","), truth.closed_hits, Json(why).dump());
 }
 
 }  // namespace arboretum

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/mesh.h"
-#include "oracle/oracle.h"
+#include "core/ray.h"
 
 namespace arboretum {
 
@@ -19,8 +19,9 @@ struct VerifyCase {
 };
 
 /// Reads `{"cases": [{"id", "triangles": [[[x, y, z] x 3] ...], "origin", "direction", "tnear", "tfar", "hit", "t",
-/// "nearest_ids"} ...]}`; numbers are float32 in decimal, or "inf", "-inf", "nan". tnear is 0 and tfar infinite where they are left
-/// out; hit, t and nearest_ids may be left out, and where they are given must be what exact arithmetic finds. Throws UserError.
+/// "nearest_ids", "closed_hits", "why", "source"} ...]}`; numbers are float32 in decimal, or "inf", "-inf", "nan". tnear is 0 and tfar
+/// infinite where they are left out; hit, t (of a miss null), nearest_ids and closed_hits may be left out, and where they are given
+/// must be what exact arithmetic finds, each by itself. Throws UserError, for a key of another name too.
 [[nodiscard]] std::vector<VerifyCase> read_case_file(const std::filesystem::path& file);
 
 /// A case of the format on one line, with the exact answers filled in.

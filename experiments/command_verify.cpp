@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "core/instances.h"
 #include "core/names.h"
 #include "core/timer.h"
 #include "experiments/append_file.h"
@@ -97,6 +98,7 @@ class Verify {
     for (double offset : command_.offsets.empty() ? std::vector<double>{0.0} : command_.offsets)
       for (int exponent : command_.scales.empty() ? std::vector<int>{0} : command_.scales) variants_.push_back({offset, exponent});
     const std::uint64_t rays = command_.rays.value_or(100'000), each = (rays + variants_.size() - 1) / variants_.size();
+    expect_instances_stay(choice.name, mesh);
     title_ = fmt::format("{}: {} triangles", choice.name, mesh.size());
     Progress progress(variants_.size(), variants_.size() * each);
     for (std::size_t v = 0; v < variants_.size(); ++v) {
@@ -110,6 +112,15 @@ class Verify {
       trace(placed, v, each, progress, name);
       progress.cell_done(name, fmt::format("{} rays on {} cells in {}", each, cells_.size(), format_duration(wall_seconds() - begin)));
     }
+  }
+
+  /// moved_and_scaled() leaves instances out, and two_level would then be verified on one: an answer about something else.
+  void expect_instances_stay(const std::string& name, const TriangleMesh& mesh) const {
+    const bool moves = std::ranges::any_of(variants_, [](const VerifyVariant& v) { return v.offset != 0.0 || v.exponent != 0; });
+    const bool reads = std::ranges::any_of(cells_, [](const VerifiedCell& v) { return v.cell.structure == "two_level"; });
+    if (mesh.instancing && moves && reads)
+      throw UserError(fmt::format("verify: {}: --offset and --scale move its triangles and not its {} instances, which two_level is built over; "
+                                  "leave those out, or two_level by --skip two_level", name, mesh.instancing->instances.size()));
   }
 
   void trace(const TriangleMesh& mesh, std::size_t variant, std::uint64_t rays, Progress& progress, const std::string& name) {
@@ -171,9 +182,14 @@ class Verify {
     return t.wrong() + t.wrong_primitive + t.any_missed + t.any_false;
   }
 
-  /// Random meshes, or mutations of the cases given.
+  /// Random meshes, or mutations of the cases given that have a triangle.
   void random(const std::vector<VerifyCase>* given, std::uint64_t rays) {
-    if (!given) {
+    std::vector<const VerifyCase*> bases;
+    if (given) {
+      for (const VerifyCase& c : *given)
+        if (c.mesh.size() > 0) bases.push_back(&c);
+      if (bases.empty()) return Progress(1, 1).note("no case has a triangle of finite corners to mutate: each goes alone");
+    } else {
       make_cells({.spec = {}, .name = "random"}, 0);
       if (cells_.empty()) return;
     }
@@ -182,8 +198,7 @@ class Verify {
     Progress progress(1, subjects);
     for (std::uint64_t i = 0; i < subjects; ++i) {
       const std::size_t count = std::min<std::uint64_t>(kSubjectRays, rays - i * kSubjectRays);
-      const VerifyCase* base = given ? &(*given)[i % given->size()] : nullptr;
-      if (base && base->mesh.size() == 0) continue;
+      const VerifyCase* base = given ? bases[i % bases.size()] : nullptr;
       const RandomSubject subject =
           base ? mutated_subject(base->mesh, base->ray, command_.seed, i, count) : random_subject(command_.seed, i, count);
       small_subject(subject.mesh, subject.rays, total_rays_, fmt::format("{}-seed{}-{}", base ? base->id : "random", command_.seed, i));

@@ -76,7 +76,7 @@ Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time
   if (!answer.is_hit()) {
     j.missed = true;
   } else {
-    const double difference = double(answer.t) - truth.t, tolerance = kSurfaceTolerance * std::fabs(truth.t);
+    const double difference = double(answer.t) - truth.t, tolerance = surface_tolerance(truth.t);
     j.wrong_surface = !(std::fabs(difference) <= tolerance);  // true for a NaN
     j.wrong_primitive = !is_at_nearest_t(mesh, ray, at, truth, answer.primitive);
     something_behind = difference > tolerance && j.wrong_primitive && is_behind(mesh, ray, at, truth, answer);

@@ -1,6 +1,8 @@
 // The comparison of given answers with the exact ones, ray by ray.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -10,8 +12,11 @@
 
 namespace arboretum {
 
-/// Relative difference of t beyond which a hit is on the wrong surface.
-inline constexpr double kSurfaceTolerance = 0x1p-12;
+/// Difference of t beyond which a hit is on the wrong surface: relative, and not less than the least denormal float, since rounding
+/// moves a t that is no normal number by up to half of that.
+[[nodiscard]] inline double surface_tolerance(double exact_t) noexcept {
+  return std::max(0x1p-12 * std::fabs(exact_t), 0x1p-149);
+}
 
 /// One ray of a batch; `adjacency` as below.
 [[nodiscard]] Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth, const Hit& answer,

@@ -153,6 +153,7 @@ RandomSubject mutated_subject(const TriangleMesh& given, const Ray& given_ray, s
   Dice dice(seed, index);
   TriangleMesh mesh = given;
   Ray ray = given_ray;
+  if (ray.tnear < 0) ray.tnear = 0;  // a case may have it below where nothing lies there; its mutations may have something
   const auto any_float = [&]() -> float& {
     if (dice.below(2)) return mesh.vertices[dice.below(mesh.vertices.size())][dice.below(3)];
     return (dice.below(2) ? ray.origin : ray.direction)[dice.below(3)];

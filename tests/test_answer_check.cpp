@@ -46,6 +46,26 @@ TEST_CASE("right answers pass the check") {
   }
 }
 
+TEST_CASE("a t that is no normal number may be off by its rounding, not by two denormals") {
+  constexpr float least = 0x1p-149f;
+  const struct {
+    float z;  ///< of a wall that a ray of direction (0, 0, 2) meets at half of it
+    float answer;
+    bool wrong;
+  } cases[] = {{3 * least, 2 * least, false}, {3 * least, least, false},     {3 * least, 3 * least, true}, {3 * least, 0, true},
+               {2 * least, least, false},     {2 * least, 2 * least, false}, {2 * least, 3 * least, true}, {0x1p-125f, 0x1p-126f + 0x1p-139f, false},
+               {0x1p-125f, 0x1p-126f + 0x1p-137f, true}};
+  for (const auto& c : cases) {
+    INFO("z " << c.z / least << ", answer " << c.answer / least << " denormals");
+    TriangleMesh mesh;
+    add_triangle(mesh, {-1, -1, c.z}, {1, -1, c.z}, {0, 1, c.z});
+    const Oracle oracle(mesh);
+    const std::vector<Ray> rays{{{0, 0, 0}, 0, {0, 0, 2}, kInf}};
+    const std::vector<Hit> answers{{c.answer, 0, 0, 0}};
+    CHECK(oracle.check_closest_hit(rays, oracle.closest_hit(rays), answers).wrong_surface == c.wrong);
+  }
+}
+
 TEST_CASE("each wrong answer is counted for what it is") {
   TriangleMesh mesh;
   add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1});
