@@ -273,6 +273,26 @@ TEST_CASE("the triangle/box test agrees with clipping the triangle to the box") 
   }
 }
 
+TEST_CASE("a needle is not lost to the rounding of its normal") {
+  std::size_t all_rounding = 0;
+  for (std::uint64_t i = 0; i < 20000; ++i) {
+    const Vec3f tip = uniform_point(31, i, 0, {{-1, -1, -1}, {1, 1, 1}}), end = uniform_point(31, i, 3, {{-1, -1, -1}, {1, 1, 1}}) * std::ldexp(1.0f, -int(i % 3) * 40);
+    const float width = std::ldexp(1.0f, -int(i % 80));
+    std::array<Vec3f, 3> t{tip, end, end + uniform_point(31, i, 6, {{-1, -1, -1}, {1, 1, 1}}) * width};
+    std::ranges::rotate(t, t.begin() + std::ptrdiff_t(i / 3 % 3));
+    const double pad = 0x1p-44 * std::max({double(std::abs(tip.x)), double(std::abs(tip.y)), double(std::abs(tip.z)), double(std::abs(end.x)), double(std::abs(end.y)), double(std::abs(end.z))});
+    const TriangleOverlap overlap(t);
+    all_rounding += width < 0x1p-53f;
+    for (int at = 0; at <= 64; ++at) {  // points of the edge that is long, in boxes of their own
+      const double s = at / 64.0;
+      const std::array<double, 3> p{tip.x + s * (double(end.x) - tip.x), tip.y + s * (double(end.y) - tip.y), tip.z + s * (double(end.z) - tip.z)};
+      INFO("triangle " << i << ", " << at);
+      if (!overlap.touches(p, {pad, pad, pad})) FAIL_CHECK("a point of the triangle is outside");
+    }
+  }
+  CHECK(all_rounding > 5000);
+}
+
 TEST_CASE("a grid's expected steps are what random rays take") {
   const TriangleMesh mesh = random_triangles(20000, 1e-4f, 14);
   const std::span<const KernelRow> rows = kernel_table();
