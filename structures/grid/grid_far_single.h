@@ -73,7 +73,7 @@ class FarWalk {
   Leaf& leaf_;
 };
 
-/// Whether the walk's proof holds for the ray (grid.h).
+/// Whether the walk's proof holds for the ray (grid.h), and its numbers are far from overflowing.
 ARBORETUM_INLINE bool within_walk_bounds(const grid::Grid& grid, const Ray& ray) {
   const grid::Level& outer = grid.levels()[0];
   float away = 0.0f, largest = 0.0f;
@@ -83,7 +83,7 @@ ARBORETUM_INLINE bool within_walk_bounds(const grid::Grid& grid, const Ray& ray)
     largest = d > largest ? d : largest, away = o > away ? o : away;
   }
   const float all = grid.max_coordinate() + 32.0f * grid.reach();
-  return (away <= 16.0f * grid.reach()) && (all <= 0x1p60f * largest) && (grid.pad() >= 0x1p-80f * largest);
+  return (all < 0x1p120f) && (away <= 16.0f * grid.reach()) && (all <= 0x1p60f * largest) && (grid.pad() >= 0x1p-80f * largest);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
