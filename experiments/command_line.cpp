@@ -119,8 +119,8 @@ void declare_render(CLI::App& app, RenderCommand& render) {
   c->add_option("--integrator", render.integrator, "path, whitted, ambient_occlusion, normals (default: path; ambient_occlusion where nothing emits light)");
   c->add_option("--spp", render.settings.samples, "Samples a pixel (default 16)")->check(CLI::Range(1, 65536));
   c->add_option("--resolution", render.resolution, "WIDTHxHEIGHT (default: the camera's, up to 640 a side; else 512x512)");
-  c->add_option("--depth", render.settings.depth, "Scatterings of a path at most (default 32, the most of whitted; 1: direct light)")->check(CLI::Range(0, 4096));
-  c->add_option("--clamp", render.settings.clamp, "Most light that one path brings at once from beyond its first hit: fewer bright specks, some light lost (default: none)")
+  c->add_option("--depth", render.depth, "Scatterings of a path at most (default 32, the most of whitted; 1: direct light)")->check(CLI::Range(0, 4096));
+  c->add_option("--clamp", render.clamp, "Most light that one path brings at once from beyond its first hit: fewer bright specks, some light lost (default: none)")
       ->check(CLI::PositiveNumber);
   c->add_option("--exposure", render.exposure, "auto, or stops: radiance 1 is white at 0 (default auto; of ambient_occlusion and normals 0)");
   c->add_option("--seed", render.settings.seed, "Seed of the random numbers (default 1)")->check(refuse_no_count);

@@ -60,6 +60,14 @@ bool takes_part(EffectKind kind, Integrator integrator) {
   return kind == EffectKind::dof || kind == EffectKind::motion_blur || kind == EffectKind::alpha_cutout || kind == EffectKind::instancing;
 }
 
+/// What is said of paths where none are followed would change nothing.
+void set_paths(const RenderCommand& command, RenderSettings& settings) {
+  if (!draws_light(settings.integrator) && (command.depth || command.clamp))
+    throw UserError(fmt::format("{} has no effect: {} follows no paths{}; take it out, or choose --integrator path", command.depth ? "--depth" : "--clamp",
+                                to_string(settings.integrator), command.integrator.empty() || command.integrator == "auto" ? ", and nothing in the scene emits light" : ""));
+  settings.depth = command.depth.value_or(settings.depth), settings.clamp = command.clamp.value_or(settings.clamp);
+}
+
 /// Without a light in it a scene is black; its shape can be seen all the same.
 Integrator chosen_integrator(const std::string& word, const std::vector<Effect>& effects) {
   if (!word.empty() && word != "auto") return parse_integrator(word);
@@ -174,6 +182,7 @@ ExitStatus command_render(const RenderCommand& command) {
   const std::vector<Effect> effects = effects_of(scene);
   RenderSettings settings = command.settings;
   settings.integrator = chosen_integrator(command.integrator, effects);
+  set_paths(command, settings);
   set_resolution(command.resolution, view_of(scene), settings);
   check(settings);
   if (!command.heat_map.empty()) {

@@ -187,7 +187,8 @@ void add_custom_context(Json& context, const BenchmarkFlags& flags) {
   }
 }
 
-ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord record, const Registry& registry,
+/// `whole`: the plan before the filter. What the folder of a run that is gone on with holds of it stays in the results.
+ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, PlanRecord record, const Registry& registry,
                    const RunCommand& command) {
   const Shard shard = record.shard;
   const std::filesystem::path folder = command.out.empty() ? default_folder(experiment, shard) : command.out;
@@ -202,7 +203,8 @@ ExitStatus measure(const Experiment& experiment, const Plan& plan, PlanRecord re
   if (!command.benchmark.out.empty())
     AppendFile(command.benchmark.out, true);  // cannot be written: say so now
   if (!command.resume) set_aside(folder);
-  Journal journal(folder, hash, plan, command.resume);
+  Journal journal(folder, hash, whole, command.resume);
+  keep_measured(plan, record, whole, journal.done());
   remove_files(folder, present(folder, concluding_files()));
   write_whole(folder / "effective.yaml",
               fmt::format("# configuration hash: {}\n{}{}", hash, shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
@@ -255,6 +257,7 @@ ExitStatus command_run(RunCommand command) {
   const Experiment experiment = read_experiment(command.config, registry, command.overrides);
   Plan plan = make_plan(experiment, registry);
   const auto [filter, skip] = filters_of(command);
+  const Plan whole = plan;
   apply_filter(plan, filter, skip);
   const std::map<std::string, unsigned> shards = split_plan(experiment, plan, shard.of);
   PlanRecord record = record_of(plan, shards, shard);
@@ -269,7 +272,7 @@ ExitStatus command_run(RunCommand command) {
                plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded, plan.filtered);
     return ExitStatus::kNothingMeasured;
   }
-  return measure(experiment, plan, std::move(record), registry, command);
+  return measure(experiment, std::move(plan), whole, std::move(record), registry, command);
 }
 
 }  // namespace arboretum

@@ -66,7 +66,9 @@ struct RenderCommand {
   std::string exposure;          ///< auto or stops; empty: auto, or 0 where what is drawn is no light
   std::string heat_map;          ///< empty, nodes or triangles
   std::string resolution;        ///< WIDTHxHEIGHT; empty: the camera's
-  RenderSettings settings;       ///< but what the words above say
+  std::optional<unsigned> depth; ///< of paths, as `clamp`
+  std::optional<float> clamp;
+  RenderSettings settings;       ///< but what is said above
   KernelChoice kernel;
 };
 

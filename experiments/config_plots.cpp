@@ -16,7 +16,9 @@ constexpr std::string_view kPlots[] = {"rays_per_second", "rays_by_builder", "sa
 constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios", "traversal_ratios"};
 
 bool is_measured(std::string_view plot, const Metrics& m) {
-  if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" || plot == "published_ratios" || plot == "traversal_ratios") return m.trace;
+  if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" || plot == "published_ratios" || plot == "traversal_ratios" ||
+      plot == "self_intersection")  // how rays leave their surface is always checked
+    return m.trace;
   if (plot == "build_time") return m.build;
   if (plot == "sah_cost" || plot == "epo") return m.quality;
   if (plot == "bytes_per_triangle") return m.trace || m.build;

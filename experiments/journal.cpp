@@ -18,7 +18,8 @@ Journal::Journal(std::filesystem::path folder, std::string configuration_hash, c
   const std::filesystem::path cells = folder_ / "cells.jsonl", repetitions = folder_ / "repetitions.jsonl";
   if (resume) {
     std::map<std::string, const Cell*> wanted;
-    for (const Cell& cell : plan.cells) wanted.emplace(cell.name(), &cell);
+    for (const auto* list : {&plan.cells, &plan.elsewhere})
+      for (const Cell& cell : *list) wanted.emplace(cell.name(), &cell);
     for (const auto& path : {cells, repetitions}) {
       for (const std::string& text : read_lines(path)) {
         const Json line = parse(text);

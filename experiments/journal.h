@@ -15,7 +15,7 @@ namespace arboretum {
 
 class Journal {
  public:
-  /// Opens the files in `folder`. With `resume`, takes up what they hold of `plan`; without, starts them
+  /// Opens the files in `folder`. With `resume`, takes up what they hold of `plan`, cells of `elsewhere` too; without, starts them
   /// anew. Throws UserError when the folder holds another configuration's results, or cannot be written.
   Journal(std::filesystem::path folder, std::string configuration_hash, const Plan& plan, bool resume);
 

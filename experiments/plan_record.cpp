@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <set>
 
 #include "core/error.h"
 
@@ -35,6 +36,29 @@ PlanRecord record_of(const Plan& plan, const std::map<std::string, unsigned>& sh
   for (const Cell& cell : plan.cells) record.cells.push_back({cell.name(), shard_of(cell.name()), ""});
   for (const SkippedCell& cell : plan.skipped) record.skipped.push_back({cell.name, shard_of(cell.name), cell.reason});
   return record;
+}
+
+void keep_measured(Plan& plan, PlanRecord& record, const Plan& whole, const std::map<std::string, CellResult>& done) {
+  std::set<std::string> wanted;
+  for (const Cell& cell : plan.cells) wanted.insert(cell.name());
+  std::map<std::string, unsigned> recorded;
+  for (const PlanRecord::Entry& entry : record.cells) recorded.emplace(entry.name, entry.shard);
+  std::vector<Cell> cells;
+  std::vector<PlanRecord::Entry> entries;
+  std::set<std::string> kept;
+  for (const auto* list : {&whole.cells, &whole.elsewhere}) {
+    for (const Cell& cell : *list) {
+      const std::string name = cell.name();
+      const bool now = wanted.contains(name), before = !now && done.contains(name);
+      if (before) kept.insert(name);
+      if (now || before) cells.push_back(cell);
+      if (before || recorded.contains(name)) entries.push_back({name, before ? record.shard.index : recorded.at(name), ""});
+      if (before && !recorded.contains(name) && list == &whole.cells && plan.filtered > 0) --plan.filtered;
+    }
+  }
+  std::erase_if(plan.skipped, [&](const SkippedCell& cell) { return kept.contains(cell.name); });
+  std::erase_if(record.skipped, [&](const PlanRecord::Entry& entry) { return kept.contains(entry.name); });
+  plan.cells = std::move(cells), record.cells = std::move(entries), record.filtered = plan.filtered;
 }
 
 std::string to_text(const PlanRecord& record) {

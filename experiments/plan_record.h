@@ -33,6 +33,10 @@ inline constexpr const char* kPlanFile = "plan.json";
 /// `plan` is whole: not yet one shard alone.
 [[nodiscard]] PlanRecord record_of(const Plan& plan, const std::map<std::string, unsigned>& shards, const Shard& shard);
 
+/// Takes up what a run that is gone on with has measured already and this one, by its filter or on its machine, would not: cells of
+/// `whole`, the plan before the filter, among them those of `elsewhere`. They keep their places in the plan's order.
+void keep_measured(Plan& plan, PlanRecord& record, const Plan& whole, const std::map<std::string, CellResult>& done);
+
 [[nodiscard]] std::string to_text(const PlanRecord& record);
 /// The folder's; std::nullopt where it has none. Throws UserError when it cannot be understood.
 [[nodiscard]] std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder);

@@ -107,7 +107,7 @@ void add_facts(Json& facts, const Counters& c) {
   if (c.lanes > 0)
     facts["simd_utilization"] = static_cast<double>(c.lanes_active) / static_cast<double>(c.lanes);
   const auto share = [](std::uint64_t part, std::uint64_t whole) { return static_cast<double>(part) / static_cast<double>(whole); };
-  if (c.nodes > 0) {
+  if (std::ranges::any_of(c.children_hit, [](std::uint64_t visits) { return visits > 0; })) {  // not every structure's nodes have children that a ray meets: a grid's cells
     Json& children = facts["children_hit"] = Json::array();
     for (std::uint64_t visits : c.children_hit) children.push_back(share(visits, c.nodes));
   }

@@ -68,12 +68,14 @@ def main():
         results = load(arguments.results)
         drawn, default = [], configured(figures.ALL, results.context.get("plots"))
         names = chosen(arguments.only, figures.ALL, default)
+        named = not arguments.only and isinstance(results.context.get("plots"), list)
         for name in names:
             module = importlib.import_module(f"figures.{name}")
             try:
                 style.save(module.draw(results), results.folder, name)
             except NoData as reason:
-                print(f"{name}: left out, {reason}")
+                # `run` hides what is written here to stdout; that a figure which somebody named is not there must be seen.
+                print(f"{name}: left out, {reason}", file=sys.stderr if named and getattr(module, "ONLY_WHEN_NAMED", False) else sys.stdout)
                 drawn.append((name, module, str(reason)))
                 continue
             print(f"{results.folder / name}.png .svg")

@@ -107,7 +107,7 @@ def reproduce(results):
     if isinstance(command, list):
         command = shlex.join(str(c) for c in command)
     revision = context.get("git_revision") or context.get("revision")
-    lines = [f"git checkout {revision}"] if revision else []
+    lines = [f"git checkout {revision}"] if revision and revision != "unknown" else []
     command = str(command or "arboretum run effective.yaml")
     lines.append(f"./{command}" if command.startswith("arboretum ") else command)
     parts.append(f"<pre>{escape(chr(10).join(lines))}</pre>")

@@ -20,8 +20,9 @@ from results import ordered  # noqa: E402
 COLOURS = {  # structures
     "kdtree": "#CC6677", "bvh2": "#88CCEE", "bvh4": "#44AA99", "bvh8": "#332288", "bvh16": "#882255",
     "bvh4_aos": "#AA4499", "grid": "#999933", "octree": "#117733", "brute_force": "#DDCC77", "embree": "#555555",
+    "bvh4_quantised": "#EE8866", "bvh8_quantised": "#6699CC", "bih": "#997700", "two_level": "#004488", "bvh4_motion": "#994455",
 }
-SPARE_COLOURS = ("#6699CC", "#EE8866", "#997700", "#004488", "#994455", "#77AADD")
+SPARE_COLOURS = ("#77AADD", "#BBCC33", "#EE3377", "#99DDFF", "#663333", "#009988")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 DPI = 160
 
@@ -34,9 +35,24 @@ plt.rcParams.update({
 })
 
 
-def colour(structure):
-    """The structure's own colour; one that is new here gets a spare one by its name, the same in every figure."""
-    return COLOURS.get(structure) or SPARE_COLOURS[sum(map(ord, structure)) % len(SPARE_COLOURS)]
+class Palette:
+    """Names that have a colour of their own, and spare colours for those that are new: by the name, so that it is the same in every figure, or the
+    next one free. Two names get the same only where there are more of them than spare colours."""
+
+    def __init__(self, own, spare):
+        self.own, self.spare, self.given = own, spare, {}
+
+    def __call__(self, name):
+        if name in self.own:
+            return self.own[name]
+        if name not in self.given:
+            first = sum(map(ord, name)) % len(self.spare)
+            turns = [self.spare[(first + k) % len(self.spare)] for k in range(len(self.spare))]
+            self.given[name] = next((c for c in turns if c not in self.given.values()), turns[0])
+        return self.given[name]
+
+
+colour = Palette(COLOURS, SPARE_COLOURS)
 
 
 INTERSECTOR_COLOURS = {  # families near each other: crack-free ones green and black, precomputed ones yellow and brown
@@ -46,8 +62,7 @@ INTERSECTOR_COLOURS = {  # families near each other: crack-free ones green and b
 }
 
 
-def intersector_colour(intersector):
-    return INTERSECTOR_COLOURS.get(intersector) or SPARE_COLOURS[sum(map(ord, intersector)) % len(SPARE_COLOURS)]
+intersector_colour = Palette(INTERSECTOR_COLOURS, SPARE_COLOURS)
 
 
 def intersector_legend(intersectors):
@@ -88,12 +103,8 @@ def hatch(structure):
 
 PART_COLOURS = {"nodes": "#332288", "leaves": "#DDCC77", "other": "#AAAAAA", "build": "#4477AA", "collapse": "#CC6677",
                 "reinsertion": "#AA4499", "sort": "#88CCEE", "morton codes": "#44AA99", "clip": "#117733"}
-SPARE_PART_COLOURS = ("#6699CC", "#EE8866", "#997700", "#004488", "#994455", "#77AADD", "#BBCC33", "#99DDFF", "#44BB99", "#FFAABB")
-
-
-def part_colour(name):
-    """Of a phase of a build, a part of the memory: its own, or a spare one by its name."""
-    return PART_COLOURS.get(name) or SPARE_PART_COLOURS[sum(map(ord, name)) % len(SPARE_PART_COLOURS)]
+SPARE_PART_COLOURS = ("#6699CC", "#EE8866", "#997700", "#004488", "#994455", "#BBCC33", "#FFAABB", "#663333", "#009988", "#EE3377")
+part_colour = Palette(PART_COLOURS, SPARE_PART_COLOURS)  # of a phase of a build, a part of the memory
 
 
 def part_legend(names):
@@ -157,6 +168,15 @@ def short(scene, most=24):
     return scene if len(scene) <= most else scene[: most // 2 - 1] + "…" + scene[-most // 2 :]
 
 
+def panel_title(scene, workload, width):
+    """Scene and workload on as many lines as a panel `width` inches wide needs: broken between the two, then before the workload's variant."""
+    most = int(11.5 * width)
+    scene, workload = short(scene), workload.replace("_", " ")
+    if len(f"{scene}, {workload}") <= most:
+        return f"{scene}, {workload}"
+    return f"{scene},\n" + (workload if len(workload) <= most else workload.replace(":", ":\n", 1))
+
+
 def panel_grid(scenes, workloads, width, height, most_columns):
     """A panel for each scene and workload, titled; a scene begins a row. Gives the figure and {(scene, workload): axis}."""
     columns = min(len(workloads), most_columns)
@@ -170,7 +190,7 @@ def panel_grid(scenes, workloads, width, height, most_columns):
                 axis.set_visible(False)
                 continue
             found[scene, workloads[place]] = axis
-            axis.set_title(f"{short(scene)}, {workloads[place].replace('_', ' ')}")
+            axis.set_title(panel_title(scene, workloads[place], width))
     return figure, found
 
 

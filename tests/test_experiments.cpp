@@ -382,3 +382,14 @@ measure: {min_time: 0.125, memory: 512MiB}
         configuration_hash(first));
 }
 
+
+TEST_CASE("the figure of ways to leave a surface is drawn where there are several, whatever the metrics") {
+  const TemporaryFolder folder;
+  const auto drawn = [&](const std::string& ways, const std::string& workload) {
+    const std::string yaml = "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], workload: [" + workload + "]}\nmetrics: [trace]\nrays: {self_intersection: [" + ways + "]}\n";
+    const std::vector<std::string> plots = read_experiment(folder.write("rays.yaml", yaml), paper_registry()).plots;
+    return std::ranges::find(plots, "self_intersection") != plots.end();
+  };
+  CHECK(drawn("error_bound, exclusion", "diffuse"));
+  CHECK_FALSE(drawn("error_bound", "diffuse"));
+}

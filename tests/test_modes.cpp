@@ -299,6 +299,12 @@ TEST_CASE("lanes by depth, switches and queue lengths: packets, hybrids and queu
   CHECK(facts["node_queue_length"] == 4.0);
   CHECK(facts["leaf_queue_length"] == 2.0);
   CHECK_FALSE(facts.contains("packet_share"));
+  Counters cells;  // of a grid, whose nodes have no children that a ray meets
+  cells.rays = 4, cells.nodes = 10;
+  facts = Json();
+  add_facts(facts, cells);
+  CHECK(facts["nodes_per_ray"] == 2.5);
+  CHECK_FALSE(facts.contains("children_hit"));
 }
 
 TEST_CASE("streams and the kd-tree follow their depth too") {

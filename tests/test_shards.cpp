@@ -249,3 +249,46 @@ TEST_CASE("a folder that holds no results names the nearest that does; damaged f
   write_whole(part / "results.json", "{");
   CHECK(error_of([&] { (void)read_result_folder(part); }).find("results.json") != std::string::npos);
 }
+
+TEST_CASE("a run gone on with keeps what was measured, whatever its filter, its shard and its machine") {
+  const Sweep before({Isa::scalar, Isa::sse, Isa::avx2, Isa::avx512}), here;
+  std::map<std::string, CellResult> done;
+  for (const Cell& cell : before.plan.cells)
+    if (cell.isa != Isa::sse) done.emplace(cell.name(), result_of(cell));
+  done.emplace("of/another/experiment", result_of(before.plan.cells[0]));
+  for (const unsigned of : {1u, 3u}) {
+    CAPTURE(of);
+    Plan plan = here.plan;
+    apply_filter(plan, "watertight.*sse", "");
+    const std::size_t filtered = plan.filtered;
+    const auto shards = split_plan(here.experiment, plan, of);
+    const Shard shard{.index = of, .of = of};
+    PlanRecord record = record_of(plan, shards, shard);
+    if (of > 1) keep_shard(plan, shards, of);
+    std::set<std::string> wanted;
+    for (const Cell& cell : plan.cells) wanted.insert(cell.name());
+    REQUIRE((!wanted.empty() && filtered > 0));
+    Plan unchanged = plan;
+    PlanRecord same = record;
+    keep_measured(unchanged, same, here.plan, {});
+    CHECK(names(unchanged, Cell::Metric::trace) == names(plan, Cell::Metric::trace));
+    CHECK(to_text(same) == to_text(record));
+    CHECK(unchanged.filtered == filtered);
+
+    keep_measured(plan, record, here.plan, done);
+    std::vector<std::string> expected, found;
+    for (const auto* list : {&here.plan.cells, &here.plan.elsewhere})
+      for (const Cell& cell : *list)
+        if (wanted.contains(cell.name()) || done.contains(cell.name())) expected.push_back(cell.name());
+    for (const Cell& cell : plan.cells) found.push_back(cell.name());
+    CHECK(found == expected);
+    CHECK(std::ranges::count_if(plan.cells, [](const Cell& cell) { return cell.isa == Isa::avx512; }) > 0);
+    CHECK(std::ranges::none_of(plan.skipped, [&](const SkippedCell& cell) { return done.contains(cell.name); }));
+    CHECK(std::ranges::none_of(record.skipped, [&](const PlanRecord::Entry& entry) { return done.contains(entry.name); }));
+    std::map<std::string, unsigned> recorded;
+    for (const PlanRecord::Entry& entry : record.cells) recorded.emplace(entry.name, entry.shard);
+    for (const std::string& name : found) CHECK(recorded.at(name) == of);
+    if (of == 1) CHECK(plan.filtered == filtered - std::size_t(std::ranges::count_if(here.plan.cells, [&](const Cell& c) { return done.contains(c.name()); })));
+    CHECK(record.filtered == plan.filtered);
+  }
+}

@@ -1,4 +1,5 @@
-"""One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, or raises NoData.
+"""One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, or raises NoData. ONLY_WHEN_NAMED: a configuration
+draws it only where it names it, and is told where it could not be drawn.
 
 A new figure is a module here and its name in ALL. Other modules here (bars, squares, modes, leak_lines) are what figures share.
 """

@@ -8,6 +8,7 @@ TITLE = "Lane utilisation by depth"
 CAPTION = ("Of the lanes that nodes of a depth are tested with, those that hold something: the rays of a packet that are in the node, or the children that a "
            "single ray is tested against. Depths that fewer than one ray in a thousand reaches are left out. Counted in a pass of its own, untimed.")
 FEWEST_VISITS = 1e-3
+ONLY_WHEN_NAMED = True
 
 
 def draw(results):

@@ -1,11 +1,11 @@
 """Rays lost through a closed surface, as its triangles become longer and thinner."""
 
-from figures.leak_lines import draw_lines
+from figures.leak_lines import CAPTION as LINES, draw_lines
 
 TITLE = "Leaks against the shape of triangles"
 CAPTION = ("The scene is stretched along one axis; a triangle's aspect is its longest edge over the height on it, the median of the mesh's "
            "triangles. A leak is a ray that passes through a closed surface, away from its silhouette and border, and is answered by a miss or by "
-           "something behind.")
+           "something behind." + LINES)
 
 
 def draw(results):

@@ -1,11 +1,11 @@
 """Rays lost through a closed surface, as it stands farther and farther from the origin."""
 
-from figures.leak_lines import draw_lines, without
+from figures.leak_lines import CAPTION as LINES, draw_lines, without
 
 TITLE = "Leaks against distance from the origin"
 CAPTION = ("A leak is a ray that passes through a closed surface, away from its silhouette and border, and is answered by a miss or by something "
            "behind. The rays are aimed at edges and vertices. Far out the grid of float32 is coarse against the scene, which loses its finer "
-           "triangles by it; what is left of it is still closed.")
+           "triangles by it; what is left of it is still closed." + LINES)
 
 
 def draw(results):

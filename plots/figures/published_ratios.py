@@ -12,6 +12,7 @@ TITLE = "Speed-ups beside published ones"
 CAPTION = ("Bars: ratios of the medians of this run, with what the 95 % confidence intervals of both leave. Diamonds: the ratio of the published "
            "figures, from another machine and with another share of shading (the source stands below the figure). The line is 1: no gain. A red ratio: some of the answers "
            "of its cells are wrong (the table has how many).")
+ONLY_WHEN_NAMED = True
 PUBLISHED = Path(__file__).resolve().parent.parent / "published"
 
 

@@ -17,6 +17,7 @@ CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same
 # Blue to orange by way of white: readers with any colour vision can tell the ends apart.
 COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FEE9CF", "#FFFFFF", "#D3E4F3", "#5C9BCF", "#1F5A96"])
 MEAN = "mean"
+ONLY_WHEN_NAMED = True
 
 
 def draw(results):

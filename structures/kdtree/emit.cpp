@@ -103,7 +103,8 @@ Layout lay_out(const Part& tree, unsigned width, std::size_t block_bytes) {
   std::size_t pairs = 0, leaves = 0, blocks = 0;
   count(root, pairs, leaves, blocks, width);
   const std::size_t align = block_bytes % 64 == 0 ? 64 : 32;
-  const std::size_t node_bytes = (pairs * 2 * sizeof(Node) + 63) / 64 * 64;
+  // The root stands behind the pairs: the tree keeps a copy of it at hand, its bytes are the arena's.
+  const std::size_t node_bytes = ((pairs * 2 + 1) * sizeof(Node) + 63) / 64 * 64;
   // A leaf may be followed by a gap of less than `align`.
   const std::size_t bytes = node_bytes + blocks * block_bytes + (block_bytes % align == 0 ? 0 : leaves * (align - 1));
   if (bytes > Node::kMostBytes) {
@@ -114,6 +115,7 @@ Layout lay_out(const Part& tree, unsigned width, std::size_t block_bytes) {
   out.arena = Arena(bytes);
   Writer writer(out.arena.data(), node_bytes, width, block_bytes, out.leaves);
   out.root = writer.node(root, root.is_leaf() ? 0 : writer.below(root, 0));
+  new (out.arena.data() + pairs * 2 * sizeof(Node)) Node(out.root);
   out.depth = writer.depth();
   return out;
 }

@@ -58,6 +58,7 @@ class Render(CommandLineCase):
         (self.folder / "cube.obj").write_text(CUBE)
         dark = self.call("render", "cube.obj", "--resolution", "8x8")
         self.assertIn("ambient_occlusion", dark.stdout)  # nothing emits light
+        self.assert_error(self.call("render", "cube.obj", "--resolution", "8x8", "--depth", "9"), "--depth has no effect: ambient_occlusion", "nothing in the scene emits light")
 
     def test_render_errors(self):
         cases = [
@@ -80,6 +81,8 @@ class Render(CommandLineCase):
             (("--clamp", "nan"), "clamp"),
             (("--clamp", "0"), "--clamp"),
             (("--integrator", "whitted", "--depth", "33"), "0 to 32"),
+            (("--integrator", "ambient_occlusion", "--depth", "9"), "--depth has no effect: ambient_occlusion follows no paths; take it out"),
+            (("--integrator", "normals", "--clamp", "2"), "--clamp has no effect: normals follows no paths; take it out"),
             (("--effects", "all,mirror"), "'all' stands alone"),
             (("--effects", "mirror,"), "an empty name"),
             (("--heatmap", "nodes", "--effects", "mirrors"), "did you mean 'mirror'"),

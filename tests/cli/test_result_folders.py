@@ -59,6 +59,38 @@ class ResultFolders(CommandLineCase):
             self.assertIn("begun at revision aaaaaaaaaaaa", " ".join(self.context(folder)["warnings"]))
             self.assertEqual([c["git_revision"] for c in json.loads(plan.read_text())["earlier_contexts"]], ["a" * 40])
 
+    def test_a_filter_says_what_is_measured_now_and_takes_nothing_from_what_was(self):
+        out = self.folder / "results/small"
+        every = self.cells(*FEW)
+
+        def held():
+            rows = list(csv.DictReader((out / "results.csv").read_text().splitlines()))
+            document = json.loads((out / "results.json").read_text())
+            plan = [cell["name"] for cell in json.loads((out / "plan.json").read_text())["cells"]]
+            names = list(dict.fromkeys(row["run_name"] for row in rows))
+            self.assertEqual(list(dict.fromkeys(b["run_name"] for b in document["benchmarks"])), names)
+            self.assertEqual(document["context"]["cells"], len(names))
+            self.assertEqual(plan, names)
+            return names, len(rows), document
+
+        first = [name for name in every if "bvh4" in name]
+        self.assertIn(self.run_small(*FEW, "--filter", "bvh4").returncode, (0, 1))
+        self.assertEqual(held()[:2], (first, 7 * len(first)))
+        again = self.run_small(*FEW, "--resume", "--filter", "bvh2/.*/sse/")
+        self.assertIn(f"({len(first)} done before)", again.stderr)
+        both = [name for name in every if "bvh4" in name or "bvh2" in name and "/sse/" in name]
+        names, rows, document = held()
+        self.assertEqual((names, rows), (both, 7 * len(both)))
+        self.assertEqual(document["context"]["filtered_cells"], len(self.cells()) - len(both))
+        lesser = {**os.environ, "ARBORETUM_ISA": "scalar"}
+        self.assertIn(self.run_small(*FEW, "--resume", env=lesser).returncode, (0, 1))  # what this machine cannot measure stays as well
+        names, rows, document = held()
+        self.assertEqual((sorted(names), rows), (sorted(every), 7 * len(every)))
+        self.assertFalse({s["name"] for s in document["skipped"]} & set(names))
+        self.run_small(*FEW, "--resume", "--filter", "bvh4")
+        self.assertEqual(held()[:2], (every, 7 * len(every)))
+        self.assertEqual(sorted(cell["name"] for cell in read_jsonl(out / "cells.jsonl")), sorted(every))
+
     def test_a_run_that_begins_anew_loses_nothing(self):
         folder = self.folder / self.shard(1, 3)
         (folder / "notes.txt").write_text("mine")

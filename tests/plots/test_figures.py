@@ -10,10 +10,11 @@ sys.dont_write_bytecode = True
 from made_results import HARD, PLOTS, PUBLISHED, SEEN, Folder, build, everything, hard, other, trace, whole  # noqa: E402
 
 import report  # noqa: E402
+import style  # noqa: E402
 import tables  # noqa: E402
-from figures import ALL, published_ratios  # noqa: E402
+from figures import ALL, leaks_vs_distance, published_ratios, rays_per_second  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
-from figures.leak_lines import without  # noqa: E402
+from figures.leak_lines import MOST_LIFT, lifts, without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
 from results import load  # noqa: E402
 
@@ -146,6 +147,53 @@ class Drawing(unittest.TestCase):
                 self.assertEqual((done.returncode, done.stderr), (0, ""), f"{case}: {done.stderr}")
                 self.assertTrue((folder.path / "report.html").is_file())
         self.assertIn("rays_per_second: left out, ", Folder([]).plot("--no-report").stdout)
+
+    def test_a_figure_that_was_named_and_is_left_out_is_told_where_run_does_not_hide_it(self):
+        counted = {"lane_utilization_by_depth": [1.0, 0.75], "visits_by_depth": [1.0, 0.5]}
+        rows = [other("primary", traversal=f"mode{k}", **counted) for k in range(len(style.MARKERS) + 1)]
+        done = Folder(rows, {"plots": ["sah_cost", "lane_utilization"]}).plot("--no-report")
+        self.assertEqual((done.returncode, done.stderr), (0, "lane_utilization: left out, 11 modes are too many to tell apart; choose some with --filter\n"))
+        few = Folder(rows[1:], {"plots": ["lane_utilization"]})
+        self.assertEqual(few.plot("--no-report").stderr, "")
+        self.assertTrue((few.path / "lane_utilization.png").is_file())
+
+    def test_colours_of_a_figure_are_distinct(self):
+        phases = ("outer grid", "inner grids", "planes", "references", "splits", "tree", "layout", "top", "moving boxes", "a new phase")
+        for palette, names in ((style.part_colour, phases + tuple(style.PART_COLOURS)), (style.colour, ("ab", "ba", *style.COLOURS)),
+                               (style.intersector_colour, ("ab", "ba", *style.INTERSECTOR_COLOURS))):
+            fresh = style.Palette(palette.own, palette.spare)
+            self.assertEqual(len({fresh(name) for name in names}), len(names))
+            self.assertEqual([fresh(name) for name in names], [fresh(name) for name in names])
+
+    def test_titles_of_neighbouring_panels_do_not_overlap(self):
+        rows = [other(f"{workload}:self_intersection={way}", scene) for scene in ("suzanne", "a_scene_with_a_name_that_is_long:offset=1e4")
+                for workload in ("ambient_occlusion", "diffuse", "shadow") for way in ("none", "integer_offset", "error_bound")]
+        figure = rays_per_second.draw(load(Folder(rows).path))
+        figure.draw_without_rendering()
+        boxes = [axis.title.get_window_extent() for axis in figure.axes if axis.get_visible()]
+        self.assertEqual(len(boxes), len(rows))
+        self.assertFalse([(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)])
+        style.plt.close(figure)
+
+    def test_lines_of_leaks_that_lie_on_each_other_are_drawn_apart(self):
+        self.assertEqual(lifts([{0: 0, 1: 0}, {0: 0, 1: 5}, {1: 0, 2: 0}]), [0, 0, 0])
+        apart = lifts([{0: 0, 1: 0, 2: 3}, {0: 7, 1: 0, 2: 3}, {0: 0, 1: 0, 2: 0}])
+        self.assertEqual((apart[0], apart[1] == apart[2], apart[1] > 0), (0, True, True))
+        many = lifts([{0: 0, 1: 0}] * 20)
+        self.assertEqual((len(set(many)), max(many) <= MOST_LIFT), (20, True))
+
+    def test_leaks_of_a_scene_that_stands_at_the_origin_are_drawn(self):
+        rows = [other("hard_edge", f"ball:offset={x:g}", cracks=2, offset=x, radius=1.0) for x in (0, 1, 1e4)]
+        figure = leaks_vs_distance.draw(load(Folder(rows).path))
+        self.assertEqual([list(line.get_xdata()) for line in figure.axes[0].lines], [[0, 1, 1e4]])
+        self.assertIn(0, figure.axes[0].get_xticks())
+        low, high = figure.axes[0].get_xlim()
+        self.assertTrue(low < 0 and high > 1e4)
+        style.plt.close(figure)
+
+    def test_no_checkout_of_an_unknown_revision(self):
+        for revision, told in (("unknown", False), ("", False), ("abc", True)):
+            self.assertEqual("git checkout" in report.reproduce(load(Folder(whole(), {"git_revision": revision}).path)), told)
 
     def test_report_is_well_formed_and_escaped(self):
         evil = "<script>alert(1)</script>&\"'"
