@@ -204,6 +204,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
     AppendFile(command.benchmark.out, true);  // cannot be written: say so now
   if (!command.resume) set_aside(folder);
   Journal journal(folder, hash, whole, command.resume);
+  const double seconds = total_seconds(experiment, plan);
   keep_measured(plan, record, whole, journal.done());
   remove_files(folder, present(folder, concluding_files()));
   write_whole(folder / "effective.yaml",
@@ -216,7 +217,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   write_whole(folder / kPlanFile, to_text(record));
   fmt::print(stderr, "{}: {} cells ({} done before), {} skipped{}; about {}\n", experiment.name, plan.cells.size(), journal.done().size(),
              plan.skipped.size(), shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
-             format_duration(total_seconds(experiment, plan)));
+             format_duration(seconds));
 
   RunOutcome outcome = run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast}, std::move(loaded));
   outcome.warnings = changed;

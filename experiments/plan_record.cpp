@@ -54,6 +54,7 @@ void keep_measured(Plan& plan, PlanRecord& record, const Plan& whole, const std:
       if (now || before) cells.push_back(cell);
       if (before || recorded.contains(name)) entries.push_back({name, before ? record.shard.index : recorded.at(name), ""});
       if (before && !recorded.contains(name) && list == &whole.cells && plan.filtered > 0) --plan.filtered;
+      if (before && recorded.contains(name) && recorded.at(name) != record.shard.index && plan.in_other_shards > 0) --plan.in_other_shards;
     }
   }
   std::erase_if(plan.skipped, [&](const SkippedCell& cell) { return kept.contains(cell.name); });

@@ -36,8 +36,8 @@ plt.rcParams.update({
 
 
 class Palette:
-    """Names that have a colour of their own, and spare colours for those that are new: by the name, so that it is the same in every figure, or the
-    next one free. Two names get the same only where there are more of them than spare colours."""
+    """Names that have a colour of their own, and spare colours for those that are new: by the name, or the next one free: the same in
+    every figure of a report unless two new names fall on one colour, then by the order in which they are drawn. Two names get the same only where there are more of them than spare colours."""
 
     def __init__(self, own, spare):
         self.own, self.spare, self.given = own, spare, {}

@@ -49,7 +49,7 @@ class BinnedSah {
     tree_.primitives.resize(n);
     tbb::parallel_for(std::size_t{0}, set_aside_.size(), [&](std::size_t i) {
       const Range& range = set_aside_[i].range;
-      std::memcpy(tree_.primitives.data() + begin_of(set_aside_[i]), range.references, range.size * sizeof(std::uint32_t));
+      if (range.size > 0) std::memcpy(tree_.primitives.data() + begin_of(set_aside_[i]), range.references, range.size * sizeof(std::uint32_t));
     });
     phase.ends("splits");
   }
@@ -83,7 +83,7 @@ class BinnedSah {
   /// Splits a range: into as much room in `other`, or in place where that is nullptr. Returns true where the sides are in `other`. Not inlined: recurse() has to do without
   /// room for bins in its frame.
   __attribute__((noinline)) bool split(const Range& range, sah::Reference* other, Range& left, Range& right) const {
-    const sah::ObjectSplit object(range.references, range.references + range.size, range.bounds.centroids, max_bins_, leaf_width_);
+    sah::ObjectSplit object(range.references, range.references + range.size, range.bounds.centroids, max_bins_, leaf_width_);
     if (!object.exists()) {
       split_in_the_middle(range, left, right);
       return false;

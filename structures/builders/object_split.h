@@ -70,7 +70,7 @@ inline void partition_in_place(Reference* r, std::size_t left_count, std::size_t
   for_each(left_chunks, [&](std::size_t c) {
     const Chunk& from = chunks[c];
     if (from.misplaced == 0) return;
-    const Chunk* to = &*std::upper_bound(chunks.begin() + std::ptrdiff_t(left_chunks), chunks.end(), from.before, [](std::size_t k, const Chunk& chunk) { return k < chunk.before; }) - 1;
+    const Chunk* to = &*std::prev(std::upper_bound(chunks.begin() + std::ptrdiff_t(left_chunks), chunks.end(), from.before, [](std::size_t k, const Chunk& chunk) { return k < chunk.before; }));
     std::size_t j = from.before - to->before;
     for (std::size_t i = 0; i < from.misplaced; ++i, ++j) {
       for (; j == to->misplaced; ++to) j = 0;
@@ -109,8 +109,9 @@ class ObjectSplit {
     if (chunks_.empty()) return partition(r_, end_, map_, split_, left_out, right_out, left_centroids, right_centroids);
     partition_range(r_, end_, map_, split_, chunks_, left_out, right_out, left_centroids, right_centroids);
   }
-  /// The same within the range itself, [r, r + n), in an order of its own.
-  void partition_in_place(Reference* r, Box& left_centroids, Box& right_centroids) const {
+  /// The same within the range itself, of which `r` is the begin, in an order of its own. To be called once: the chunks' bins, which nothing needs any more, go.
+  void partition_in_place(Reference* r, Box& left_centroids, Box& right_centroids) {
+    MeteredVector<ManyBins>().swap(chunks_);
     sah::partition_in_place(r, split_.left_count, std::size_t(end_ - r_), map_, split_, left_centroids, right_centroids);
   }
 

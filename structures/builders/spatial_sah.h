@@ -160,7 +160,7 @@ class SpatialSah {
   void line_up(std::uint32_t index, std::uint32_t begin) {
     const BinaryNode& node = tree_.nodes[index];
     if (node.is_leaf()) {
-      std::memcpy(tree_.primitives.data() + begin, references_[0].data() + tree_.first[index], node.count * sizeof(std::uint32_t));
+      if (node.count > 0) std::memcpy(tree_.primitives.data() + begin, references_[0].data() + tree_.first[index], node.count * sizeof(std::uint32_t));
       tree_.first[index] = begin;
       return;
     }

@@ -47,6 +47,7 @@ struct KdRay {
       r = select(parallel, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       share = select(parallel, F(kPad), share), least = select(parallel, F(0x1p-100f), least);
     }
+    // In this order, since a share of a tiny scene may be nothing. Where the product overflows the axis is left out, as below.
     const F at = o * r, e = share * ((F(max_coordinate) + abs(o)) * abs(r)) + least;
     enter = at + e, leave = at - e;
     const auto fits = abs(enter) + abs(leave) < F(kTooLarge);

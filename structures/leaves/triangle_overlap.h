@@ -26,8 +26,9 @@ class TriangleOverlap {
     double edge[3][3];
     for (int i = 0; i < 3; ++i)
       for (int axis = 0; axis < 3; ++axis) edge[i][axis] = v[(i + 1) % 3][axis] - v[i][axis];
-    // A component of the normal is off by less than 2^-51 of the sum of its two products' sizes, at most a box's or a corner's coordinate from the corner that
-    // the plane goes through: the corners' largest counts twice in the plane's own thickness, what a box reaches beyond it in touches().
+    // A component of the normal is off by hardly more than 2^-51 of the sum of its two products' sizes (edges, products and difference round), so by less than `error`. A point x that
+    // triangle and box share is at most twice the largest coordinate from the corner that the plane goes through: of the box's center, n.(c - v0) is then at most
+    // what the box reaches, |n|.half, and the errors times those distances, the plane's thickness.
     for (int k = 0; k < 3; ++k) {
       const int p = (k + 1) % 3, q = (k + 2) % 3;
       const double ahead = edge[0][p] * edge[1][q], back = edge[0][q] * edge[1][p], error = 0x1p-50 * (std::abs(ahead) + std::abs(back));
