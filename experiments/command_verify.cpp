@@ -117,7 +117,7 @@ class Verify {
   /// moved_and_scaled() leaves instances out, and two_level would then be verified on one: an answer about something else.
   void expect_instances_stay(const std::string& name, const TriangleMesh& mesh) const {
     const bool moves = std::ranges::any_of(variants_, [](const VerifyVariant& v) { return v.offset != 0.0 || v.exponent != 0; });
-    const bool reads = std::ranges::any_of(cells_, [](const VerifiedCell& v) { return v.cell.structure == "two_level"; });
+    const bool reads = std::ranges::any_of(cells_, [this](const VerifiedCell& v) { return registry_.structure(v.cell.structure)->info.takes_below; });
     if (mesh.instancing && moves && reads)
       throw UserError(fmt::format("verify: {}: --offset and --scale move its triangles and not its {} instances, which two_level is built over; "
                                   "leave those out, or two_level by --skip two_level", name, mesh.instancing->instances.size()));

@@ -1,0 +1,266 @@
+// `verify` as a command: its verdicts and words, scenes of instances, and the cases files that it reads.
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "core/error.h"
+#include "experiments/case_file.h"
+#include "experiments/commands.h"
+#include "oracle/random_cases.h"
+#include "tests/catch.h"
+#include "tests/small_meshes.h"
+#include "traversal/kernel_table.h"
+
+using namespace arboretum;
+
+namespace {
+
+const std::filesystem::path kSource = ARBORETUM_SOURCE_DIR;
+
+struct Outcome {
+  int status = 0;
+  std::string out, error;
+};
+
+/// The program's command, its words on stdout and the error that it throws.
+Outcome verify(const VerifyCommand& command) {
+  Outcome outcome;
+  const auto path = std::filesystem::temp_directory_path() / ("arboretum_verify_" + std::to_string(getpid()));
+  std::fflush(stdout);
+  const int saved = dup(1);
+  REQUIRE(std::freopen(path.c_str(), "w", stdout));
+  try {
+    outcome.status = static_cast<int>(command_verify(command));
+  } catch (const UserError& e) {
+    outcome.status = static_cast<int>(ExitStatus::kUsage), outcome.error = e.what();
+  }
+  std::fflush(stdout);
+  dup2(saved, 1);
+  close(saved);
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  outcome.out = text.str();
+  std::filesystem::remove(path);
+  return outcome;
+}
+
+std::string any_isa() {
+  // ARBORETUM_ISAS may leave some out of the build.
+  for (const KernelRow& row : kernel_table())
+    if (is_available(row.isa) && row.structure == "bvh8") return std::string(to_string(row.isa));
+  return "scalar";
+}
+
+std::filesystem::path written(const std::string& name, const std::string& text) {
+  const auto path = std::filesystem::temp_directory_path() / (std::to_string(getpid()) + name);
+  std::ofstream(path) << text;
+  return path;
+}
+
+}  // namespace
+
+TEST_CASE("the command's verdicts and words") {
+  const std::string isa = "isa=" + any_isa();
+  VerifyCommand command;
+  command.subject = "sphere:200", command.axes = {"structure=bvh8,bvh4", "intersector=watertight", isa};
+  command.rays = 3000, command.kinds = {"vertex", "edge"}, command.threads = 2;
+  const Outcome kept = verify(command);
+  CHECK(kept.status == 0);
+  CHECK(kept.out.find("crack-free on closed meshes") != std::string::npos);
+  CHECK(kept.out.find("all 2 cells that promise something keep it") != std::string::npos);
+  CHECK(verify(command).out == kept.out);
+  command.threads = 1;
+  CHECK(verify(command).out == kept.out);
+
+  command.spread = true;
+  const Outcome shared = verify(command);
+  CHECK(shared.out.find("3000 rays in all, 2 cells") != std::string::npos);
+  CHECK(shared.out.find("all 2 cells that promise something keep it") != std::string::npos);
+  command.rays = 100;
+  const Outcome few = verify(command);  // one cell has them all: of the other nothing is said
+  CHECK(few.out.find("all 1 cells that promise something keep it") != std::string::npos);
+  CHECK(few.out.find("1 of 2 cells had no ray") != std::string::npos);
+  CHECK(few.out.find("--rays 512") != std::string::npos);
+  command.spread = false, command.rays = 3000;
+
+  command.axes = {"structure=bvh8", "intersector=moller_trumbore", "box=fast", isa};
+  const Outcome leaks = verify(command);
+  CHECK(leaks.status == 0);  // it promises nothing
+  CHECK(leaks.out.find("promised: nothing") != std::string::npos);
+  CHECK(leaks.out.find("per million") != std::string::npos);
+
+  command.axes = {isa, "structure=grid", "traversal=queued"};
+  CHECK(verify(command).status == 4);
+
+  const struct {
+    const char* name;
+    void (*change)(VerifyCommand&);
+    const char* error;
+  } faults[] = {
+      {"kind", [](VerifyCommand& c) { c.kinds = {"edgy"}; }, "did you mean 'edge'"},
+      {"axis", [](VerifyCommand& c) { c.axes = {"strukture=bvh8"}; }, "did you mean 'structure'"},
+      {"value", [](VerifyCommand& c) { c.axes = {"structure=bvh9"}; }, "did you mean 'bvh"},
+      {"workload", [](VerifyCommand& c) { c.axes = {"workload=primary"}; }, "rays of its own"},
+      {"scene", [](VerifyCommand& c) { c.subject = "spere:200"; }, "spere"},
+      {"no rays", [](VerifyCommand& c) { c.rays = 0; }, "--rays"},
+      {"offset of cases", [](VerifyCommand& c) { c.subject = "x.json", c.offsets = {1}; }, "--offset"},
+      {"scale", [](VerifyCommand& c) { c.scales = {500}; }, "exponent of two"},
+      {"offset", [](VerifyCommand& c) { c.offsets = {1e30}, c.scales = {100}; }, "beyond float32"},
+      {"no border", [](VerifyCommand& c) { c.kinds = {"border"}; }, "nothing that rays"},
+      {"no file", [](VerifyCommand& c) { c.subject = "nowhere.json", c.kinds.clear(); }, "no such file"},
+  };
+  for (const auto& fault : faults) {
+    INFO(fault.name);
+    VerifyCommand wrong;
+    wrong.subject = "sphere:200", wrong.axes = {isa}, wrong.rays = 100;
+    fault.change(wrong);
+    const Outcome outcome = verify(wrong);
+    CHECK(outcome.status == 2);
+    INFO(outcome.error);
+    CHECK(outcome.error.find(fault.error) != std::string::npos);
+    CHECK(outcome.error.find('\n') == std::string::npos);
+  }
+}
+
+TEST_CASE("a scene of instances is moved only for structures that do not read them") {
+  VerifyCommand command;
+  command.subject = "forest:2000", command.rays = 500, command.axes = {"isa=" + any_isa(), "structure=two_level,bvh8", "intersector=watertight"};
+  CHECK(verify(command).status == 0);
+  command.offsets = {0}, command.scales = {0};
+  CHECK(verify(command).status == 0);
+  command.offsets = {0, 1};
+  const Outcome moved = verify(command);
+  CHECK(moved.status == 2);
+  CHECK(moved.error.find("instances, which two_level is built over") != std::string::npos);
+  CHECK(moved.error.find('\n') == std::string::npos);
+  command.skip = "two_level";
+  CHECK(verify(command).status == 0);
+  command.skip.clear(), command.offsets.clear(), command.scales = {1};
+  CHECK(verify(command).status == 2);
+  command.subject = "sphere:200";
+  CHECK(verify(command).status == 0);
+}
+
+TEST_CASE("cases files: right ones are checked, wrong ones are named") {
+  const std::string isa = "isa=" + any_isa();
+  const std::string triangles = R"("triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0.25,0.25,0], "direction": [0,0,1])";
+  VerifyCommand command;
+  command.axes = {isa, "structure=bvh8", "intersector=watertight"};
+  const auto status_of = [&](const std::string& text, std::string* error = nullptr) {
+    const auto path = written("cases.json", text);
+    command.subject = path.string();
+    const Outcome outcome = verify(command);
+    if (error) *error = outcome.error;
+    std::filesystem::remove(path);
+    return outcome.status;
+  };
+  CHECK(status_of(R"({"cases": [{"id": "a", )" + triangles + R"(, "hit": true, "t": 1, "nearest_ids": [0]}]})") == 0);
+  CHECK(status_of(R"({"cases": [{)" + triangles + "}]}") == 0);
+  const struct {
+    const char* text;
+    const char* error;
+  } faults[] = {
+      {"{", "no JSON"},
+      {"{}", "holds no"},
+      {R"({"cases": [3]})", "is no object"},
+      {R"({"cases": [{"id": "q"}]})", "case q: has no triangles"},
+      {R"({"cases": [{"id": "q", "triangles": [[[0,0],[1,0,0],[0,1,0]]], "origin": [0,0,0], "direction": [0,0,1]}]})", "[x, y, z]"},
+      {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": ["big",0,0], "direction": [0,0,1]}]})", "is no number"},
+      {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1], "hit": false}]})",
+       "exact arithmetic finds a hit"},
+      {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1], "t": 2}]})",
+       "exact arithmetic finds 1"},
+      {R"({"cases": [{"id": "q", "triangles": [[[3.4028236e38,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1]}]})",
+       "case q: triangles: 3.4028236e+38 is beyond float32"},
+      {R"({"cases": [{"id": "p", "triangles": []}, {"id": "q", "triangles": [[[1e400,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1]}]})",
+       ".json: case q: 1e400 is beyond float32"},
+      {R"({"cases": [{"origin": [0,0,-1e999]}]})", ".json: case 1: -1e999 is beyond float32"},
+      {R"({"cases": [{"id": 5}]})", "case 1: id must be a string, not 5"},
+      {R"({"cases": [{"id": "q", "tneer": 5}]})", "case q: unknown key 'tneer'; did you mean 'tnear'?"},
+      {R"({"cases": [{"id": "q", "hitt": false}]})", "case q: unknown key 'hitt'; did you mean 'hit'?"},
+  };
+  for (const auto& fault : faults) {
+    INFO(fault.text);
+    std::string error;
+    CHECK(status_of(fault.text, &error) == 2);
+    INFO(error);
+    CHECK(error.find(fault.error) != std::string::npos);
+  }
+  // Each part of a wrong answer is told, whatever is given beside it: of two triangles at t = 1 and one behind them, and of a miss.
+  const std::string three = R"({"cases": [{"id": "q", "triangles": [[["nan",0,1],[0,0,1],[0,0,1]],[[0,0,1],[1,0,1],[0,1,1]],[[0,0,2],[1,0,2],[0,1,2]],[[0,0,1],[1,0,1],[0,1,1]]], )"
+                            R"("direction": [0,0,1], "origin": )";
+  const std::string hit = three + "[0.25,0.25,0], ", miss = three + "[5,0,0], ";
+  const struct {
+    const std::string& base;
+    const char* answer;
+    const char* error;  ///< empty: a right answer
+  } answers[] = {
+      {hit, R"("hit": true, "t": 1.0, "nearest_ids": [1,3], "closed_hits": 3)", ""},
+      {hit, R"("nearest_ids": [3,1])", ""},
+      {hit, R"("hit": true, "nearest_ids": [1])", "nearest_ids is [1], but exact arithmetic finds [1,3]"},
+      {hit, R"("nearest_ids": [1,2,3])", "exact arithmetic finds [1,3]"},
+      {hit, R"("nearest_ids": [])", "exact arithmetic finds [1,3]"},
+      {hit, R"("t": null)", "t is null, but exact arithmetic finds 1"},
+      {hit, R"("closed_hits": 2)", "exact arithmetic finds 3"},
+      {hit, R"("hit": "no")", "hit must be true or false, not \"no\""},
+      {hit, R"("nearest_ids": 0)", "nearest_ids must be a list of whole numbers, not 0"},
+      {hit, R"("nearest_ids": [1,-3])", "nearest_ids must be a list of whole numbers"},
+      {hit, R"("t": "inf")", "t must be a number, or null for a miss, not \"inf\""},
+      {hit, R"("closed_hits": 1.5)", "closed_hits must be a whole number, not 1.5"},
+      {miss, R"("hit": false, "t": null, "nearest_ids": [], "closed_hits": 0)", ""},
+      {miss, R"("hit": false, "t": 3)", "t is 3, but exact arithmetic finds a miss"},
+      {miss, R"("t": 3)", "t is 3, but exact arithmetic finds a miss"},
+      {miss, R"("hit": false, "nearest_ids": [0])", "nearest_ids is [0], but exact arithmetic finds []"},
+      {miss, R"("hit": true)", "exact arithmetic finds a miss"},
+  };
+  for (const auto& a : answers) {
+    INFO(a.answer);
+    std::string error;
+    CHECK(status_of(a.base + a.answer + "}]}", &error) == (*a.error ? 2 : 0));
+    INFO(error);
+    CHECK((*a.error ? error.find(a.error) != std::string::npos : error.empty()));
+  }
+  // --rays: in all, the cases among them; no more than the cases where none can be mutated.
+  const auto rays_of = [&](const std::string& text, std::uint64_t rays) {
+    const auto file = written("rays.json", text);
+    VerifyCommand more = command;
+    more.subject = file.string(), more.rays = rays;
+    const std::string out = verify(more).out;
+    std::filesystem::remove(file);
+    return out.substr(0, out.find('\n'));
+  };
+  const std::string flat = R"("triangles": [[["nan",0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1])";
+  const std::string none = R"({"cases": [{"id": "a", )" + flat + R"(}, {"id": "b", )" + flat + "}]}", one = R"({"cases": [{"id": "a", )" + flat + "}, {" + triangles + "}]}";
+  CHECK(rays_of(none, 100).find("2 cases, 2 rays") != std::string::npos);
+  CHECK(rays_of(one, 100).find("2 cases and 2 random meshes, 100 rays") != std::string::npos);
+  // tnear below 0: where 0 would have the same answer.
+  const std::string wall = R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "direction": [0,0,1], "tnear": )";
+  const std::string refused = "case q: tnear -10 is below 0 and something lies there";
+  std::string error;
+  CHECK(status_of(wall + R"(-10, "origin": [0.25,0.25,0], "hit": true})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"(-10, "origin": [0.25,0.25,1], "hit": true})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"("-inf", "origin": [0.25,0.25,0], "hit": true})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"(-10, "tfar": -5, "origin": [0.25,0.25,4], "hit": false})" + "]}", &error) == 0);
+  CHECK(status_of(wall + R"(-10, "tfar": -5, "origin": [0.25,0.25,7]})" + "]}", &error) == 2);
+  CHECK(error.find(refused) != std::string::npos);
+  CHECK(status_of(wall + R"(-10, "origin": [0.25,0.25,4], "hit": true, "t": -3})" + "]}", &error) == 2);
+  CHECK(error.find(refused) != std::string::npos);
+  CHECK(error.find('\n') == std::string::npos);
+  VerifyCase behind;
+  add_triangle(behind.mesh, {0, 0, 1}, {1, 0, 1}, {0, 1, 1});
+  behind.ray = {{0.25f, 0.25f, 0}, -10.0f, {0, 0, 1}, 2.0f};
+  for (std::uint64_t i = 0; i < 20; ++i) CHECK(mutated_subject(behind.mesh, behind.ray, 1, i, 1).rays.rays[0].tnear == 0);
+  CHECK(read_case_file(kSource / "tests/hard_cases.json").size() == 96);
+  // What is written is read back, the largest float included, whose shortest decimal lies beyond it.
+  TriangleMesh mesh;
+  add_triangle(mesh, {0.1f, 1e-30f, 1}, {1, 0, 1}, {0, 16777216, 1});
+  add_triangle(mesh, {std::numeric_limits<float>::max(), 0, 1}, {0, std::numeric_limits<float>::lowest(), 1}, {0x1p-149f, 0, 1});
+  const Ray ray{{0.3f, 0.7f, 0}, 0.0f, {0, 0, 1}, 0x1.fp120f};
+  const auto path = written("back.json", R"({"cases": [)" + case_json("back", "why", mesh, ray) + "]}");
+  const VerifyCase back = read_case_file(path).front();
+  std::filesystem::remove(path);
+  CHECK(std::memcmp(&back.ray, &ray, sizeof ray) == 0);
+  CHECK(back.mesh.vertices == mesh.vertices);
+}
