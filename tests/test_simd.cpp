@@ -1,4 +1,5 @@
 // The semantics of simd/, on every ISA that the machine runs, against one operation at a time in plain C++.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -59,6 +60,12 @@ struct Reference {
   Compare compare;
   std::function<Bits(const Lanes&)> lane;
 };
+
+/// As signed integers, the largest first.
+std::vector<Bits> sorted_down(std::vector<Bits> lanes) {
+  std::sort(lanes.begin(), lanes.end(), [](Bits x, Bits y) { return std::int32_t(x) > std::int32_t(y); });
+  return lanes;
+}
 
 const std::map<std::string, Reference>& references() {
   using L = const Lanes&;
@@ -165,6 +172,23 @@ const std::map<std::string, Reference>& references() {
             if ((l.c[i] & 1u) && n++ == l.lane) return l.a[i];
           return 0u;  // the lanes behind are not looked at, see agrees()
         }}},
+      {"compress_bits",
+       {exact,
+        [](L l) {
+          for (int i = 0, n = 0; i < l.width; ++i)
+            if ((l.c[i] & 1u) && n++ == l.lane) return l.a[i];
+          return 0u;
+        }}},
+      {"permute_lanes", {exact, [](L l) { return l.a[l.b[l.lane] & Bits(l.width - 1)]; }}},
+      {"or_in_lanes", {exact, [](L l) { return (l.c[l.lane] & 1u) ? l.a[l.lane] | l.b[l.lane] : l.a[l.lane]; }}},
+      {"sort_lanes_down", {exact, [](L l) { return sorted_down(std::vector<Bits>(l.a, l.a + l.width))[std::size_t(l.lane)]; }}},
+      {"sort_first_lanes_down",
+       {exact,
+        [](L l) {
+          std::vector<Bits> lanes(std::size_t(l.width), 0u);
+          for (unsigned i = 0; i < l.c[0] % unsigned(l.width + 1); ++i) lanes[i] = l.a[i] & 0x7fffffffu;
+          return sorted_down(lanes)[std::size_t(l.lane)];
+        }}},
   };
   return table;
 }
@@ -232,6 +256,8 @@ TEST_CASE("every operation of simd/ agrees with plain C++, lane by lane") {
     for (int width : {4, 8, 16}) {
       const OperationTable table = operations(isa, width);
       REQUIRE(table.count >= 59);
+      const bool orders_lanes = std::string(table.first[table.count - 1].name) == "sort_first_lanes_down";
+      CHECK(orders_lanes == (isa == Isa::avx512 || (isa == Isa::avx2 && width <= 8)));
       CHECK(table.has_fma == (isa >= Isa::avx2));
       for (int k = 0; k < table.count; ++k) {
         const Operation& operation = table.first[k];

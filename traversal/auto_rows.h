@@ -26,7 +26,7 @@ struct AutoFunctions {
   /// So many rays in packets show how those do: at first, and at most while they do well. Where a ray goes on alone more often than this, the next rays take the other way, at first so many,
   /// each time twice as many, and so many at most (docs/performance.md).
   static constexpr std::size_t kProbe = 4 * kTile, kMostPackets = 4 * kProbe, kFirstOther = 2 * kProbe, kMostOther = 64 * kProbe;
-  static constexpr float kTimesAlone = 0.2f;
+  static constexpr float kTimesAlone = 0.1f;
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
   static constexpr int kThreshold = 6;  ///< packet64's

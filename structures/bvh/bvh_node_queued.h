@@ -16,14 +16,8 @@ template <int Stride, bool AnyHit, int W>
 ARBORETUM_INLINE void push_children_of(const bvh::NodeReference* child, vf<W> entry, unsigned hit, StackEntry*& top) {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
   if constexpr (W == 4) {
-    const int count = __builtin_popcount(hit);
-    const __m128i references = _mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride]));
-    const __m128i from = _mm_cvtepu8_epi32(_mm_cvtsi32_si128(int(std::uint32_t(kCompress.lanes[hit])))), present = _mm_cmpgt_epi32(_mm_set1_epi32(count), _mm_setr_epi32(0, 1, 2, 3));
-    const auto together = [&](__m128i v) { return _mm_and_si128(_mm_castps_si128(_mm_permutevar_ps(_mm_castsi128_ps(v), from)), present); };
-    const __m128i r = together(references), k = together(_mm_castps_si128(entry.v));
-    const __m256d e = _mm256_castsi256_pd(_mm256_set_m128i(_mm_unpackhi_epi32(r, k), _mm_unpacklo_epi32(r, k)));
-    _mm256_storeu_pd(reinterpret_cast<double*>(top), AnyHit ? e : sort_down(e));
-    top += count;
+    push_four<AnyHit>(vi<4>(_mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride]))), entry, hit, top);
+    top += __builtin_popcount(hit);
     return;
   }
 #endif
@@ -123,9 +117,9 @@ struct BvhNodeQueue {
   using Of = QueuedRays<BvhNodeWalk<Nodes<Padded>, Leaves, AnyHit>>;
 };
 
-/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register, and that has been measured (docs/performance.md), else alone.
+/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register (docs/performance.md), else alone.
 template <template <class, bool, bool> class Queue, class Single, int N>
-using IncoherentInFlight = std::conditional_t<kRegisterWidth == 8 || (kRegisterWidth == 4 && N == 4), QueuedFunctions<Queue, Single, 32, 64>, Single>;
+using IncoherentInFlight = std::conditional_t<(kRegisterWidth >= N), QueuedFunctions<Queue, Single, 32, 64>, Single>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

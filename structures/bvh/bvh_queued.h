@@ -6,6 +6,7 @@
 // visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however many rays are in flight.
 #pragma once
 
+#include "simd/lane_order.h"
 #include "traversal/usual_leaves.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/queued_functions.h"
@@ -34,19 +35,6 @@ ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std
 }
 
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
-/// Which lane comes to each place when the lanes of a mask are moved together.
-struct CompressTable {
-  std::uint64_t lanes[256] = {};
-  constexpr CompressTable() {
-    for (unsigned m = 0; m < 256; ++m) {
-      unsigned n = 0;
-      for (unsigned i = 0; i < 8; ++i)
-        if (m >> i & 1) lanes[m] |= std::uint64_t(i) << (8 * n++);
-    }
-  }
-};
-inline constexpr CompressTable kCompress;
-
 /// Four entries, the largest first. Positive doubles order as their bits do, and no distance of a float is a double's NaN.
 ARBORETUM_INLINE __m256d sort_down(__m256d e) {
   __m256d p = _mm256_permute4x64_pd(e, 0x4e);  // 2 3 0 1
@@ -56,10 +44,18 @@ ARBORETUM_INLINE __m256d sort_down(__m256d e) {
   p = _mm256_permute4x64_pd(e, 0xd8);  // 0 2 1 3
   return _mm256_blend_pd(_mm256_max_pd(e, p), _mm256_min_pd(e, p), 0b0100);
 }
+
+/// Up to four children of `hit` to where the top is, the nearest last; always four entries are written.
+template <bool AnyHit, int W>
+ARBORETUM_INLINE void push_four(vi<W> references, vf<W> entry, unsigned hit, StackEntry* top) {
+  const __m128i r = first<4>(compress(hit, references)).v, k = first<4>(compress(hit, entry.as_int())).v;
+  const __m256d e = _mm256_castsi256_pd(_mm256_set_m128i(_mm_unpackhi_epi32(r, k), _mm_unpacklo_epi32(r, k)));
+  _mm256_storeu_pd(reinterpret_cast<double*>(top), AnyHit ? e : sort_down(e));
+}
 #endif
 
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
-/// The same as bytes, for the first four lanes of a mask; 0xff where there are fewer.
+/// Which lane, in bytes, comes to each place when the first four lanes of a mask are moved together; 0xff where there are fewer.
 struct CompressBytesTable {
   alignas(16) std::uint8_t bytes[256][16] = {};
   constexpr CompressBytesTable() {
@@ -98,32 +94,18 @@ template <int N, bool AnyHit>
 ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> entry, unsigned hit, StackEntry*& top) {
   constexpr int W = N < 4 ? 4 : N;
   [[maybe_unused]] const unsigned count = unsigned(__builtin_popcount(hit));
-  [[maybe_unused]] __m128i keys, references;
-#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
-  if constexpr (N == 16) {
-    keys = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(__mmask16(hit), _mm512_castps_si512(entry.v)));
-    references = _mm512_castsi512_si128(_mm512_maskz_compress_epi32(__mmask16(hit), _mm512_loadu_si512(child)));
-  } else if constexpr (N == 8) {
-    keys = _mm256_castsi256_si128(_mm256_maskz_compress_epi32(__mmask8(hit), _mm256_castps_si256(entry.v)));
-    references = _mm256_castsi256_si128(_mm256_maskz_compress_epi32(__mmask8(hit), _mm256_loadu_si256(reinterpret_cast<const __m256i*>(child))));
-  } else if constexpr (N == 4) {
-    keys = _mm_maskz_compress_epi32(__mmask8(hit), _mm_castps_si128(entry.v));
-    references = _mm_maskz_compress_epi32(__mmask8(hit), _mm_loadu_si128(reinterpret_cast<const __m128i*>(child)));
+#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
+  if constexpr (kOrdersLanes<N>) {
+    if (__builtin_expect(count <= 4, 1)) {
+      push_four<AnyHit>(vi<N>::load(child), entry, hit, top);
+      top += count;
+      return;
+    }
   }
-  constexpr bool kVectors = N >= 4;
-#elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
-  constexpr bool kVectors = N == 8;
-  if constexpr (N == 8) {
-    const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(std::int64_t(kCompress.lanes[hit])));
-    const __m128i present = _mm_cmpgt_epi32(_mm_set1_epi32(int(count)), _mm_setr_epi32(0, 1, 2, 3));
-    keys = _mm_and_si128(_mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castps_si256(entry.v), lanes)), present);
-    references = _mm_and_si128(_mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(child)), lanes)), present);
-  }
-#else
-  constexpr bool kVectors = false;
-#if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
   if constexpr (N == 4 || N == 8) {
     if (__builtin_expect(count <= 4, 1)) {
+      __m128i keys, references;
       const __m128i from = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompressBytes.bytes[hit]));
       const auto* reference = reinterpret_cast<const __m128i*>(child);
       if constexpr (N == 4) {
@@ -141,17 +123,6 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
     }
   }
 #endif
-#endif
-  if constexpr (kVectors) {
-#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
-    if (__builtin_expect(count <= 4, 1)) {
-      const __m256i e = _mm256_set_m128i(_mm_unpackhi_epi32(references, keys), _mm_unpacklo_epi32(references, keys));
-      _mm256_storeu_pd(reinterpret_cast<double*>(top), AnyHit ? _mm256_castsi256_pd(e) : sort_down(_mm256_castsi256_pd(e)));
-      top += count;
-      return;
-    }
-#endif
-  }
   alignas(64) std::uint32_t key[W];
   entry.store(key);
   push_in_scalars<N, AnyHit>(child, key, hit, top);

@@ -5,11 +5,12 @@
 // so that its cache lines, its place on the stack and its mispredicted branches are paid once for all of them. A closest hit takes the
 // children nearest first by the least distance at which any ray enters; rays that have found something nearer leave the mask when the node's turn comes.
 // Several groups take turns, a node each, so that the lines that one asks for arrive while others work: that hides what rays of their own wait for as
-// rays in flight do (bvh_queued.h), at a third of the instructions a node. A ray may visit a node that it would not have alone; it finds the same hit, since a
+// rays in flight do (bvh_queued.h), at a third of the instructions a node. What a group visits next is known when its turn ends, and those lines alone are asked for. A ray may visit a node that it would not have alone; it finds the same hit, since a
 // box is dropped only where it begins beyond the nearest hit.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
+#include "structures/bvh/stream_stack.h"
 #include "traversal/box_rays.h"
 #include "traversal/kernel_rows.h"
 #include "traversal/usual_leaves.h"
@@ -19,7 +20,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 inline constexpr std::string_view kStreamSorted = "stream_sorted";
 /// Groups that take turns (docs/performance.md).
-inline constexpr unsigned kGroupsInTurn = 8;
+inline constexpr unsigned kGroupsInTurn = 12;
 
 template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
 class Stream {
@@ -27,14 +28,14 @@ class Stream {
   /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
       : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
-        order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * stack_entries_), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
+        order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * StreamStack::words(stack_entries_)), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report>
   void run(const Report& report) {
     Group* turn[kGroupsInTurn];
     unsigned groups = 0;
-    for (unsigned i = 0; i < count_ && fill(groups_[i], stacks_.data() + i * stack_entries_); ++i) turn[groups++] = &groups_[i];
+    for (unsigned i = 0; i < count_ && fill(groups_[i], StreamStack(stacks_.data() + i * StreamStack::words(stack_entries_), stack_entries_)); ++i) turn[groups++] = &groups_[i];
     while (groups != 0) {
       for (unsigned i = 0; i < groups;) {
         Group& group = *turn[i];
@@ -43,16 +44,17 @@ class Stream {
           continue;
         }
         finish(group, report);
-        if (!fill(group, group.bottom)) turn[i] = turn[--groups];
+        if (!fill(group, group.stack)) turn[i] = turn[--groups];
       }
     }
   }
 
  private:
   static constexpr unsigned kRays = BoxRays::kMost;
+  static constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead) + 63 + 32) / 64);  ///< of a node, or of a leaf's first block, wherever they begin
   using Test = SoaNodeTest<N, Padded>;
   using Box = BoxRay<N, Padded>;
-  static constexpr int W = Test::W, kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth, kBytes = (W + 7) / 8;
+  static constexpr int W = Test::W, kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
   using F = vf<W>;
 
   /// BoxRay's g is not its f.
@@ -67,11 +69,6 @@ class Stream {
   };
   using Line = std::conditional_t<kTwoOffsets, Constants, ConstantsAndRay>;
   struct Nothing {};
-  struct Entry {
-    std::uint64_t rays;
-    bvh::NodeReference target;
-    float t;  ///< the least at which one of them enters
-  };
   using RayData = typename Leaves::RayData;
   /// What the intersector keeps for a ray is more than the ray itself.
   static constexpr bool kKeepsData = sizeof(RayData) > sizeof(Ray);
@@ -84,7 +81,10 @@ class Stream {
     alignas(64) std::byte data[kKeepsData ? kRays * sizeof(RayData) : 1];
     unsigned count = 0, octant = 0;
     std::uint64_t active = 0;  ///< rays whose search is not over
-    Entry *bottom = nullptr, *top = nullptr;
+    StreamStack stack;
+    unsigned top;                ///< entries of the stack
+    bvh::NodeReference target;   ///< what it visits next
+    std::uint64_t visitors = 0;  ///< the rays that do
     typename Counting::Depths depths{typename Counting::Depth{}};
   };
 
@@ -106,7 +106,7 @@ class Stream {
   }
 
   /// The next group's rays; false when there are none left.
-  bool fill(Group& group, Entry* stack) {
+  bool fill(Group& group, StreamStack stack) {
     while (next_ < rays_.size()) {
       const std::uint32_t i = order_.empty() ? std::uint32_t(next_) : order_[next_];
       ++next_;
@@ -119,7 +119,7 @@ class Stream {
     return false;
   }
 
-  void begin(Group& g, unsigned octant, Entry* stack) {
+  void begin(Group& g, unsigned octant, StreamStack stack) {
     const std::uint32_t* const list = list_[octant];
     const int count = int(std::exchange(waiting_[octant], 0u));
     const auto ray_at = [&](int i) -> const Ray& { return rays_[list[i]]; };
@@ -134,8 +134,8 @@ class Stream {
     }
     std::memcpy(g.t, lanes_.t, sizeof g.t);
     g.count = unsigned(count), g.octant = octant, g.active = lanes_.valid;
-    g.bottom = g.top = stack;
-    if (g.active != 0) *g.top++ = {g.active, root_, 0.0f};
+    g.stack = stack, g.top = 0;
+    g.target = root_, g.visitors = g.active;
     g.depths = typename Counting::Depths(typename Counting::Depth{});
   }
 
@@ -164,19 +164,27 @@ class Stream {
 
   /// One node or leaf; false when nothing waits any more.
   ARBORETUM_INLINE bool step(Group& g) {
-    for (;;) {
-      if (g.top == g.bottom) return false;
-      const Entry e = *--g.top;
-      if (e.target != root_) g.depths.pop(g.top - g.bottom);
-      const std::uint64_t rays = AnyHit ? e.rays & g.active : e.rays & nearer(g, e.t);
+    if (g.visitors == 0) return false;  // none of its rays is one
+    if (bvh::is_leaf(g.target)) {
+      leaf(g, g.target, g.visitors);
+    } else {
+      node(g, g.target, g.visitors);
+    }
+    return next(g);
+  }
+
+  /// Finds what the group visits when its turn comes again, and asks for its lines: no others, since what waits longer would be gone by then.
+  ARBORETUM_INLINE bool next(Group& g) {
+    for (unsigned top = g.top; top-- != 0;) {
+      g.depths.pop(top);
+      const std::uint64_t rays = g.stack.rays(top) & (AnyHit ? g.active : nearer(g, g.stack.t[top]));
       if (rays == 0) continue;
-      if (bvh::is_leaf(e.target)) {
-        leaf(g, e.target, rays);
-      } else {
-        node(g, e.target, rays);
-      }
+      g.top = top, g.target = g.stack.target[top], g.visitors = rays;
+      const auto* at = reinterpret_cast<const char*>(base_ + bvh::offset_of(g.target));
+      for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
       return true;
     }
+    return false;
   }
 
   /// The rays that have found nothing before t.
@@ -188,13 +196,12 @@ class Stream {
   }
 
   ARBORETUM_INLINE void node(Group& g, bvh::NodeReference target, std::uint64_t rays) {
-    constexpr unsigned kSide = Box::kSide, kChildren = (1u << N) - 1u;
+    constexpr unsigned kSide = Box::kSide;
+    [[maybe_unused]] constexpr unsigned kChildren = (1u << N) - 1u;
     const std::byte* const node = base_ + bvh::offset_of(target);
     const unsigned x = (g.octant & 1u) * kSide, y = (2 + (g.octant >> 1 & 1u)) * kSide, z = (4 + (g.octant >> 2)) * kSide;
     const F planes[6] = {F::load(node + x), F::load(node + (x ^ kSide)), F::load(node + y), F::load(node + (y ^ kSide)), F::load(node + z), F::load(node + (z ^ kSide))};
-    [[maybe_unused]] F least(std::numeric_limits<float>::infinity());
-    alignas(64) std::uint8_t met[kBytes][kRays];  // by ray, a bit for each child
-    unsigned any = 0;
+    MetChildren<N, AnyHit> met;
     for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
       const unsigned i = unsigned(__builtin_ctzll(rest));
       const float *const c = g.line[i].number, *const f = c + 4, *const far = kTwoOffsets ? f + 3 : f;
@@ -202,41 +209,15 @@ class Stream {
       box.near_x = 0, box.near_y = 2 * kSide, box.near_z = 4 * kSide;
       F entry;
       const vm<W> meets = box.meets([&](unsigned offset) { return planes[offset / kSide]; }, F(c[3]), F(g.t[i]), entry);
-      const unsigned hit = meets.bits() & kChildren;
-      for (int b = 0; b < kBytes; ++b) met[b][i] = std::uint8_t(hit >> (8 * b));
-      any |= hit;
-      if constexpr (!AnyHit) least = select(meets, min_x86(entry, least), least);
+      met.add(i, meets, entry);
       if constexpr (Counting::kCounting) {
-        counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
+        counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(meets.bits() & kChildren)));
         counting_.at_depth(g.depths.current(), Test::kSlots, Test::boxes(node));
       }
     }
-    push(g, Test::children(node), rays, met, any, least);
-  }
-
-  /// The children that some ray met, nearest on top.
-  ARBORETUM_INLINE void push(Group& g, const bvh::NodeReference* child, std::uint64_t rays, const std::uint8_t (&met)[kBytes][kRays], unsigned any, F least) {
-    [[maybe_unused]] alignas(64) float t[W];
-    if constexpr (!AnyHit) least.store(t);
-    Entry* const first = g.top;
-    Entry* top = first;
-    for (int b = 0; b < kBytes; ++b) {
-      const SixtyFourBytes bytes(met[b]);
-      for (unsigned rest = any >> (8 * b) & 0xffu; rest; rest &= rest - 1) {
-        const int bit = __builtin_ctz(rest), i = 8 * b + bit;
-        const auto* at = reinterpret_cast<const char*>(base_ + bvh::offset_of(child[i]));
-        for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
-        Entry e{bytes.with_bit(bit) & rays, child[i], 0.0f};
-        Entry* p = top++;
-        if constexpr (!AnyHit) {
-          e.t = t[i];
-          for (; p != first && p[-1].t < e.t; --p) *p = p[-1];
-        }
-        *p = e;
-      }
-    }
-    g.top = top;
-    g.depths.push(first - g.bottom, top - g.bottom);
+    const unsigned first = g.top;
+    g.top = met.push(g.stack, first, Test::children(node), rays);
+    g.depths.push(first, g.top);
   }
 
   ARBORETUM_INLINE void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
@@ -263,7 +244,7 @@ class Stream {
   const std::vector<std::uint32_t> order_;  ///< the i-th ray to be taken is order_[i], or i where it is empty
   const unsigned count_;
   const std::size_t stack_entries_;
-  std::vector<Entry> stacks_;
+  std::vector<std::uint32_t> stacks_;
   const std::unique_ptr<Group[]> groups_;
   std::size_t next_ = 0;
   std::uint32_t list_[8][kRays];

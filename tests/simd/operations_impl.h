@@ -1,6 +1,7 @@
 // Included between simd/target_begin.h and simd/target_end.h by tests/simd/<isa>.cpp.
 #pragma once
 
+#include "simd/lane_order.h"
 #include "simd/simd.h"
 #include "simd/swizzle.h"
 
@@ -62,6 +63,32 @@ inline void bytes_with_bit(const Bits* a, const Bits*, const Bits* c, Bits* out)
   for (int i = 0; i < 64; i += 4 * W) std::memcpy(bytes + i, a, 4 * W);
   const std::uint64_t with = SixtyFourBytes(bytes).with_bit(int(c[0] & 7u));
   for (int i = 0; i < W; ++i) out[i] = i < 2 ? Bits(with >> (32 * i)) : 0;
+}
+
+// simd/lane_order.h, for widths that it has.
+template <int W>
+inline void compress_bits(const Bits* a, const Bits*, const Bits* c, Bits* out) {
+  if constexpr (kOrdersLanes<W>) put<W>(compress(m<W>(c).bits(), n<W>(a)), out);
+}
+template <int W>
+inline void permute_lanes(const Bits* a, const Bits* b, const Bits*, Bits* out) {
+  if constexpr (kOrdersLanes<W>) put<W>(permute(n<W>(a), n<W>(b) & vi<W>(W - 1)), out);
+}
+template <int W>
+inline void or_in_lanes(const Bits* a, const Bits* b, const Bits* c, Bits* out) {
+  if constexpr (kOrdersLanes<W>) put<W>(or_where(m<W>(c), n<W>(a), n<W>(b)), out);
+}
+template <int W>
+inline void sort_lanes_down(const Bits* a, const Bits*, const Bits*, Bits* out) {
+  if constexpr (kOrdersLanes<W>) put<W>(sort_down(n<W>(a)), out);
+}
+/// Of `a` without signs the first c[0] mod (W + 1) lanes, and zeros.
+template <int W>
+inline void sort_first_lanes_down(const Bits* a, const Bits*, const Bits* c, Bits* out) {
+  if constexpr (kOrdersLanes<W>) {
+    const unsigned count = c[0] % unsigned(W + 1);
+    put<W>(sort_first_down(select(vi<W>::iota() < vi<W>(std::int32_t(count)), n<W>(a) & vi<W>(0x7fffffff), vi<W>(0)), count), out);
+  }
 }
 
 #define OP(name, expression)                                           \
@@ -139,12 +166,19 @@ inline constexpr simd_test::Operation kOperations[] = {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR || ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
     OP("compress", compress(m<W>(c), n<W>(a))),
 #endif
+    {"compress_bits", &compress_bits<W>},
+    {"permute_lanes", &permute_lanes<W>},
+    {"or_in_lanes", &or_in_lanes<W>},
+    {"sort_lanes_down", &sort_lanes_down<W>},
+    {"sort_first_lanes_down", &sort_first_lanes_down<W>},
 };
+/// The last of them, which are not there for all widths.
+inline constexpr int kLaneOrders = 5;
 #undef OP
 
 template <int W>
 inline simd_test::OperationTable table() {
-  return {kOperations<W>, int(sizeof kOperations<W> / sizeof kOperations<W>[0]), kHasFma};
+  return {kOperations<W>, int(sizeof kOperations<W> / sizeof kOperations<W>[0]) - (kOrdersLanes<W> ? 0 : kLaneOrders), kHasFma};
 }
 
 inline simd_test::OperationTable table_of(int width) {
