@@ -220,7 +220,8 @@ class Stream {
     g.depths.push(first, g.top);
   }
 
-  ARBORETUM_INLINE void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
+  /// A function of its own: in the loop it would share registers with it, and GCC then keeps the mask of rays in memory (docs/performance.md).
+  [[gnu::noinline]] void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
     const std::byte* const blocks = base_ + bvh::offset_of(target);
     const unsigned count = bvh::block_count(target);
     const auto hit = [&g](int i) {
