@@ -25,7 +25,7 @@ struct AutoFunctions {
   static constexpr float kNear = 0.125f;
   /// So many rays in packets show how those do: at first, and at most while they do well. Where a ray goes on alone more often than this, the next rays take the other way, at first so many,
   /// each time twice as many, and so many at most (docs/performance.md).
-  static constexpr std::size_t kProbe = 4 * kTile, kMostPackets = 4 * kProbe, kFirstOther = 2 * kProbe, kMostOther = 64 * kProbe;
+  static constexpr std::size_t kProbe = 4 * kTile, kMostPackets = 4 * kProbe, kFirstOther = 8 * kProbe, kMostOther = 64 * kProbe;
   static constexpr float kTimesAlone = 0.1f;
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
