@@ -12,7 +12,8 @@
 namespace arboretum {
 namespace {
 
-constexpr std::size_t kRaysPerTask = 4096;  // 64 x 64 pixels of the Morton order
+constexpr std::size_t kRaysPerTask = 4096;  // at least: 64 x 64 pixels of the Morton order
+constexpr std::size_t kTasksPerThread = 8;   // at least; `auto` finds out anew in each task how its rays go
 constexpr std::uint64_t kMostPasses = 1'000'000;
 constexpr std::size_t kMostPoints = 4000;  // of a cell's leaks
 
@@ -62,7 +63,7 @@ void TraceJob::trace(std::size_t rays) const {
   };
   if (cell_.threads == 1) return range(0, rays);
   arena_.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays, kRaysPerTask),
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays, std::max(kRaysPerTask, rays / (kTasksPerThread * cell_.threads))),
                       [&](const tbb::blocked_range<std::size_t>& r) { range(r.begin(), r.end()); });
   });
 }
