@@ -28,14 +28,14 @@ class Stream {
   /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
       : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
-        order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(count_ * StreamStack::words(stack_entries_)), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
+        order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(std::make_unique_for_overwrite<std::uint32_t[]>(count_ * StreamStack::words(stack_entries_))), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report>
   void run(const Report& report) {
     Group* turn[kGroupsInTurn];
     unsigned groups = 0;
-    for (unsigned i = 0; i < count_ && fill(groups_[i], StreamStack(stacks_.data() + i * StreamStack::words(stack_entries_), stack_entries_)); ++i) turn[groups++] = &groups_[i];
+    for (unsigned i = 0; i < count_ && fill(groups_[i], StreamStack(stacks_.get() + i * StreamStack::words(stack_entries_), stack_entries_)); ++i) turn[groups++] = &groups_[i];
     while (groups != 0) {
       for (unsigned i = 0; i < groups;) {
         Group& group = *turn[i];
@@ -245,7 +245,7 @@ class Stream {
   const std::vector<std::uint32_t> order_;  ///< the i-th ray to be taken is order_[i], or i where it is empty
   const unsigned count_;
   const std::size_t stack_entries_;
-  std::vector<std::uint32_t> stacks_;
+  const std::unique_ptr<std::uint32_t[]> stacks_;
   const std::unique_ptr<Group[]> groups_;
   std::size_t next_ = 0;
   std::uint32_t list_[8][kRays];
