@@ -12,7 +12,7 @@ namespace sah {
 inline void bin_range(const Reference* r, const Reference* end, const BinMap& map, ManyBins& total, MeteredVector<ManyBins>& chunks) {
   chunks.resize((std::size_t(end - r) + kChunk - 1) / kChunk);
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) { bin(r + c * kChunk, std::min(end, r + (c + 1) * kChunk), map, chunks[c]); });
-  clear(total, map.bins, 1);
+  clear(total, map.bins);
   for (const ManyBins& b : chunks) merge(total, b, map.bins);
 }
 
@@ -27,7 +27,7 @@ inline void partition_range(const Reference* r, const Reference* end, const BinM
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     targets[c].left = left_out, targets[c].right = right_out;
     std::size_t to_left = 0;
-    for (unsigned b = 0; b < split.bin; ++b) to_left += std::size_t(chunks[c].count4[b][split.axis]);
+    for (unsigned b = 0; b < split.bin; ++b) to_left += std::size_t(chunks[c].bin[b].count[split.axis]);
     left_out += to_left, right_out += std::min<std::size_t>(kChunk, std::size_t(end - r) - c * kChunk) - to_left;
   }
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {

@@ -28,18 +28,19 @@ inline constexpr std::size_t kChunk = 1u << 14;     ///< references a task takes
 inline constexpr std::size_t kLarge = 4 * kChunk;   ///< more references than this are split by several tasks
 inline constexpr std::size_t kParallel = 1u << 12;  ///< smaller subtrees are built by one task
 
-/// Bins of the three axes, Sets times over.
-template <unsigned N, int Sets>
-struct BinSets {
-  static constexpr unsigned kMost = N;
-  static constexpr int kSets = Sets;
-  Box box[Sets][3][N];
-  std::int32_t count4[N][4];  ///< references by bin, then axis; exact as float below 2^24, good enough above
+/// What falls into the bins of one number, on each of the three axes.
+struct alignas(32) Bin {
+  Box box[3];
+  std::int32_t count[4];  ///< exact as float below 2^24, good enough above
 };
-/// Consecutive references go to different sets, so that a read after a write to the same bin does not wait.
-using Bins = BinSets<kMaxBins, 2>;
+template <unsigned N>
+struct BinSet {
+  static constexpr unsigned kMost = N;
+  Bin bin[N];
+};
+using Bins = BinSet<kMaxBins>;
 /// For more than kLarge references. A few planes decide there what all levels below have to do with, and a sweep costs little beside the binning.
-using ManyBins = BinSets<kManyBins, 1>;
+using ManyBins = BinSet<kManyBins>;
 
 struct Split {
   float cost = std::numeric_limits<float>::infinity();
@@ -78,6 +79,8 @@ ARBORETUM_INLINE Box both_halves(vf<4> low, vf<4> high) {
 }
 /// The centroid, doubled: upper + lower.
 ARBORETUM_INLINE vf<4> centroid(const Reference& r) { return vf<4>::load(r.upper) - vf<4>::load(r.neg_lower); }
+/// The first three lanes, and 0. Behind a reference's coordinates stands its id, which is subnormal as a float: slow to multiply.
+ARBORETUM_INLINE vf<4> three_lanes(vf<4> v) { return select(vm<4>::from_bits(7u), v, vf<4>(0.0f)); }
 
 inline float lane_of(vf<4> v, int lane) {
   alignas(16) float lanes[4];
@@ -100,53 +103,51 @@ struct BinMap {
     scale = select(extent > vf<4>(kFlat), vf<4>(float(bins) * 0.9999f) / extent, vf<4>(0.0f));
   }
   ARBORETUM_INLINE void operator()(const Reference& r, std::int32_t* bin) const {
-    truncate_to_int((centroid(r) - lower) * scale).store(bin);
+    truncate_to_int(three_lanes(centroid(r) - lower) * scale).store(bin);
   }
 };
 
 template <class B>
-void clear(B& bins, unsigned n, int sets) {
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int set = 0; set < sets; ++set) {
-      for (unsigned b = 0; b < n; ++b) bins.box[set][axis][b] = empty_box();
-    }
+void clear(B& bins, unsigned n) {
+  for (unsigned b = 0; b < n; ++b) {
+    for (Box& box : bins.bin[b].box) box = empty_box();
+    vi<4>(0).store(bins.bin[b].count);
   }
-  std::memset(bins.count4, 0, n * sizeof bins.count4[0]);
 }
 
+/// The bins of references [r, end), taken from four places in turn: neighbours mostly go to the same bin, where each would wait for the one before.
 template <class B>
 void bin(const Reference* r, const Reference* end, const BinMap& map, B& bins) {
-  const int sets = end - r < 64 ? 1 : B::kSets;
-  clear(bins, map.bins, sets);
-  const auto put = [&](const Reference& ref, int set) {
-    alignas(16) std::int32_t b[4];
-    map(ref, b);
+  clear(bins, map.bins);
+  const auto put = [&](const Reference& ref, const std::int32_t* number) {
     const Box box = Box::load(&ref);
     for (int axis = 0; axis < 3; ++axis) {
-      bins.box[set][axis][b[axis]] = max_x86(box, bins.box[set][axis][b[axis]]);
-      ++bins.count4[b[axis]][axis];
+      Bin& bin = bins.bin[number[axis]];
+      bin.box[axis] = max_x86(box, bin.box[axis]);
+      ++bin.count[axis];
     }
   };
-  if (sets == 1) {
-    for (; r < end; ++r) put(*r, 0);
-    return;
-  }
-  if constexpr (B::kSets == 2) {
-    for (; r + 1 < end; r += 2) put(r[0], 0), put(r[1], 1);
-    if (r < end) put(*r, 0);
-    for (int axis = 0; axis < 3; ++axis) {
-      for (unsigned b = 0; b < map.bins; ++b) bins.box[0][axis][b] = max_x86(bins.box[0][axis][b], bins.box[1][axis][b]);
+  constexpr std::size_t kPlaces = 4, kAhead = 16;
+  alignas(16) std::int32_t numbers[kAhead][kPlaces][4];  // found for some references before any is put: stores and later loads keep out of each other's way
+  const std::size_t part = std::size_t(end - r) / kPlaces;
+  for (std::size_t begin = 0; begin < part; begin += kAhead) {
+    const std::size_t n = std::min(kAhead, part - begin);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < kPlaces; ++k) map(r[k * part + begin + i], numbers[i][k]);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < kPlaces; ++k) put(r[k * part + begin + i], numbers[i][k]);
     }
   }
+  for (r += kPlaces * part; r < end; ++r) map(*r, numbers[0][0]), put(*r, numbers[0][0]);
 }
 
 template <class B>
 void merge(B& into, const B& from, unsigned n) {
-  for (int axis = 0; axis < 3; ++axis) {
-    for (unsigned b = 0; b < n; ++b) {
-      into.box[0][axis][b] = max_x86(into.box[0][axis][b], from.box[0][axis][b]);
-      into.count4[b][axis] += from.count4[b][axis];
-    }
+  for (unsigned b = 0; b < n; ++b) {
+    Bin& bin = into.bin[b];
+    for (int axis = 0; axis < 3; ++axis) bin.box[axis] = max_x86(bin.box[axis], from.bin[b].box[axis]);
+    (vi<4>::load(bin.count) + vi<4>::load(from.bin[b].count)).store(bin.count);
   }
 }
 
@@ -176,7 +177,7 @@ ARBORETUM_INLINE vf<4> half_areas(const Box (&box)[3]) {
 
 template <class B>
 ARBORETUM_INLINE vf<4> counts_of(const B& bins, unsigned b) {
-  return to_float(vi<4>::load(bins.count4[b]));
+  return to_float(vi<4>::load(bins.bin[b].count));
 }
 
 /// Leaf blocks that `count` references fill, the last one perhaps in part.
@@ -196,7 +197,7 @@ Split best_split(const B& bins, unsigned n, std::size_t total, unsigned leaf_wid
   Box box[3] = {empty_box(), empty_box(), empty_box()};
   vf<4> count(0.0f);
   for (unsigned b = n; --b > 0;) {
-    for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b], box[axis]);
+    for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.bin[b].box[axis], box[axis]);
     count = count + counts_of(bins, b);
     right_cost[b] = select(count > zero, half_areas(box) * blocks(count), none);
   }
@@ -205,7 +206,7 @@ Split best_split(const B& bins, unsigned n, std::size_t total, unsigned leaf_wid
   vf<4> best_cost = none;
   vi<4> best_bin(0);
   for (unsigned b = 1; b < n; ++b) {
-    for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[0][axis][b - 1], box[axis]);
+    for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.bin[b - 1].box[axis], box[axis]);
     count = count + counts_of(bins, b - 1);
     const vf<4> cost = select(count > zero, half_areas(box) * blocks(count) + right_cost[b], none);
     const vm<4> better = cost < best_cost;
@@ -220,7 +221,7 @@ Split best_split(const B& bins, unsigned n, std::size_t total, unsigned leaf_wid
     if (costs[axis] < best.cost) best = {costs[axis], axis, unsigned(planes[axis]), 0};
   }
   if (best.axis < 0) return best;
-  for (unsigned b = 0; b < best.bin; ++b) best.left_count += std::uint32_t(bins.count4[b][best.axis]);
+  for (unsigned b = 0; b < best.bin; ++b) best.left_count += std::uint32_t(bins.bin[b].count[best.axis]);
   if (best.left_count == total) best.axis = -1;
   return best;
 }
@@ -229,8 +230,8 @@ Split best_split(const B& bins, unsigned n, std::size_t total, unsigned leaf_wid
 template <class B>
 void child_bounds(const B& bins, unsigned n, const Split& split, Box& left, Box& right) {
   left = right = empty_box();
-  for (unsigned b = 0; b < split.bin; ++b) left = max_x86(bins.box[0][split.axis][b], left);
-  for (unsigned b = split.bin; b < n; ++b) right = max_x86(bins.box[0][split.axis][b], right);
+  for (unsigned b = 0; b < split.bin; ++b) left = max_x86(bins.bin[b].box[split.axis], left);
+  for (unsigned b = split.bin; b < n; ++b) right = max_x86(bins.bin[b].box[split.axis], right);
 }
 
 /// Whether a reference lies left of a split.

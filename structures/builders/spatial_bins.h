@@ -33,7 +33,7 @@ struct SpatialMap {
   }
   /// The bins of four coordinates.
   ARBORETUM_INLINE vi<4> operator()(vf<4> position) const {
-    return min(max(truncate_to_int((position - lower) * scale), vi<4>(0)), vi<4>(std::int32_t(bins) - 1));
+    return min(max(truncate_to_int(three_lanes(position - lower) * scale), vi<4>(0)), vi<4>(std::int32_t(bins) - 1));
   }
   ARBORETUM_INLINE void reach(const Reference& r, std::int32_t* first, std::int32_t* last) const {
     (*this)(-vf<4>::load(r.neg_lower)).store(first), (*this)(vf<4>::load(r.upper)).store(last);

@@ -42,7 +42,9 @@ struct BinMap {
   void count(const Reference& r, Bins& out) const {
     const __m128 low = _mm_load_ps(lower), by = _mm_load_ps(scale), last = _mm_set1_ps(float(bins - 1)), most = _mm_set1_ps(float(bins));
     const __m128 begin = _mm_min_ps(_mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(&r.box.lower.x), low), by), last);
-    const __m128 end = _mm_min_ps(_mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(&r.box.upper.x), low), by), most);
+    // Behind the upper corner stands the id, which is subnormal as a float: slow to multiply.
+    const __m128 upper = _mm_and_ps(_mm_loadu_ps(&r.box.upper.x), _mm_castsi128_ps(_mm_setr_epi32(-1, -1, -1, 0)));
+    const __m128 end = _mm_min_ps(_mm_mul_ps(_mm_sub_ps(upper, low), by), most);
     const __m128i whole = _mm_cvttps_epi32(end);
     alignas(16) std::int32_t b[4], e[4];  // e: rounded up, which is the bin's number + 1
     _mm_store_si128(reinterpret_cast<__m128i*>(b), _mm_cvttps_epi32(begin));
