@@ -71,6 +71,8 @@ ARBORETUM_INLINE vf<4> high_half(Box b) {
 ARBORETUM_INLINE Box both_halves(vf<4> low, vf<4> high) {
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
   return Box(_mm256_insertf128_ps(_mm256_castps128_ps256(low.v), high.v, 1));
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+  return {low, high};
 #else
   alignas(32) float v[8];
   low.store(v), high.store(v + 4);
@@ -246,20 +248,18 @@ struct LeftOf {
 /// Bounds of the centroids on the two sides of a split, gathered without branches.
 class SideBounds {
  public:
-  ARBORETUM_INLINE SideBounds() {
-    for (vf<4>& b : bounds_) b = vf<4>(-std::numeric_limits<float>::infinity());
-  }
+  ARBORETUM_INLINE SideBounds() : left_(empty_box()), right_(empty_box()) {}
   ARBORETUM_INLINE void extend(const Reference& r, bool left) {
-    const vf<4> c = centroid(r), none = -std::numeric_limits<float>::infinity();
-    const vm<4> is_left(left);
-    bounds_[0] = max_x86(select(is_left, -c, none), bounds_[0]), bounds_[1] = max_x86(select(is_left, c, none), bounds_[1]);
-    bounds_[2] = max_x86(select(is_left, none, -c), bounds_[2]), bounds_[3] = max_x86(select(is_left, none, c), bounds_[3]);
+    const vf<4> c = centroid(r);
+    const Box point = both_halves(-c, c), none = empty_box();
+    const vm<8> is_left(left);
+    left_ = max_x86(select(is_left, point, none), left_), right_ = max_x86(select(is_left, none, point), right_);
   }
-  [[nodiscard]] Box left() const { return both_halves(bounds_[0], bounds_[1]); }
-  [[nodiscard]] Box right() const { return both_halves(bounds_[2], bounds_[3]); }
+  [[nodiscard]] Box left() const { return left_; }
+  [[nodiscard]] Box right() const { return right_; }
 
  private:
-  vf<4> bounds_[4];
+  Box left_, right_;
 };
 
 /// Moves references [r, end) to left_out and right_out, in order; returns the sides' centroid bounds.
