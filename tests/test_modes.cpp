@@ -353,6 +353,34 @@ TEST_CASE("streams and the kd-tree follow their depth too") {
   CHECK(seen > 20);
 }
 
+TEST_CASE("auto on SSE leaves streams for rays in flight where rays share little, and only there") {
+  if (!is_available(Isa::sse)) return;
+  const TriangleMesh fine = random_triangles(60'000, 0.01f, 5), coarse = random_triangles(40, 0.5f, 6);
+  for (const TriangleMesh* mesh : {&fine, &coarse}) {
+    Structures structures(*mesh);
+    // More than are taken the one way or the other before it is asked again, and no whole number of these.
+    const std::vector<Ray> rays = generic_rays(*mesh, 45'001, 7);
+    for (std::string_view structure : {"bvh4", "bvh8", "bvh16"}) {
+      const auto row = [&](std::string_view traversal) { return *find_kernel(structure, "triangle4", "moller_trumbore", "padded", traversal, Isa::sse); };
+      const Accel& accel = structures.get(row("auto"));
+      INFO(structure << ", " << mesh->size() << " triangles");
+      Counters closest, any;
+      const std::vector<Hit> hits = closest_hit(row("auto"), accel, rays, {}, &closest);
+      const std::vector<std::uint8_t> occluded = any_hit(row("auto"), accel, rays, {}, &any);
+      CHECK(closest.rays == rays.size());
+      CHECK(any.rays == rays.size());
+      const bool in_flight = mesh == &fine && structure != "bvh16";
+      CHECK((closest.queue_rounds > 0) == in_flight);
+      CHECK((any.queue_rounds > 0) == in_flight);
+      const std::vector<Hit> alone = closest_hit(row("single"), accel, rays, {});
+      CHECK(std::memcmp(hits.data(), alone.data(), hits.size() * sizeof(Hit)) == 0);
+      CHECK(occluded == any_hit(row("single"), accel, rays, {}));
+      CHECK(std::memcmp(closest_hit(row("auto"), accel, rays, {}).data(), alone.data(), hits.size() * sizeof(Hit)) == 0);
+      CHECK(any_hit(row("auto"), accel, rays, {}) == occluded);
+    }
+  }
+}
+
 TEST_CASE("settings of a way of traversal: in the plan, in the cell's name and in effective.yaml where they mean something, refused elsewhere") {
   const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("arboretum-modes-" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);

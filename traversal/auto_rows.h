@@ -2,7 +2,7 @@
 //
 // A tile of 64 rays is coherent when a sample of its rays leaves no wide cone: their directions lie close together. Such tiles go as packets,
 // whose interval test then decides for most rays at once; the others go as the structure's best way for rays that share little: the wide BVHs' streams, whose rays share nodes
-// as long as they can and hide each other's latency after that; rays in flight or single rays where there are none. In structures of small steps (kd-tree, octree, bounding interval hierarchy) packets are worth while
+// as long as they can and hide each other's latency after that (on SSE rays in flight where they share too little, structures/bvh/bvh_streams_or_queue.h); rays in flight or single rays where there are none. In structures of small steps (kd-tree, octree, bounding interval hierarchy) packets are worth while
 // for rays that only start near each other, too. In the wide BVHs, whether packets are better than streams depends on the scene as well: where triangles are small, rays that are close together
 // meet different ones, and packets that let too many of their rays go on alone hand the tiles that follow to streams, for a while. What a mode
 // costs for the wrong rays is in docs/performance.md. Every way gives the same hits, so the choice changes no answer.

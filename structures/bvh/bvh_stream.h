@@ -25,6 +25,9 @@ inline constexpr unsigned kGroupsInTurn = 12;
 template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
 class Stream {
  public:
+  /// Where somebody asks how its rays share (bvh_streams_or_queue.h).
+  static constexpr bool kCountsTurns = kRegisterWidth == 4;
+
   /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
       : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
@@ -47,6 +50,13 @@ class Stream {
         if (!fill(group, group.stack)) turn[i] = turn[--groups];
       }
     }
+  }
+
+  /// How many rays of a group visited a node or leaf together, on average.
+  [[nodiscard]] float rays_a_turn() const
+    requires kCountsTurns
+  {
+    return float(rays_in_turns_) / float(std::max(turns_, std::uint64_t{1}));
   }
 
  private:
@@ -165,6 +175,7 @@ class Stream {
   /// One node or leaf; false when nothing waits any more.
   ARBORETUM_INLINE bool step(Group& g) {
     if (g.visitors == 0) return false;  // none of its rays is one
+    if constexpr (kCountsTurns) ++turns_, rays_in_turns_ += unsigned(__builtin_popcountll(g.visitors));
     if (bvh::is_leaf(g.target)) {
       leaf(g, g.target, g.visitors);
     } else {
@@ -247,6 +258,7 @@ class Stream {
   const std::size_t stack_entries_;
   const std::unique_ptr<std::uint32_t[]> stacks_;
   const std::unique_ptr<Group[]> groups_;
+  std::uint64_t turns_ = 0, rays_in_turns_ = 0;  ///< where kCountsTurns
   std::size_t next_ = 0;
   std::uint32_t list_[8][kRays];
   unsigned waiting_[8] = {};
