@@ -39,6 +39,7 @@ struct Exact {
   static constexpr std::string_view kName = "exact";
   static constexpr bool reads(TriangleForm form) { return form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = true;
+  static constexpr bool kDepthBetweenCorners = true;
 
   /// The ray's constants, and the search's state: the best hit's corners and the low end of its interval.
   struct RayData : ShearedRay {

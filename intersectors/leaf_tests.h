@@ -44,6 +44,8 @@ struct LeafTests {
   bool (*any_hit)(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, float tfar) = nullptr;
   /// nullptr, or what is to be done once with the nearest hit of all.
   void (*finish)(PreparedRay& ray, NearestHit& best) = nullptr;
+  /// Boxes may be tight along the ray (traversal/box_test.h).
+  bool depth_between_corners = false;
 };
 
 /// All of this executable whose instruction set this machine runs.

@@ -9,6 +9,11 @@ namespace arboretum {
 template <class Intersector, class Block>
 inline constexpr bool kCanRead = Intersector::reads(Block::kForm == TriangleForm::indices ? TriangleForm::vertices : Block::kForm);
 
+/// An intersector that says so: what it hits is as far away, along the axis where the direction is largest, as some point between the triangle's corners, and all that it
+/// misjudges is where the ray passes across that axis (traversal/box_test.h).
+template <class Intersector>
+inline constexpr bool kDepthBetweenCorners = requires { requires Intersector::kDepthBetweenCorners; };
+
 namespace ARBORETUM_ISA_NAMESPACE {
 
 template <class Intersector, class Block>
@@ -43,7 +48,7 @@ void add_leaf_tests(std::vector<LeafTests>& list) {
   for_each_type(BlocksOf<Intersector>{}, [&]<class Block>(std::type_identity<Block>) {
     if constexpr (kCanRead<Intersector, Block>) {
       using T = CalledTests<Intersector, Block>;
-      list.push_back({Block::kName, Intersector::kName, kIsa, nullptr, &T::prepare, &T::closest_hit, &T::any_hit, kFinishes<Intersector> ? &T::finish : nullptr});
+      list.push_back({Block::kName, Intersector::kName, kIsa, nullptr, &T::prepare, &T::closest_hit, &T::any_hit, kFinishes<Intersector> ? &T::finish : nullptr, kDepthBetweenCorners<Intersector>});
     }
   });
 }

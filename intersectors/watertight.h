@@ -31,6 +31,8 @@ struct Watertight {
   static constexpr std::string_view kName = "watertight";
   static constexpr bool reads(TriangleForm form) { return form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = true;
+  /// t is a mean of the corners' distances, or the plane's kept between them; what is rounded are the sheared x and y.
+  static constexpr bool kDepthBetweenCorners = true;
 
   using RayData = ShearedRay;
 

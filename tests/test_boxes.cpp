@@ -110,9 +110,10 @@ TEST_CASE("padded boxes are never missed, Ize's not where a ray is in them for 2
     }
     for (Isa isa : available_isas()) {
       const auto met = [&](Test test) { return meets(isa, test, draw.ray, draw.max_coordinate, draw.boxes); };
-      const unsigned fast = met(Test::fast), ize = met(Test::ize), padded = met(Test::padded);
+      const unsigned fast = met(Test::fast), ize = met(Test::ize), padded = met(Test::padded), tight = met(Test::tight);
       INFO(to_string(isa) << ", draw " << i);
       REQUIRE((touch & ~padded) == 0);
+      REQUIRE((touch & ~tight) == 0);
       REQUIRE((must & ~ize) == 0);
       Counts& c = counts[isa];
       c.missed_by_fast += std::size_t(std::popcount(touch & ~fast)), c.missed_by_ize += std::size_t(std::popcount(touch & ~ize));
@@ -145,6 +146,47 @@ TEST_CASE("two ulp are not enough for every box that a ray touches at an edge") 
     INFO(to_string(isa));
     CHECK(meets(isa, Test::ize, ray, 3.0f, boxes) == 0);
     CHECK(meets(isa, Test::padded, ray, 3.0f, boxes) == 0xffu);
+  }
+}
+
+TEST_CASE("boxes that are tight along the ray leave out what a ray has left by a step of eight ulp, in a large scene too; wide ones do not") {
+  Boxes wall{};
+  for (int lane = 0; lane < 8; ++lane) {
+    const float planes[6] = {-100.0f, 100.0f, -100.0f, 100.0f, 3.0f, 3.0f};
+    for (int k = 0; k < 6; ++k) wall.planes[k][lane] = planes[k];
+  }
+  const float step = 8 * 0x1p-22f;
+  for (float towards : {1.0f, -1.0f}) {
+    const Ray leaving{{1.0f, 2.0f, 3.0f + towards * step}, 0.0f, {0.5f, 0.25f, towards}, kInfinity}, returning{leaving.origin, 0.0f, leaving.direction * -1.0f, kInfinity};
+    const Ray along{leaving.origin, 0.0f, {4.0f, 0.25f, towards}, kInfinity};
+    for (Isa isa : available_isas()) {
+      INFO(to_string(isa) << ", towards " << towards);
+      CHECK(meets(isa, Test::tight, leaving, 500.0f, wall) == 0);
+      CHECK(meets(isa, Test::padded, leaving, 500.0f, wall) == 0xffu);
+      CHECK(meets(isa, Test::tight, returning, 500.0f, wall) == 0xffu);
+      CHECK(meets(isa, Test::tight, along, 500.0f, wall) == 0xffu);  // z is not the axis
+    }
+  }
+}
+
+TEST_CASE("a ray in the plane of a box's face meets it from any distance") {
+  Boxes boxes{};
+  for (int lane = 0; lane < 8; ++lane) {
+    for (int k = 0; k < 6; ++k) boxes.planes[k][lane] = float(k % 2);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int exponent = 0; exponent < 120; ++exponent) {
+      for (float face : {0.0f, 1.0f}) {
+        Ray ray{{face, face, face}, 0.0f, {0.0f, -0.0f, 0.0f}, kInfinity};
+        ray.origin[axis] = -std::ldexp(1.0f, exponent), ray.direction[axis] = 0.5f;
+        REQUIRE(inside(boxes, 0, ray));
+        for (Isa isa : available_isas()) {
+          INFO(to_string(isa) << ", axis " << axis << ", from 2^" << exponent);
+          CHECK(meets(isa, Test::padded, ray, 1.0f, boxes) == 0xffu);
+          CHECK(meets(isa, Test::tight, ray, 1.0f, boxes) == 0xffu);
+        }
+      }
+    }
   }
 }
 

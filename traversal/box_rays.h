@@ -17,7 +17,7 @@ template <class F>
   }
 }
 
-/// Structures of arrays. The constants are computed W rays at a time by the operations of BoxRay, so they are the same bits.
+/// Structures of arrays. The constants are computed W rays at a time by the operations of BoxRay, so they are the same bits, but for pads that are tight along the ray.
 struct BoxRays : LaneRays {
   alignas(64) float r[3][kMost], near[3][kMost], far[3][kMost];  ///< BoxRay's r, f, g
   alignas(64) float first[kMost];  ///< distance from which boxes count
@@ -25,19 +25,19 @@ struct BoxRays : LaneRays {
 
   /// As LaneRays::prepare().
   template <int W, int N, class RayAt, class Each>
-  ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, bool padded, float max_coordinate, const Each& each) {
+  ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, bool padded, BoxPad pad, const Each& each) {
     overflown = 0;
     LaneRays::prepare<W>(count, ray_at, [&](int k) {
-      constants<W, N>(k, padded, max_coordinate);
+      constants<W, N>(k, padded, pad);
       each(k);
     });
     if (__builtin_expect((overflown &= valid) != 0, 0)) {
       for (std::uint64_t rest = overflown; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
         if (padded) {
-          mend(i, BoxRay<N, true>(ray_at(i), max_coordinate));
+          mend(i, BoxRay<N, true>(ray_at(i), pad.max_coordinate));
         } else {
-          mend(i, BoxRay<N, false>(ray_at(i), max_coordinate));
+          mend(i, BoxRay<N, false>(ray_at(i), pad.max_coordinate));
         }
       }
     }
@@ -45,20 +45,25 @@ struct BoxRays : LaneRays {
 
  private:
   template <int W, int N>
-  ARBORETUM_INLINE void constants(int k, bool padded, float max_coordinate) {
+  ARBORETUM_INLINE void constants(int k, bool padded, BoxPad pad) {
     using F = vf<W>;
     using Box = BoxRay<N, true>;
     const F o[3] = {F::load(rays.origin[0] + k), F::load(rays.origin[1] + k), F::load(rays.origin[2] + k)};
     const F d[3] = {F::load(rays.direction[0] + k), F::load(rays.direction[1] + k), F::load(rays.direction[2] + k)};
-    const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-    max_x86(F::load(rays.tnear + k), F(0.0f)).store(first + k);
-    vm<W> overflows(false);
+    const F size[3] = {abs(d[0]), abs(d[1]), abs(d[2])}, largest = max_x86(max_x86(size[0], size[1]), size[2]);
+    (max_x86(F::load(rays.tnear + k), F(0.0f)) * F(pad.before)).store(first + k);
+    vm<W> overflows(false), tight[3] = {vm<W>(false), vm<W>(false), vm<W>(false)};
+    if (pad.tight) {  // as largest_last() has it, of equal ones too
+      const vm<W> x_over_y = size[0] > size[1];
+      tight[0] = x_over_y & (size[0] > size[2]), tight[1] = ~x_over_y & (size[1] > size[2]), tight[2] = ~(tight[0] | tight[1]);
+    }
+    const auto origin = [&] { return max_x86(max_x86(abs(o[0]), abs(o[1])), abs(o[2])); };
     for (int a = 0; a < 3; ++a) {
       F rs, fs, gs;
       if (padded) {
-        Box::template constants<true>(o[a], d[a], largest, F(max_coordinate), rs, fs, gs);
+        Box::template constants<true>(o[a], d[a], largest, origin, F(pad.max_coordinate), tight[a], rs, fs, gs);
       } else {
-        Box::template constants<false>(o[a], d[a], largest, F(max_coordinate), rs, fs, gs);
+        Box::template constants<false>(o[a], d[a], largest, origin, F(pad.max_coordinate), tight[a], rs, fs, gs);
       }
       rs.store(r[a] + k), fs.store(near[a] + k), gs.store(far[a] + k);
       overflows = overflows | Box::overflows(d[a], rs, fs, gs);

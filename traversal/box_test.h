@@ -8,13 +8,23 @@
 // plane * r - o * r is off by u (M + |o|)|r| from (plane - o)/d; rounding o * r, adding e, and the fused operation's own
 // rounding add less than u (|o| + |e| / |r| + M + |o|)|r| each: in all under 4 u (M + |o|)|r| = e / 2. A direction component below
 // 2^-60 of the largest gets r = 2^60 / |d|max: the ray moves by less than the pad along that axis wherever it can meet the
-// scene, and e alone is then larger than any such t.
+// scene, and e alone is then larger than any such t, which is (M + |o|max) / |d|max at most. Where it is not, for a ray from more than some 2^39 M away, the axis is left out.
 //
 // Without FMA (scalar, SSE) t = (plane - o) * r with r = 1/d, infinite for 0; padded: the origin of the near planes is moved
 // by e = 2^-21 (M + |o|) along the direction, that of the far planes against it (as Woop, Benthin, Wald 2013 do), so both ends
 // of the interval are padded for the cost of none. Proof: the moved origin, the difference and the two factors round by less
 // than 4 u (M + |o| + e)|r| together, which is under e |r|. (Ize's pad is in ize_box.h.) 0 * inf is NaN in the fast test;
 // min_x86 and max_x86 keep their second operand, the running value, and so ignore it.
+//
+// Tight along the ray (BoxPad): where the direction is largest, along z say, e is only c |o||r| with c = 2^-23 (1 + 2^-20) (FMA), or 0, and the interval's ends
+// are scaled by 1 -+ 2^-20 instead, once a ray and once a hit. No touched box is lost either. Proof (FMA): let the exact ray be in the box at T within the interval. The rounded
+// o * r and f are off by (2 u + u^2)|o r| together, which e, however it is rounded, makes good, so near_z <= T (1 + 2 u) and far_z >= T (1 - 2 u), up to u^2. The wide pads of x and y are
+// e = 8 u (M + |o|)|r|, of which half is slack; and (M + |o|)|r| >= T, since the ray is in the box at T: near_x <= T (1 - 4 u), far_x >= T (1 + 4 u). So an
+// entry in z is before an exit in x, and the other way round; in z itself the two are the same rounded, so monotone, function of planes that are in order; and the interval's own ends are
+// scaled by 16 u. Without FMA z has three relative roundings, 3 u, and the rest is the same. Boxes that a ray starts on then do not count, where wide pads reach back over any step
+// that it may have taken off its surface: kitchen interior's diffuse rays test a third fewer triangles (docs/performance.md).
+// Who may ask for it: intersectors that find nothing but what the exact ray meets (`exact`), or which a ray that is moved across z alone would meet, for what the pads of x and y
+// stand, and at a distance between those of the nearest and the farthest corner along z (`watertight`: kDepthBetweenCorners).
 //
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once
@@ -26,6 +36,19 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 /// Where a ray enters boxes at the earliest: tnear, and 0 for -0, since distances are ordered by their bits.
 [[nodiscard]] ARBORETUM_INLINE float first_distance(const Ray& ray) { return ray.tnear > 0.0f ? ray.tnear : 0.0f; }
+
+/// What padded boxes are padded by, where many rays are prepared together (box_rays.h): one ray alone loses by finding its largest axis what it gains (docs/performance.md).
+struct BoxPad {
+  float max_coordinate;  ///< the scene's largest
+  float before = 1.0f, beyond = 1.0f;  ///< what the interval's ends are scaled by
+  bool tight = false;    ///< along the axis where the direction is largest (above)
+
+  /// Wide along all axes.
+  ARBORETUM_INLINE BoxPad(float scene_max) : max_coordinate(scene_max) {}
+  ARBORETUM_INLINE BoxPad(float scene_max, bool tight_along_ray) : max_coordinate(scene_max), tight(tight_along_ray) {
+    if (tight) before = 1.0f - 0x1p-20f, beyond = 1.0f + 0x1p-20f;
+  }
+};
 
 /// One ray's constants for boxes.
 template <int N, bool Padded>
@@ -43,7 +66,7 @@ struct BoxRay {
     using F = vf<4>;
     const F o = F::load(&ray.origin), d = F::load(&ray.direction);
     F rs, fs, gs;
-    constants<Padded>(o, d, F(largest(ray.direction)), F(max_coordinate), rs, fs, gs);
+    constants<Padded>(o, d, F(largest(ray.direction)), [&] { return F(largest(ray.origin)); }, F(max_coordinate), vm<4>(false), rs, fs, gs);
     r = axes(rs), f = axes(fs), g = axes(gs);
     if (__builtin_expect((overflows(d, rs, fs, gs).bits() & 7u) != 0, 0)) leave_out(ray.direction.x, r.x, f.x, g.x), leave_out(ray.direction.y, r.y, f.y, g.y), leave_out(ray.direction.z, r.z, f.z, g.z);
     octant = sign_mask(rs) & 7u;
@@ -57,9 +80,9 @@ struct BoxRay {
   ARBORETUM_INLINE unsigned near_y() const { return (2 + (octant >> 1 & 1u)) * kSide; }
   ARBORETUM_INLINE unsigned near_z() const { return (4 + (octant >> 2)) * kSide; }
 
-  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest`: the largest |component| of the ray's direction.
-  template <bool Pad, class F>
-  static ARBORETUM_INLINE void constants(F o, F d, F largest, F max_coordinate, F& r, F& f, F& g) {
+  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; `tight`: the pad along this axis is.
+  template <bool Pad, class F, class Mask, class Origin>
+  static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin, F max_coordinate, [[maybe_unused]] Mask tight, F& r, F& f, F& g) {
     if constexpr (kHasFma) {
       r = F(1.0f) / d;
       // A branch, rarely taken: no division waits for `largest`.
@@ -67,14 +90,16 @@ struct BoxRay {
       if (__builtin_expect(any(tiny), 0)) r = select(tiny, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       f = g = o * r;
       if constexpr (Pad) {
-        const F e = F(0x1p-21f) * ((max_coordinate + abs(o)) * abs(r)) + F(0x1p-100f);  // in this order: 2^-21 of a tiny scene may be nothing
+        const F reach = select(tight, F(0.0f), max_coordinate) + abs(o), share = select(tight, F(0x1.00001p-23f), F(0x1p-21f));
+        F e = share * (reach * abs(r)) + F(0x1p-100f);  // in this order: 2^-21 of a tiny scene may be nothing
+        if (__builtin_expect(any(tiny), 0)) e = select(tiny & ~(e > F(2.0f) * ((max_coordinate + origin()) / largest)), F(kTooLarge), e);  // left out, as what overflows
         f = f + e, g = g - e;
       }
     } else {
       r = F(1.0f) / d;
       f = g = o;
       if constexpr (Pad) {
-        const F e = xor_sign(F(0x1p-21f) * (max_coordinate + abs(o)) + F(0x1p-100f), sign_bits(r));
+        const F e = xor_sign(select(tight, F(0.0f), F(0x1p-21f) * (max_coordinate + abs(o))) + F(0x1p-100f), sign_bits(r));
         f = f + e, g = g - e;
       }
     }

@@ -30,7 +30,7 @@ class Stream {
 
   /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
-      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
+      : base_(tree.base()), root_(tree.root()), pad_(tree.max_coordinate(), Padded && row.tests->depth_between_corners), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
         order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(std::make_unique_for_overwrite<std::uint32_t[]>(count_ * StreamStack::words(stack_entries_))), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
@@ -85,7 +85,7 @@ class Stream {
   struct alignas(64) Group {
     Line line[kRays];
     [[no_unique_address]] std::conditional_t<kTwoOffsets, std::array<Ray, kRays>, Nothing> rays;
-    float t[kRays];  ///< nearest hit so far
+    float t[kRays];  ///< the distance up to which boxes count: to the nearest hit so far
     NearestHit best[kRays];
     std::uint32_t index[kRays];
     alignas(64) std::byte data[kKeepsData ? kRays * sizeof(RayData) : 1];
@@ -133,7 +133,7 @@ class Stream {
     const std::uint32_t* const list = list_[octant];
     const int count = int(std::exchange(waiting_[octant], 0u));
     const auto ray_at = [&](int i) -> const Ray& { return rays_[list[i]]; };
-    lanes_.template prepare<kNative, N>(count, ray_at, Padded, max_coordinate_, [](int) {});
+    lanes_.template prepare<kNative, N>(count, ray_at, Padded, pad_, [](int) {});
     for (int k = 0; k < count; k += 4) gather(g, k);
     for (int i = 0; i < count; ++i) {
       g.index[i] = list[i], ray(g, unsigned(i)) = ray_at(i);
@@ -142,7 +142,7 @@ class Stream {
         if (lanes_.valid >> i & 1u) new (static_cast<void*>(g.data + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(ray_at(i)));
       }
     }
-    std::memcpy(g.t, lanes_.t, sizeof g.t);
+    for (int k = 0; k < int(kRays); k += kNative) (vf<kNative>::load(lanes_.t + k) * vf<kNative>(pad_.beyond)).store(g.t + k);
     g.count = unsigned(count), g.octant = octant, g.active = lanes_.valid;
     g.stack = stack, g.top = 0;
     g.target = root_, g.visitors = g.active;
@@ -235,11 +235,11 @@ class Stream {
   [[gnu::noinline]] void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
     const std::byte* const blocks = base_ + bvh::offset_of(target);
     const unsigned count = bvh::block_count(target);
-    const auto hit = [&g](int i) {
+    const auto hit = [&g, beyond = pad_.beyond](int i) {
       if constexpr (AnyHit) {
         g.best[i].primitive = 0, g.active &= ~(std::uint64_t{1} << i);
       } else {
-        g.t[i] = g.best[i].t;
+        g.t[i] = g.best[i].t * beyond;
       }
     };
     test_leaf<AnyHit>(leaves_, form_, counting_, blocks, count, rays, [&](int i) -> const Ray& { return ray(g, unsigned(i)); }, [&](int i) -> decltype(auto) { return data(g, unsigned(i)); },
@@ -248,7 +248,7 @@ class Stream {
 
   const std::byte* const base_;
   const bvh::NodeReference root_;
-  const float max_coordinate_;
+  const BoxPad pad_;
   const Leaves leaves_;
   const LeafForm& form_;
   const Counting counting_;

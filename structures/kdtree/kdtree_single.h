@@ -35,10 +35,11 @@ struct KdRay {
   static constexpr float kPad = 0x1p-21f;
   static constexpr float kTooLarge = 0x1p124f, kAllOfT = std::numeric_limits<float>::max();
 
-  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest`: the largest |component| of the ray's direction; `pad`: kPad, or 0 for `fast` planes. Returns
-  /// the lanes whose axis counts: where constants may have overflown it is left out, with a reciprocal of 1 and constants by which every plane is met at all t.
-  template <class F>
-  static ARBORETUM_INLINE auto constants(F o, F d, F largest, float max_coordinate, float pad, F& r, F& enter, F& leave) {
+  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; `pad`: kPad, or 0 for `fast` planes. Returns
+  /// the lanes whose axis counts: where constants may have overflown, or a parallel ray comes from so far that its pad is less than t (traversal/box_test.h), it is left out, with a
+  /// reciprocal of 1 and constants by which every plane is met at all t.
+  template <class F, class Origin>
+  static ARBORETUM_INLINE auto constants(F o, F d, F largest, const Origin& origin, float max_coordinate, float pad, F& r, F& enter, F& leave) {
     r = F(1.0f) / d;
     F share(pad), least(pad * 0x1p-79f);
     // Branches, rarely taken: no division waits for `largest`.
@@ -48,7 +49,9 @@ struct KdRay {
       share = select(parallel, F(kPad), share), least = select(parallel, F(0x1p-100f), least);
     }
     // In this order, since a share of a tiny scene may be nothing. Where the product overflows the axis is left out, as below.
-    const F at = o * r, e = share * ((F(max_coordinate) + abs(o)) * abs(r)) + least;
+    const F at = o * r;
+    F e = share * ((F(max_coordinate) + abs(o)) * abs(r)) + least;
+    if (__builtin_expect(any(parallel), 0)) e = select(parallel & ~(e > F(2.0f) * ((F(max_coordinate) + origin()) / largest)), F(kTooLarge), e);
     enter = at + e, leave = at - e;
     const auto fits = abs(enter) + abs(leave) < F(kTooLarge);
     if (__builtin_expect(any(~fits), 0)) {
@@ -61,10 +64,12 @@ struct KdRay {
   KdRay() = default;
   ARBORETUM_INLINE KdRay(const Ray& ray, float max_coordinate, float pad) {
     using F = vf<4>;  // the axes stand in lanes
-    const float x = __builtin_fabsf(ray.direction.x), y = __builtin_fabsf(ray.direction.y), z = __builtin_fabsf(ray.direction.z);
-    const float xy = x > y ? x : y;
+    const auto largest = [](Vec3f v) {
+      const float x = __builtin_fabsf(v.x), y = __builtin_fabsf(v.y), z = __builtin_fabsf(v.z), xy = x > y ? x : y;
+      return F(xy > z ? xy : z);
+    };
     F rs, in, out;
-    constants(F::load(&ray.origin), F::load(&ray.direction), F(xy > z ? xy : z), max_coordinate, pad, rs, in, out);
+    constants(F::load(&ray.origin), F::load(&ray.direction), largest(ray.direction), [&] { return largest(ray.origin); }, max_coordinate, pad, rs, in, out);
     rs.store(r), in.store(enter), out.store(leave);
     const unsigned negative = sign_mask(rs);
     for (unsigned k = 0; k < 3; ++k) far[k] = negative >> k & 1u ? 0u : 8u;

@@ -10,7 +10,7 @@ struct Boxes {
   alignas(64) float planes[6][8];
 };
 
-enum class Test { fast, ize, padded };
+enum class Test { fast, ize, padded, tight };  ///< tight: padded boxes, tight along the ray
 
 /// The boxes that the test lets the ray into, as bits. `max_coordinate`: the largest of the scene.
 unsigned meets_scalar(Test test, const Ray& ray, float max_coordinate, const Boxes& boxes);
