@@ -61,9 +61,9 @@ struct BoxRays : LaneRays {
     for (int a = 0; a < 3; ++a) {
       F rs, fs, gs;
       if (padded) {
-        Box::template constants<true>(o[a], d[a], largest, origin, F(pad.max_coordinate), tight[a], rs, fs, gs);
+        Box::template constants<true>(o[a], d[a], largest, origin, pad, tight[a], rs, fs, gs);
       } else {
-        Box::template constants<false>(o[a], d[a], largest, origin, F(pad.max_coordinate), tight[a], rs, fs, gs);
+        Box::template constants<false>(o[a], d[a], largest, origin, pad, tight[a], rs, fs, gs);
       }
       rs.store(r[a] + k), fs.store(near[a] + k), gs.store(far[a] + k);
       overflows = overflows | Box::overflows(d[a], rs, fs, gs);

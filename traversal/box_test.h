@@ -1,7 +1,7 @@
 // Box tests: one ray against the N child boxes of a node.
 //
 // FastBox keeps no promise at all: rounding can lose a box that the exact ray touches only at a face, edge or corner.
-// PaddedBox never misses a box that the exact ray touches: its interval [near, far] holds the exact one, for every t.
+// PaddedBox never misses a box that the exact ray touches: its interval [near, far] holds the exact one, for every t (but see "tight" below).
 //
 // With FMA (AVX2, AVX-512) a plane costs one fused multiply: t = plane * r - o * r. Padded: the constants are
 // o * r +- e with e = 2^-21 (M + |o|) |r|, M the scene's largest |coordinate|. Proof: r = (1/d)(1 + a), |a| <= u = 2^-24, so
@@ -18,13 +18,14 @@
 //
 // Tight along the ray (BoxPad): where the direction is largest, along z say, e is only c |o||r| with c = 2^-23 (1 + 2^-20) (FMA), or 0, and the interval's ends
 // are scaled by 1 -+ 2^-20 instead, once a ray and once a hit. No touched box is lost either. Proof (FMA): let the exact ray be in the box at T within the interval. The rounded
-// o * r and f are off by (2 u + u^2)|o r| together, which e, however it is rounded, makes good, so near_z <= T (1 + 2 u) and far_z >= T (1 - 2 u), up to u^2. The wide pads of x and y are
-// e = 8 u (M + |o|)|r|, of which half is slack; and (M + |o|)|r| >= T, since the ray is in the box at T: near_x <= T (1 - 4 u), far_x >= T (1 + 4 u). So an
-// entry in z is before an exit in x, and the other way round; in z itself the two are the same rounded, so monotone, function of planes that are in order; and the interval's own ends are
-// scaled by 16 u. Without FMA z has three relative roundings, 3 u, and the rest is the same. Boxes that a ray starts on then do not count, where wide pads reach back over any step
-// that it may have taken off its surface: kitchen interior's diffuse rays test a third fewer triangles (docs/performance.md).
+// o * r and f are off by (2 u + u^2)|o r| together, which e, however it is rounded, makes good, so near_z <= T (1 + 2 u) and far_z >= T (1 - 2 u), up to u^2. The pads of x and y are
+// then e = 12 u (M + |o|)|r|, of which 4 u make good their own roundings; and (M + |o|)|r| >= T, since the ray is in the box at T: near_x <= T (1 - 8 u), far_x >= T (1 + 8 u). So an
+// entry in z is before an exit in x, and the other way round, also where r is subnormal and z off by 6 u; in z itself the two are the same rounded, so monotone, function of planes that are
+// in order; and the interval's own ends are scaled by 16 u. Without FMA z has three relative roundings, 3 u, and the rest is the same. Boxes that a ray starts on then do not count, where
+// wide pads reach back over any step that it may have taken off its surface.
 // Who may ask for it: intersectors that find nothing but what the exact ray meets (`exact`), or which a ray that is moved across z alone would meet, for what the pads of x and y
-// stand, and at a distance between those of the nearest and the farthest corner along z (`watertight`: kDepthBetweenCorners).
+// stand, and at a distance between those of the nearest and the farthest corner along z (`watertight`: kDepthBetweenCorners; its sheared x is off by 3 u (M + |o|) where shears are fused
+// and 4 u where not, the corners' errors being averaged as their depths are: with x's own 4 u and z's 2 or 3 u that is 9 or 11 u of the 12).
 //
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once
@@ -40,13 +41,14 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// What padded boxes are padded by, where many rays are prepared together (box_rays.h): one ray alone loses by finding its largest axis what it gains (docs/performance.md).
 struct BoxPad {
   float max_coordinate;  ///< the scene's largest
+  float share = 0x1p-21f;              ///< of M + |o|, along the other axes
   float before = 1.0f, beyond = 1.0f;  ///< what the interval's ends are scaled by
   bool tight = false;    ///< along the axis where the direction is largest (above)
 
   /// Wide along all axes.
   ARBORETUM_INLINE BoxPad(float scene_max) : max_coordinate(scene_max) {}
   ARBORETUM_INLINE BoxPad(float scene_max, bool tight_along_ray) : max_coordinate(scene_max), tight(tight_along_ray) {
-    if (tight) before = 1.0f - 0x1p-20f, beyond = 1.0f + 0x1p-20f;
+    if (tight) share = 0x1.8p-21f, before = 1.0f - 0x1p-20f, beyond = 1.0f + 0x1p-20f;
   }
 };
 
@@ -66,7 +68,7 @@ struct BoxRay {
     using F = vf<4>;
     const F o = F::load(&ray.origin), d = F::load(&ray.direction);
     F rs, fs, gs;
-    constants<Padded>(o, d, F(largest(ray.direction)), [&] { return F(largest(ray.origin)); }, F(max_coordinate), vm<4>(false), rs, fs, gs);
+    constants<Padded>(o, d, F(largest(ray.direction)), [&] { return F(largest(ray.origin)); }, BoxPad(max_coordinate), vm<4>(false), rs, fs, gs);
     r = axes(rs), f = axes(fs), g = axes(gs);
     if (__builtin_expect((overflows(d, rs, fs, gs).bits() & 7u) != 0, 0)) leave_out(ray.direction.x, r.x, f.x, g.x), leave_out(ray.direction.y, r.y, f.y, g.y), leave_out(ray.direction.z, r.z, f.z, g.z);
     octant = sign_mask(rs) & 7u;
@@ -82,7 +84,8 @@ struct BoxRay {
 
   /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; `tight`: the pad along this axis is.
   template <bool Pad, class F, class Mask, class Origin>
-  static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin, F max_coordinate, [[maybe_unused]] Mask tight, F& r, F& f, F& g) {
+  static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin, [[maybe_unused]] BoxPad pad, [[maybe_unused]] Mask tight, F& r, F& f, F& g) {
+    [[maybe_unused]] const F max_coordinate(pad.max_coordinate), wide(pad.share);
     if constexpr (kHasFma) {
       r = F(1.0f) / d;
       // A branch, rarely taken: no division waits for `largest`.
@@ -90,7 +93,7 @@ struct BoxRay {
       if (__builtin_expect(any(tiny), 0)) r = select(tiny, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       f = g = o * r;
       if constexpr (Pad) {
-        const F reach = select(tight, F(0.0f), max_coordinate) + abs(o), share = select(tight, F(0x1.00001p-23f), F(0x1p-21f));
+        const F reach = select(tight, F(0.0f), max_coordinate) + abs(o), share = select(tight, F(0x1.00001p-23f), wide);
         F e = share * (reach * abs(r)) + F(0x1p-100f);  // in this order: 2^-21 of a tiny scene may be nothing
         if (__builtin_expect(any(tiny), 0)) e = select(tiny & ~(e > F(2.0f) * ((max_coordinate + origin()) / largest)), F(kTooLarge), e);  // left out, as what overflows
         f = f + e, g = g - e;
@@ -99,7 +102,7 @@ struct BoxRay {
       r = F(1.0f) / d;
       f = g = o;
       if constexpr (Pad) {
-        const F e = xor_sign(select(tight, F(0.0f), F(0x1p-21f) * (max_coordinate + abs(o))) + F(0x1p-100f), sign_bits(r));
+        const F e = xor_sign(select(tight, F(0.0f), wide * (max_coordinate + abs(o))) + F(0x1p-100f), sign_bits(r));
         f = f + e, g = g - e;
       }
     }

@@ -31,7 +31,7 @@ struct SpatialMap {
     lower = -low_half(bounds), width = extent * vf<4>(1.0f / float(bins));
     scale = select(extent > vf<4>(kFlat), vf<4>(float(bins)) / extent, vf<4>(0.0f));
   }
-  /// The bins of four coordinates.
+  /// The bins of three coordinates.
   ARBORETUM_INLINE vi<4> operator()(vf<4> position) const {
     return min(max(truncate_to_int(three_lanes(position - lower) * scale), vi<4>(0)), vi<4>(std::int32_t(bins) - 1));
   }
