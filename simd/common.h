@@ -14,6 +14,17 @@ template <int W> ARBORETUM_INLINE vi<W> sign_bits(vf<W> a) { return a.as_int() &
 template <int W> ARBORETUM_INLINE vf<W> xor_sign(vf<W> a, vi<W> sign) { return vf<W>::from_int_bits(a.as_int() ^ sign); }
 template <int W> ARBORETUM_INLINE vf<W> operator-(vf<W> a) { return xor_sign(a, vi<W>(std::numeric_limits<std::int32_t>::min())); }
 
+/// The largest |component| of a point or direction; of W of them, given by component.
+template <class Vector>
+[[nodiscard]] ARBORETUM_INLINE float largest_component(const Vector& v) {
+  const float x = __builtin_fabsf(v.x), y = __builtin_fabsf(v.y), z = __builtin_fabsf(v.z), xy = x > y ? x : y;
+  return xy > z ? xy : z;
+}
+template <int W>
+[[nodiscard]] ARBORETUM_INLINE vf<W> largest_component(vf<W> x, vf<W> y, vf<W> z) {
+  return max_x86(max_x86(abs(x), abs(y)), abs(z));
+}
+
 /// Lane I of four.
 template <int I>
 ARBORETUM_INLINE float lane(vf<4> a) {

@@ -53,7 +53,8 @@ std::optional<Inside> inside(const Boxes& boxes, int lane, const Ray& ray) {
   return in;
 }
 
-/// Eight boxes and a ray at one of their corners, edges or faces, along an axis or in a face; of sizes from 2^-20 to 2^20, up to 2^14 of it from the origin.
+/// Eight boxes and a ray at one of their corners, edges or faces, along an axis or in a face; of sizes from 2^-20 to 2^20, up to 2^14 of it from the origin. Some rays come from up to 2^20
+/// boxes away.
 struct Draw {
   std::uint64_t number, next = 0;
   float in(float low, float high) { return low + (high - low) * random_float(77, number, next++); }
@@ -85,6 +86,11 @@ struct Draw {
     for (int axis = 0; axis < 3; ++axis)
       if (ray.direction[axis] == 0.0f && below(2)) ray.direction[axis] = -0.0f;
     ray.tnear = below(4) ? 0.0f : 0.5f, ray.tfar = below(4) ? kInfinity : 1.0f;
+    if (below(4) == 0) {  // from far away, for all that its origin's rounding makes of the aim
+      const float steps = std::ldexp(1.0f, int(below(21)));
+      for (int axis = 0; axis < 3; ++axis) ray.origin[axis] -= ray.direction[axis] * steps;
+      ray.tnear = 0.0f, ray.tfar = kInfinity;
+    }
   }
 };
 

@@ -50,20 +50,23 @@ struct BoxRays : LaneRays {
     using Box = BoxRay<N, true>;
     const F o[3] = {F::load(rays.origin[0] + k), F::load(rays.origin[1] + k), F::load(rays.origin[2] + k)};
     const F d[3] = {F::load(rays.direction[0] + k), F::load(rays.direction[1] + k), F::load(rays.direction[2] + k)};
-    const F size[3] = {abs(d[0]), abs(d[1]), abs(d[2])}, largest = max_x86(max_x86(size[0], size[1]), size[2]);
-    (max_x86(F::load(rays.tnear + k), F(0.0f)) * F(pad.before)).store(first + k);
-    vm<W> overflows(false), tight[3] = {vm<W>(false), vm<W>(false), vm<W>(false)};
-    if (pad.tight) {  // as largest_last() has it, of equal ones too
-      const vm<W> x_over_y = size[0] > size[1];
-      tight[0] = x_over_y & (size[0] > size[2]), tight[1] = ~x_over_y & (size[1] > size[2]), tight[2] = ~(tight[0] | tight[1]);
+    const F largest = largest_component(d[0], d[1], d[2]);
+    const auto origin = [&] { return largest_component(o[0], o[1], o[2]); };
+    (max_x86(F::load(rays.tnear + k), F(0.0f)) * F(pad.before())).store(first + k);
+    F reach[3], share[3];
+    for (int a = 0; a < 3; ++a) reach[a] = F(pad.max_coordinate), share[a] = F(pad.tight ? BoxPad::kBeside : BoxPad::kWide);
+    if (pad.tight) {  // along the axis that largest_last() takes, of equal ones too
+      const F x = abs(d[0]), y = abs(d[1]), z = abs(d[2]);
+      const vm<W> by_x = (x > y) & (x > z), by_y = ~(x > y) & (y > z), along[3] = {by_x, by_y, ~(by_x | by_y)};
+      for (int a = 0; a < 3; ++a) reach[a] = select(along[a], F(0.0f), reach[a]), share[a] = select(along[a], F(BoxPad::kAlong), share[a]);
     }
-    const auto origin = [&] { return max_x86(max_x86(abs(o[0]), abs(o[1])), abs(o[2])); };
+    vm<W> overflows(false);
     for (int a = 0; a < 3; ++a) {
       F rs, fs, gs;
       if (padded) {
-        Box::template constants<true>(o[a], d[a], largest, origin, pad, tight[a], rs, fs, gs);
+        Box::template constants<true>(o[a], d[a], largest, origin, reach[a], share[a], rs, fs, gs);
       } else {
-        Box::template constants<false>(o[a], d[a], largest, origin, pad, tight[a], rs, fs, gs);
+        Box::template constants<false>(o[a], d[a], largest, origin, reach[a], share[a], rs, fs, gs);
       }
       rs.store(r[a] + k), fs.store(near[a] + k), gs.store(far[a] + k);
       overflows = overflows | Box::overflows(d[a], rs, fs, gs);

@@ -38,18 +38,27 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Where a ray enters boxes at the earliest: tnear, and 0 for -0, since distances are ordered by their bits.
 [[nodiscard]] ARBORETUM_INLINE float first_distance(const Ray& ray) { return ray.tnear > 0.0f ? ray.tnear : 0.0f; }
 
-/// What padded boxes are padded by, where many rays are prepared together (box_rays.h): one ray alone loses by finding its largest axis what it gains (docs/performance.md).
-struct BoxPad {
-  float max_coordinate;  ///< the scene's largest
-  float share = 0x1p-21f;              ///< of M + |o|, along the other axes
-  float before = 1.0f, beyond = 1.0f;  ///< what the interval's ends are scaled by
-  bool tight = false;    ///< along the axis where the direction is largest (above)
+/// A ray's constants along an axis that are this large may overflow: the axis is left out of its tests.
+inline constexpr float kTooLarge = 0x1p124f;
 
-  /// Wide along all axes.
-  ARBORETUM_INLINE BoxPad(float scene_max) : max_coordinate(scene_max) {}
-  ARBORETUM_INLINE BoxPad(float scene_max, bool tight_along_ray) : max_coordinate(scene_max), tight(tight_along_ray) {
-    if (tight) share = 0x1.8p-21f, before = 1.0f - 0x1p-20f, beyond = 1.0f + 0x1p-20f;
-  }
+/// The pads e of axes, `parallel` those along which a ray does as good as not move: where such a pad may be less than a t in the scene, one by which the axis is left out. `origin` and
+/// `largest`: the largest |component| of the ray's origin and direction.
+template <class F, class Mask>
+[[nodiscard]] ARBORETUM_INLINE F pad_or_leave_out(F e, Mask parallel, F max_coordinate, F origin, F largest) {
+  return select(parallel & ~(e > F(2.0f) * ((max_coordinate + origin) / largest)), F(kTooLarge), e);
+}
+
+/// What padded boxes are padded by. Tight (above) is for many rays that are prepared together (box_rays.h): one ray alone loses by finding its largest axis what it gains
+/// (docs/performance.md).
+struct BoxPad {
+  static constexpr float kWide = 0x1p-21f, kBeside = 0x1.8p-21f, kAlong = kHasFma ? 0x1.00001p-23f : 0.0f;  ///< shares: of M + |o|, along other axes than a tight one, and of |o| along that
+
+  float max_coordinate;  ///< the scene's largest
+  bool tight = false;    ///< along the axis where the direction is largest
+
+  /// What the interval's ends are scaled by.
+  [[nodiscard]] ARBORETUM_INLINE float before() const { return tight ? 1.0f - 0x1p-20f : 1.0f; }
+  [[nodiscard]] ARBORETUM_INLINE float beyond() const { return tight ? 1.0f + 0x1p-20f : 1.0f; }
 };
 
 /// One ray's constants for boxes.
@@ -68,7 +77,7 @@ struct BoxRay {
     using F = vf<4>;
     const F o = F::load(&ray.origin), d = F::load(&ray.direction);
     F rs, fs, gs;
-    constants<Padded>(o, d, F(largest(ray.direction)), [&] { return F(largest(ray.origin)); }, BoxPad(max_coordinate), vm<4>(false), rs, fs, gs);
+    constants<Padded>(o, d, F(largest_component(ray.direction)), [&] { return F(largest_component(ray.origin)); }, F(max_coordinate), F(BoxPad::kWide), rs, fs, gs);
     r = axes(rs), f = axes(fs), g = axes(gs);
     if (__builtin_expect((overflows(d, rs, fs, gs).bits() & 7u) != 0, 0)) leave_out(ray.direction.x, r.x, f.x, g.x), leave_out(ray.direction.y, r.y, f.y, g.y), leave_out(ray.direction.z, r.z, f.z, g.z);
     octant = sign_mask(rs) & 7u;
@@ -82,10 +91,10 @@ struct BoxRay {
   ARBORETUM_INLINE unsigned near_y() const { return (2 + (octant >> 1 & 1u)) * kSide; }
   ARBORETUM_INLINE unsigned near_z() const { return (4 + (octant >> 2)) * kSide; }
 
-  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; `tight`: the pad along this axis is.
-  template <bool Pad, class F, class Mask, class Origin>
-  static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin, [[maybe_unused]] BoxPad pad, [[maybe_unused]] Mask tight, F& r, F& f, F& g) {
-    [[maybe_unused]] const F max_coordinate(pad.max_coordinate), wide(pad.share);
+  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; the pad is a `share` of
+  /// max_coordinate + |o|.
+  template <bool Pad, class F, class Origin>
+  static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin, [[maybe_unused]] F max_coordinate, [[maybe_unused]] F share, F& r, F& f, F& g) {
     if constexpr (kHasFma) {
       r = F(1.0f) / d;
       // A branch, rarely taken: no division waits for `largest`.
@@ -93,16 +102,15 @@ struct BoxRay {
       if (__builtin_expect(any(tiny), 0)) r = select(tiny, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       f = g = o * r;
       if constexpr (Pad) {
-        const F reach = select(tight, F(0.0f), max_coordinate) + abs(o), share = select(tight, F(0x1.00001p-23f), wide);
-        F e = share * (reach * abs(r)) + F(0x1p-100f);  // in this order: 2^-21 of a tiny scene may be nothing
-        if (__builtin_expect(any(tiny), 0)) e = select(tiny & ~(e > F(2.0f) * ((max_coordinate + origin()) / largest)), F(kTooLarge), e);  // left out, as what overflows
+        F e = share * ((max_coordinate + abs(o)) * abs(r)) + F(0x1p-100f);  // in this order: 2^-21 of a tiny scene may be nothing
+        if (__builtin_expect(any(tiny), 0)) e = pad_or_leave_out(e, tiny, max_coordinate, origin(), largest);
         f = f + e, g = g - e;
       }
     } else {
       r = F(1.0f) / d;
       f = g = o;
       if constexpr (Pad) {
-        const F e = xor_sign(select(tight, F(0.0f), wide * (max_coordinate + abs(o))) + F(0x1p-100f), sign_bits(r));
+        const F e = xor_sign(share * (max_coordinate + abs(o)) + F(0x1p-100f), sign_bits(r));
         f = f + e, g = g - e;
       }
     }
@@ -119,15 +127,8 @@ struct BoxRay {
   }
 
  private:
-  static constexpr float kTooLarge = 0x1p124f;
-
   static ARBORETUM_INLINE unsigned sign_bit(float a) { return __builtin_bit_cast(std::uint32_t, a) >> 31; }
   static ARBORETUM_INLINE Vec3f axes(vf<4> a) { return {lane<0>(a), lane<1>(a), lane<2>(a)}; }
-  static ARBORETUM_INLINE float largest(Vec3f d) {
-    const float x = __builtin_fabsf(d.x), y = __builtin_fabsf(d.y), z = __builtin_fabsf(d.z);
-    const float xy = x > y ? x : y;
-    return xy > z ? xy : z;
-  }
   /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN. Its interval becomes
   /// all t for boxes that exist, and stays empty for others.
   static void leave_out(float d, float& r, float& f, float& g) {

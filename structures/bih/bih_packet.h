@@ -28,7 +28,7 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
     Base::trace(
-        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 2>(count, ray_at, padded_, tree_.max_coordinate(), each); },
+        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 2>(count, ray_at, padded_, BoxPad{tree_.max_coordinate()}, each); },
         [&](Mask mask, unsigned octant) { traverse(mask, octant); });
   }
 

@@ -36,7 +36,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
     Base::trace(
-        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, N>(count, ray_at, padded_, max_coordinate_, each); },
+        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, N>(count, ray_at, padded_, BoxPad{max_coordinate_}, each); },
         [&](Mask mask, unsigned) { traverse(mask); });
   }
 

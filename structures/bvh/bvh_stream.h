@@ -30,7 +30,7 @@ class Stream {
 
   /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
-      : base_(tree.base()), root_(tree.root()), pad_(tree.max_coordinate(), Padded && row.tests->depth_between_corners), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
+      : base_(tree.base()), root_(tree.root()), pad_{tree.max_coordinate(), Padded && row.tests->depth_between_corners}, leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
         order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(std::make_unique_for_overwrite<std::uint32_t[]>(count_ * StreamStack::words(stack_entries_))), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
@@ -142,7 +142,7 @@ class Stream {
         if (lanes_.valid >> i & 1u) new (static_cast<void*>(g.data + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(ray_at(i)));
       }
     }
-    for (int k = 0; k < int(kRays); k += kNative) (vf<kNative>::load(lanes_.t + k) * vf<kNative>(pad_.beyond)).store(g.t + k);
+    for (int k = 0; k < count; k += kNative) (vf<kNative>::load(lanes_.t + k) * vf<kNative>(pad_.beyond())).store(g.t + k);
     g.count = unsigned(count), g.octant = octant, g.active = lanes_.valid;
     g.stack = stack, g.top = 0;
     g.target = root_, g.visitors = g.active;
@@ -235,7 +235,7 @@ class Stream {
   [[gnu::noinline]] void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
     const std::byte* const blocks = base_ + bvh::offset_of(target);
     const unsigned count = bvh::block_count(target);
-    const auto hit = [&g, beyond = pad_.beyond](int i) {
+    const auto hit = [&g, beyond = pad_.beyond()](int i) {
       if constexpr (AnyHit) {
         g.best[i].primitive = 0, g.active &= ~(std::uint64_t{1} << i);
       } else {

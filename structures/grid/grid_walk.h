@@ -26,14 +26,9 @@ struct GridRay {
         fixed(false),
         negative(false) {
     const F size = abs(direction);
-    fixed = (size <= F(largest(ray.direction) * 0x1p-60f)) | vm<4>::from_bits(8);
+    fixed = (size <= F(largest_component(ray.direction) * 0x1p-60f)) | vm<4>::from_bits(8);
     negative = direction.as_int() < vi<4>(0);
     reciprocal = F(1.0f) / direction;
-  }
-  static ARBORETUM_INLINE float largest(Vec3f d) {
-    const float x = __builtin_fabsf(d.x), y = __builtin_fabsf(d.y), z = __builtin_fabsf(d.z);
-    const float xy = x > y ? x : y;
-    return xy > z ? xy : z;
   }
 };
 

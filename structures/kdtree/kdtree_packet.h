@@ -43,11 +43,12 @@ struct KdLanes : LaneRays {
   ARBORETUM_INLINE void constants(int k, float pad, float max_coordinate) {
     using F = vf<W>;
     const F d[3] = {F::load(rays.direction[0] + k), F::load(rays.direction[1] + k), F::load(rays.direction[2] + k)};
-    const F largest = max_x86(max_x86(abs(d[0]), abs(d[1])), abs(d[2]));
-    const auto origin = [&] { return max_x86(max_x86(abs(F::load(rays.origin[0] + k)), abs(F::load(rays.origin[1] + k))), abs(F::load(rays.origin[2] + k))); };
+    const F o[3] = {F::load(rays.origin[0] + k), F::load(rays.origin[1] + k), F::load(rays.origin[2] + k)};
+    const F largest = largest_component(d[0], d[1], d[2]);
+    const auto origin = [&] { return largest_component(o[0], o[1], o[2]); };
     for (int a = 0; a < 3; ++a) {
       F reciprocal, in, out;
-      const vm<W> fits = KdRay::constants(F::load(rays.origin[a] + k), d[a], largest, origin, max_coordinate, pad, reciprocal, in, out);
+      const vm<W> fits = KdRay::constants(o[a], d[a], largest, origin, max_coordinate, pad, reciprocal, in, out);
       reciprocal.store(r[a] + k), in.store(enter[a] + k), out.store(leave[a] + k);
       overflown |= std::uint64_t((~fits).bits()) << k;
     }

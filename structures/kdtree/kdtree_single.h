@@ -17,6 +17,7 @@
 #pragma once
 
 #include "traversal/batch_stack.h"
+#include "traversal/box_test.h"
 #include "traversal/single_rays.h"
 
 namespace arboretum {
@@ -33,7 +34,7 @@ struct KdRay {
   std::uint32_t far[4];            ///< byte offset within a pair of the child that the ray comes to last
 
   static constexpr float kPad = 0x1p-21f;
-  static constexpr float kTooLarge = 0x1p124f, kAllOfT = std::numeric_limits<float>::max();
+  static constexpr float kAllOfT = std::numeric_limits<float>::max();
 
   /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; `pad`: kPad, or 0 for `fast` planes. Returns
   /// the lanes whose axis counts: where constants may have overflown, or a parallel ray comes from so far that its pad is less than t (traversal/box_test.h), it is left out, with a
@@ -51,7 +52,7 @@ struct KdRay {
     // In this order, since a share of a tiny scene may be nothing. Where the product overflows the axis is left out, as below.
     const F at = o * r;
     F e = share * ((F(max_coordinate) + abs(o)) * abs(r)) + least;
-    if (__builtin_expect(any(parallel), 0)) e = select(parallel & ~(e > F(2.0f) * ((F(max_coordinate) + origin()) / largest)), F(kTooLarge), e);
+    if (__builtin_expect(any(parallel), 0)) e = pad_or_leave_out(e, parallel, F(max_coordinate), origin(), largest);
     enter = at + e, leave = at - e;
     const auto fits = abs(enter) + abs(leave) < F(kTooLarge);
     if (__builtin_expect(any(~fits), 0)) {
@@ -64,12 +65,8 @@ struct KdRay {
   KdRay() = default;
   ARBORETUM_INLINE KdRay(const Ray& ray, float max_coordinate, float pad) {
     using F = vf<4>;  // the axes stand in lanes
-    const auto largest = [](Vec3f v) {
-      const float x = __builtin_fabsf(v.x), y = __builtin_fabsf(v.y), z = __builtin_fabsf(v.z), xy = x > y ? x : y;
-      return F(xy > z ? xy : z);
-    };
     F rs, in, out;
-    constants(F::load(&ray.origin), F::load(&ray.direction), largest(ray.direction), [&] { return largest(ray.origin); }, max_coordinate, pad, rs, in, out);
+    constants(F::load(&ray.origin), F::load(&ray.direction), F(largest_component(ray.direction)), [&] { return F(largest_component(ray.origin)); }, max_coordinate, pad, rs, in, out);
     rs.store(r), in.store(enter), out.store(leave);
     const unsigned negative = sign_mask(rs);
     for (unsigned k = 0; k < 3; ++k) far[k] = negative >> k & 1u ? 0u : 8u;

@@ -44,7 +44,7 @@ class TwoLevelKernel {
   bool trace(const Ray& ray, float /*time*/, NearestHit& nearest_hit) {
     Hit best;
     float nearest = ray.tfar;
-    const float origin = largest(ray.origin), k = accel_.magnification();
+    const float origin = largest_component(ray.origin), k = accel_.magnification();
     SoaNodeTest<4, true> nodes(ray, accel_.reach() + k * (origin + accel_.reach()));
     const bvh::Bvh4& top = accel_.top();
     walk_bvh<false>(top.base(), top.root(), nodes, stack_.data(), nearest, counting_, [&](bvh::NodeReference reference) {
@@ -78,7 +78,7 @@ class TwoLevelKernel {
     Ray mapped;
     mapped.origin = transform_point(instance.to_object, ray.origin);
     mapped.direction = transform_direction(instance.to_object, ray.direction);
-    const float slack = 0x1p-20f * (largest(mapped.origin) + instance.max_coordinate) / largest(mapped.direction);
+    const float slack = 0x1p-20f * (largest_component(mapped.origin) + instance.max_coordinate) / largest_component(mapped.direction);
     const float doubt = 0x1p10f * slack;  // within it of an end of the interval, world space decides
     const float last = best.is_hit() ? nearest : ray.tfar + slack;
     mapped.tnear = ray.tnear > slack ? ray.tnear - slack : 0.0f;
@@ -166,12 +166,6 @@ class TwoLevelKernel {
     } else {
       trace(nullptr);
     }
-  }
-
-  static float largest(Vec3f v) {
-    const float x = __builtin_fabsf(v.x), y = __builtin_fabsf(v.y), z = __builtin_fabsf(v.z);
-    const float xy = x > y ? x : y;
-    return xy > z ? xy : z;
   }
 
   const two_level::TwoLevel& accel_;
