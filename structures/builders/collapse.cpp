@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include <emmintrin.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
 
 namespace arboretum {
 namespace {
@@ -181,10 +183,37 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
 /// Places in the array depend on scheduling, the tree does not.
 class Collapse::Writer {
  public:
-  Writer(const Collapse& collapse, ReservedArray<WideNode>& out) : collapse_(collapse), tree_(collapse.tree_), out_(out) { out.hand_out(1); }
+  /// Nodes that the tasks of one place in the arena take next: in runs, so that tasks seldom meet at the counter or in a line of memory.
+  struct alignas(64) Share {
+    std::uint32_t next = 0, end = 0;
+  };
+
+  Writer(const Collapse& collapse, ReservedArray<WideNode>& out)
+      : collapse_(collapse), tree_(collapse.tree_), out_(out), shares_(std::size_t(tbb::this_task_arena::max_concurrency())) {
+    // A run ends where fewer are left than siblings are asked for; and each place leaves one unfinished, the root's task another.
+    const std::size_t runs = tree_.node_count / (kRun - kMaxBranching) + 1 + shares_.size() + 1;
+    out.reserve(1 + runs * kRun), out.hand_out(1);
+  }
+
+  void write() {
+    Share share;
+    (void)write(0, 0, share);
+  }
+
+ private:
+  static constexpr std::uint32_t kRun = 512;
+
+  /// The first of `n` neighbouring nodes.
+  std::uint32_t take(unsigned n, Share& share) {
+    if (share.next + n > share.end) {
+      share.next = next_.fetch_add(kRun, std::memory_order_relaxed), share.end = share.next + kRun;
+      out_.hand_out(kRun);
+    }
+    return std::exchange(share.next, share.next + n);
+  }
 
   /// Returns the SAH cost of the subtree for a ray that enters it.
-  float write(std::uint32_t index, std::uint32_t place) {
+  float write(std::uint32_t index, std::uint32_t place, Share& share) {
     const BinaryNode& node = tree_.nodes[index];
     const CollapseSettings& settings = collapse_.settings_;
     WideNode& out = out_[place];
@@ -197,15 +226,15 @@ class Collapse::Writer {
       return (kLeafVisit + float(blocks)) * settings.intersection_cost;
     }
     const Slots slots = collapse_.children(index);
-    const std::uint32_t first = out.first = next_.fetch_add(slots.size, std::memory_order_relaxed);
-    out_.hand_out(slots.size);
+    const std::uint32_t first = out.first = take(slots.size, share);
     out.children = slots.size, out.blocks = 0, out.repeats = false;
     float costs[kMaxBranching];
-    const auto child = [&](unsigned i) { costs[i] = write(slots.node[i], first + i); };
+    const auto child = [&](unsigned i, Share& its) { costs[i] = write(slots.node[i], first + i, its); };
     if (node.count > kParallel) {
-      tbb::parallel_for(0u, slots.size, child);
+      // A thread that waits here takes up other tasks, but none at the same time: its place's share is its own.
+      tbb::parallel_for(0u, slots.size, [&](unsigned i) { child(i, shares_[std::size_t(tbb::this_task_arena::current_thread_index())]); });
     } else {
-      for (unsigned i = 0; i < slots.size; ++i) child(i);
+      for (unsigned i = 0; i < slots.size; ++i) child(i, share);
     }
     std::uint64_t bytes = round_up(settings.node_bytes);
     float cost = settings.traversal_cost;
@@ -219,7 +248,6 @@ class Collapse::Writer {
     return cost;
   }
 
- private:
   /// Puts children that cost little, such as leaves, last, where any hit looks first; others of much the same cost, within a factor of eight, stay as the builder has them,
   /// next to each other in space.
   static void order(WideNode* children, const float* costs, unsigned size) noexcept {
@@ -240,12 +268,12 @@ class Collapse::Writer {
   const Collapse& collapse_;
   const BinaryTree& tree_;
   ReservedArray<WideNode>& out_;
+  std::vector<Share> shares_;
   std::atomic<std::uint32_t> next_{1};
 };
 
 void Collapse::write(ReservedArray<WideNode>& out) const {
-  out.reserve(tree_.node_count);
-  if (!tree_.primitives.empty()) (void)Writer(*this, out).write(0, 0);
+  if (!tree_.primitives.empty()) Writer(*this, out).write();
 }
 
 WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings) {
