@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <string>
 
+#include <cpuid.h>
+
 #include "core/error.h"
 
 namespace arboretum {
@@ -25,6 +27,16 @@ int native_width(Isa isa) noexcept {
   return kWidths[static_cast<int>(isa)];
 }
 
+namespace {
+
+/// CPUID leaf 0x80000001, ECX bit 5. Before clang 15 __builtin_cpu_supports() does not know it by name.
+bool has_lzcnt() noexcept {
+  unsigned eax = 0, ebx = 0, ecx = 0, edx = 0;
+  return __get_cpuid(0x80000001u, &eax, &ebx, &ecx, &edx) != 0 && (ecx >> 5 & 1u) != 0;
+}
+
+}  // namespace
+
 bool cpu_supports(Isa isa) noexcept {
   __builtin_cpu_init();  // knows the operating system's register support (XCR0) too
   switch (isa) {
@@ -32,7 +44,7 @@ bool cpu_supports(Isa isa) noexcept {
     case Isa::sse: return __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
     case Isa::avx2:
       return cpu_supports(Isa::sse) && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-             __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("lzcnt");
+             __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") && has_lzcnt();
     case Isa::avx512:
       return cpu_supports(Isa::avx2) && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
              __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");

@@ -279,7 +279,7 @@ TEST_CASE("a needle is not lost to the rounding of its normal") {
     const Vec3f tip = uniform_point(31, i, 0, {{-1, -1, -1}, {1, 1, 1}}), end = uniform_point(31, i, 3, {{-1, -1, -1}, {1, 1, 1}}) * std::ldexp(1.0f, -int(i % 3) * 40);
     const float width = std::ldexp(1.0f, -int(i % 80));
     std::array<Vec3f, 3> t{tip, end, end + uniform_point(31, i, 6, {{-1, -1, -1}, {1, 1, 1}}) * width};
-    std::ranges::rotate(t, t.begin() + std::ptrdiff_t(i / 3 % 3));
+    std::rotate(t.begin(), t.begin() + std::ptrdiff_t(i / 3 % 3), t.end());
     const double pad = 0x1p-44 * std::max({double(std::abs(tip.x)), double(std::abs(tip.y)), double(std::abs(tip.z)), double(std::abs(end.x)), double(std::abs(end.y)), double(std::abs(end.z))});
     const TriangleOverlap overlap(t);
     all_rounding += width < 0x1p-53f;

@@ -66,10 +66,7 @@ class PacketLeaves {
   ARBORETUM_INLINE void load(const Ray* rays, int count, const Prepare& prepare) {
     rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0};
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
-    prepare([this](int i) -> const Ray& { return rays_[i]; },
-            [this](int k) {
-              if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(lanes_.rays, k);
-            });
+    prepare([this](int i) -> const Ray& { return rays_[i]; }, [this](int k) { prepare_lanes(k); });
     for (int i = 0; i < count; ++i) best_[i] = NearestHit{lanes_.t[i]};
     if constexpr (!Leaves::kRaysInLanes) {
       for (Mask rest = lanes_.valid; rest; rest &= rest - 1) {
@@ -77,6 +74,10 @@ class PacketLeaves {
         new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(rays_[i]));
       }
     }
+  }
+
+  ARBORETUM_INLINE void prepare_lanes([[maybe_unused]] int k) {
+    if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(lanes_.rays, k);
   }
 
   void finish() {

@@ -35,7 +35,7 @@ class BinnedSah {
       MeteredVector<sah::Reference> references;
     };
     // By the place that a thread has in the arena: there may be more threads in the course of time, but no two at once have the same one.
-    std::vector<Workspace> workspaces(std::size_t(tbb::this_task_arena::max_concurrency()));
+    std::vector<Workspace> workspaces(static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()));
     const auto begin_of = [this](const Subtree& subtree) { return std::size_t(subtree.range.references - references_.data()); };
     tbb::parallel_for(std::size_t{0}, set_aside_.size(), [&](std::size_t i) {
       const auto& [range, node] = set_aside_[i];

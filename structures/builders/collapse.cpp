@@ -183,7 +183,7 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
 /// Places in the array depend on scheduling, the tree does not.
 class Collapse::Writer {
  public:
-  /// Nodes that the tasks of one place in the arena take next: in runs, so that tasks seldom meet at the counter or in a line of memory.
+  /// The nodes [next, end) of a run, which the tasks of one place in the arena take next: by runs tasks seldom meet at the counter or in a line of memory.
   struct alignas(64) Share {
     std::uint32_t next = 0, end = 0;
   };
@@ -198,6 +198,8 @@ class Collapse::Writer {
   void write() {
     Share share;
     (void)write(0, 0, share);
+    shares_.push_back(share);
+    for (const Share& unfinished : shares_) out_.hand_out(unfinished.end > 0 ? kRun - (unfinished.end - unfinished.next) : 0);
   }
 
  private:
@@ -206,8 +208,8 @@ class Collapse::Writer {
   /// The first of `n` neighbouring nodes.
   std::uint32_t take(unsigned n, Share& share) {
     if (share.next + n > share.end) {
+      if (share.end > 0) out_.hand_out(kRun);
       share.next = next_.fetch_add(kRun, std::memory_order_relaxed), share.end = share.next + kRun;
-      out_.hand_out(kRun);
     }
     return std::exchange(share.next, share.next + n);
   }

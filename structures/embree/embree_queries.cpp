@@ -28,11 +28,11 @@ constexpr float kLargest = 1.844e18f;
 /// on tnear < 0 (what hands it over raises it to 0). False with a NaN anywhere.
 inline bool accepts(const Ray& ray) noexcept {
   const auto in_range = [](Vec3f a) {
-    return (unsigned(std::abs(a.x) <= kLargest) & unsigned(std::abs(a.y) <= kLargest) & unsigned(std::abs(a.z) <= kLargest)) != 0;
+    return unsigned(std::abs(a.x) <= kLargest) & unsigned(std::abs(a.y) <= kLargest) & unsigned(std::abs(a.z) <= kLargest);
   };
   const Vec3f d = ray.direction;
-  return in_range(ray.origin) & in_range(d) & ((d.x != 0.0f) | (d.y != 0.0f) | (d.z != 0.0f)) &
-         (ray.tnear <= ray.tfar) & (ray.tfar >= 0.0f);
+  const unsigned some_direction = unsigned(d.x != 0.0f) | unsigned(d.y != 0.0f) | unsigned(d.z != 0.0f);
+  return (in_range(ray.origin) & in_range(d) & some_direction & unsigned(ray.tnear <= ray.tfar) & unsigned(ray.tfar >= 0.0f)) != 0;
 }
 
 /// What Embree is told beside scene and rays, in either version of its API.

@@ -17,8 +17,8 @@ import sys
 
 ISA_NAMESPACE = re.compile(r"isa_(sse|avx2|avx512)")
 FUNCTION = re.compile(r"^[0-9a-f]+ <(.+)>:$")
-# What objdump prints after the bytes of an instruction: prefixes, the mnemonic, the operands.
-INSTRUCTION = re.compile(r"^\s+[0-9a-f]+:\t(?:(?:lock|rep[nz]*|repz|repnz|data16|cs|notrack|bnd) )*([a-z0-9.]+)(?:\s+(.*))?$")
+# What objdump, GNU or LLVM, prints of an instruction without its bytes: the address, prefixes, the mnemonic, the operands.
+INSTRUCTION = re.compile(r"^\s+[0-9a-f]+:\s+(?:(?:lock|rep[nz]*|repz|repnz|data16|cs|notrack|bnd) )*([a-z0-9.]+)(?:\s+(.*))?$")
 # VEX and EVEX encodings and mask registers; BMI and the counts that SSE2 machines lack (tzcnt is not here: baseline code
 # uses its encoding for bsf); SSE3 to SSE4.2.
 VEX = re.compile(r"^(v(?!err|erw)[a-z0-9]+|k(add|and|andn|mov|not|or|ortest|shift[lr]|test|unpck|xnor|xor)[bwdq]+)$")
