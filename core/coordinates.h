@@ -10,7 +10,9 @@
 namespace arboretum {
 
 /// The largest |coordinate|; of NaN components it says nothing.
-[[nodiscard]] inline float largest_coordinate(Vec3f p) noexcept { return std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)}); }
+[[nodiscard]] inline float largest_coordinate(Vec3f p) noexcept {
+  return std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+}
 
 /// The largest |coordinate| of the box's corners; 0 for an empty box.
 [[nodiscard]] inline float largest_coordinate(const Bounds3f& box) noexcept {

@@ -33,11 +33,13 @@ std::filesystem::path program_data_folder() {
 std::filesystem::path data_folder() {
   if (const char* chosen = std::getenv("ARBORETUM_DATA"); chosen && *chosen) {
     if (holds_data(chosen)) return chosen;
-    throw UserError(std::string("ARBORETUM_DATA=") + chosen + ": no scenes/catalogue.yaml there; name the share/arboretum of an installation, or unset it");
+    throw UserError(std::string("ARBORETUM_DATA=") + chosen +
+                    ": no scenes/catalogue.yaml there; name the share/arboretum of an installation, or unset it");
   }
   if (std::filesystem::path folder = program_data_folder(); !folder.empty()) return folder;
   const std::filesystem::path beside = beside_program();
-  throw UserError("no share/arboretum with scenes/catalogue.yaml near " + (beside.empty() ? std::string("the executable") : beside.string()) +
+  throw UserError("no share/arboretum with scenes/catalogue.yaml near " +
+                  (beside.empty() ? std::string("the executable") : beside.string()) +
                   "; set ARBORETUM_DATA to that folder of an installation or a build");
 }
 

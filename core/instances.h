@@ -1,5 +1,5 @@
-// Instances: meshes that stand at several places of a scene. TriangleMesh holds them laid out in one flat mesh; beside it
-// stands what a structure of two levels needs: each prototype once, and where it is placed.
+// Instances: meshes that stand at several places of a scene. TriangleMesh holds them laid out in one flat mesh; beside
+// it stands what a structure of two levels needs: each prototype once, and where it is placed.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,8 @@ struct AffineMap {
 };
 
 [[nodiscard]] inline bool is_identity(const AffineMap& map) noexcept { return map == AffineMap{}; }
-/// The image of a point, computed in double and rounded to float: how flat meshes are made, with the same bits everywhere.
+/// The image of a point, computed in double and rounded to float: how flat meshes are made, with the same bits
+/// everywhere.
 [[nodiscard]] Vec3f transform_point(const AffineMap& map, Vec3f p) noexcept;
 /// The same for a direction: no translation.
 [[nodiscard]] Vec3f transform_direction(const AffineMap& map, Vec3f d) noexcept;

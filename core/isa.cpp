@@ -58,9 +58,12 @@ std::span<const Isa> available_isas() {
     if (const char* forced = std::getenv("ARBORETUM_ISA"); forced && *forced) {
       const std::optional<Isa> isa = parse_isa(forced);
       if (!isa) {
-        throw UserError("ARBORETUM_ISA='" + std::string(forced) + "' names no instruction set; use scalar, sse, avx2 or avx512");
+        throw UserError("ARBORETUM_ISA='" + std::string(forced) +
+                        "' names no instruction set; use scalar, sse, avx2 or avx512");
       }
-      if (!cpu_supports(*isa)) throw UserError("ARBORETUM_ISA=" + std::string(forced) + ": this machine has no " + std::string(to_string(*isa)));
+      if (!cpu_supports(*isa))
+        throw UserError("ARBORETUM_ISA=" + std::string(forced) + ": this machine has no " +
+                        std::string(to_string(*isa)));
       limit = *isa;
     }
     std::vector<Isa> list;

@@ -12,7 +12,9 @@ namespace {
 std::atomic<std::size_t> current_bytes{0};
 std::atomic<std::size_t> peak_bytes{0};
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-[[nodiscard]] std::align_val_t alignment_of(std::size_t bytes) noexcept { return std::align_val_t(bytes >= kHugePage ? kHugePage : 64); }
+[[nodiscard]] std::align_val_t alignment_of(std::size_t bytes) noexcept {
+  return std::align_val_t(bytes >= kHugePage ? kHugePage : 64);
+}
 }  // namespace
 
 void MemoryMeter::add(std::size_t bytes) noexcept {
@@ -37,7 +39,8 @@ void release_uncounted(void* data, std::size_t bytes) noexcept { ::operator dele
 
 std::size_t give_back_pages(void* begin, void* end) noexcept {
   static const std::uintptr_t page = std::uintptr_t(sysconf(_SC_PAGESIZE));
-  const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(begin) + page - 1) / page * page, last = reinterpret_cast<std::uintptr_t>(end) / page * page;
+  const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(begin) + page - 1) / page * page,
+                       last = reinterpret_cast<std::uintptr_t>(end) / page * page;
   if (first >= last || madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED) != 0) return 0;
   return last - first;
 }

@@ -7,8 +7,9 @@
 
 namespace arboretum {
 
-/// Process-wide running total and peak of the bytes allocated through Arena and MeteredVector, and of what a ReservedArray has handed out and not got back. Thread-safe.
-/// A builder's peak is peak() - current() as it was at reset_peak(); builds are measured one at a time.
+/// Process-wide running total and peak of the bytes allocated through Arena and MeteredVector, and of what a
+/// ReservedArray has handed out and not got back. Thread-safe. A builder's peak is peak() - current() as it was at
+/// reset_peak(); builds are measured one at a time.
 class MemoryMeter {
  public:
   static void add(std::size_t bytes) noexcept;
@@ -29,11 +30,12 @@ void release_metered(void* data, std::size_t bytes) noexcept;
 [[nodiscard]] void* allocate_uncounted(std::size_t bytes);
 /// Gives back what allocate_uncounted(bytes) gave.
 void release_uncounted(void* data, std::size_t bytes) noexcept;
-/// Hands the whole pages of [begin, end), a part of such an allocation whose values are needed no more, back to the system. Returns their bytes.
+/// Hands the whole pages of [begin, end), a part of such an allocation whose values are needed no more, back to the
+/// system. Returns their bytes.
 std::size_t give_back_pages(void* begin, void* end) noexcept;
 
-/// For builders' arrays. Elements are default-initialised (left as they are for trivial types), since builders overwrite
-/// whole arrays.
+/// For builders' arrays. Elements are default-initialised (left as they are for trivial types), since builders
+/// overwrite whole arrays.
 template <class T>
 struct MeteredAllocator {
   static_assert(alignof(T) <= 64);
@@ -52,7 +54,9 @@ struct MeteredAllocator {
     ::new (static_cast<void*>(p)) U(static_cast<Args&&>(args)...);
   }
   template <class U>
-  bool operator==(const MeteredAllocator<U>&) const noexcept { return true; }
+  bool operator==(const MeteredAllocator<U>&) const noexcept {
+    return true;
+  }
 };
 
 template <class T>

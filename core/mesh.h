@@ -1,4 +1,5 @@
-// TriangleMesh: shared vertices and index triples, key frames where it moves. What structures build from and the oracle reads.
+// TriangleMesh: shared vertices and index triples, key frames where it moves. What structures build from and the oracle
+// reads.
 #pragma once
 
 #include <array>
@@ -33,7 +34,9 @@ struct TriangleMesh {
   [[nodiscard]] std::size_t size() const noexcept { return triangles.size(); }
   [[nodiscard]] bool moves() const noexcept { return !later_frames.empty(); }
   [[nodiscard]] std::size_t frames() const noexcept { return later_frames.size() + 1; }
-  [[nodiscard]] const std::vector<Vec3f>& frame(std::size_t k) const noexcept { return k == 0 ? vertices : later_frames[k - 1]; }
+  [[nodiscard]] const std::vector<Vec3f>& frame(std::size_t k) const noexcept {
+    return k == 0 ? vertices : later_frames[k - 1];
+  }
 
   /// A vertex at a time, as frame_at(time, frames()) gives it.
   [[nodiscard]] Vec3f position(std::uint32_t vertex, FrameTime at) const noexcept {

@@ -1,5 +1,5 @@
-// Key frames: which two of them a time lies between, and where a vertex is in between. Everything that looks at a moving
-// mesh (kernels, oracle, workloads) goes through these, so that shared vertices stay shared, bit for bit.
+// Key frames: which two of them a time lies between, and where a vertex is in between. Everything that looks at a
+// moving mesh (kernels, oracle, workloads) goes through these, so that shared vertices stay shared, bit for bit.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,9 @@ struct FrameTime {
 
 /// a (1 - weight) + b weight, each operation rounded to float (no fused multiply-add, on any instruction set): `a` for
 /// weight 0, `b` for weight 1.
-[[nodiscard]] inline float interpolate(float a, float b, float weight) noexcept { return a * (1.0f - weight) + b * weight; }
+[[nodiscard]] inline float interpolate(float a, float b, float weight) noexcept {
+  return a * (1.0f - weight) + b * weight;
+}
 [[nodiscard]] inline Vec3f interpolate(Vec3f a, Vec3f b, float weight) noexcept {
   return {interpolate(a.x, b.x, weight), interpolate(a.y, b.y, weight), interpolate(a.z, b.z, weight)};
 }

@@ -14,7 +14,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   for (std::size_t i = 1; i <= a.size(); ++i) {
     for (std::size_t j = 1; j <= b.size(); ++j) {
       d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
     }
   }
   return d[a.size()][b.size()];
@@ -37,7 +38,8 @@ std::string close_name(std::string_view name, std::span<const std::string> candi
   return same_start || 3 * edit_distance(name, nearest) <= std::max(name.size(), nearest.size()) ? nearest : "";
 }
 
-std::string unknown_name_message(std::string_view kind, std::string_view name, std::span<const std::string> candidates) {
+std::string unknown_name_message(std::string_view kind, std::string_view name,
+                                 std::span<const std::string> candidates) {
   std::string message = "unknown " + std::string(kind) + " '" + std::string(name) + "'";
   if (candidates.empty()) return message;
   const std::string close = close_name(name, candidates);
@@ -48,7 +50,8 @@ std::string unknown_name_message(std::string_view kind, std::string_view name, s
 
 std::size_t index_of_name(std::string_view kind, std::string_view name, std::span<const std::string_view> names) {
   const auto found = std::ranges::find(names, name);
-  if (found == names.end()) throw UserError(unknown_name_message(kind, name, std::vector<std::string>(names.begin(), names.end())));
+  if (found == names.end())
+    throw UserError(unknown_name_message(kind, name, std::vector<std::string>(names.begin(), names.end())));
   return std::size_t(found - names.begin());
 }
 

@@ -11,13 +11,14 @@ namespace arboretum {
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
 /// The candidate with the smallest edit distance to `name`; empty when there are no candidates.
 [[nodiscard]] std::string nearest_name(std::string_view name, std::span<const std::string> candidates);
-/// The nearest candidate, if it looks like a misspelling: at most a third of the longer word differs, or the first three letters are the same.
-/// Empty where none does.
+/// The nearest candidate, if it looks like a misspelling: at most a third of the longer word differs, or the first
+/// three letters are the same. Empty where none does.
 [[nodiscard]] std::string close_name(std::string_view name, std::span<const std::string> candidates);
 /// "unknown <kind> 'naem'; did you mean 'name'? (valid: a, b, c)": one line for UserError. Asks only for a close name.
 [[nodiscard]] std::string unknown_name_message(std::string_view kind, std::string_view name,
                                                std::span<const std::string> candidates);
 /// Where `name` stands in `names`; throws UserError with unknown_name_message() where it does not.
-[[nodiscard]] std::size_t index_of_name(std::string_view kind, std::string_view name, std::span<const std::string_view> names);
+[[nodiscard]] std::size_t index_of_name(std::string_view kind, std::string_view name,
+                                        std::span<const std::string_view> names);
 
 }  // namespace arboretum

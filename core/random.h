@@ -14,7 +14,8 @@ namespace arboretum {
 }
 
 /// 64 random bits of sample `index` in `dimension`.
-[[nodiscard]] constexpr std::uint64_t random_bits(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) noexcept {
+[[nodiscard]] constexpr std::uint64_t random_bits(std::uint64_t seed, std::uint64_t index,
+                                                  std::uint64_t dimension) noexcept {
   return mix64(mix64(seed ^ (dimension * 0xd1342543de82ef95u)) ^ mix64(index));
 }
 
@@ -24,7 +25,8 @@ namespace arboretum {
 }
 
 /// Uniform in [0, 1), a multiple of 2^-53.
-[[nodiscard]] constexpr double random_double(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) noexcept {
+[[nodiscard]] constexpr double random_double(std::uint64_t seed, std::uint64_t index,
+                                             std::uint64_t dimension) noexcept {
   return double(random_bits(seed, index, dimension) >> 11) * 0x1p-53;
 }
 

@@ -48,7 +48,9 @@ struct TraversalSettings {
   static constexpr unsigned kOwn = ~0u;
   unsigned hybrid_threshold = kOwn;  ///< of hybrid4, 8, 16: so many rays in a node, or fewer, go on alone; 0: none ever
   unsigned rays_in_flight = kOwn;    ///< of queued: 1 to 64
-  [[nodiscard]] static constexpr unsigned chosen(unsigned set, unsigned own) noexcept { return set == kOwn ? own : set; }
+  [[nodiscard]] static constexpr unsigned chosen(unsigned set, unsigned own) noexcept {
+    return set == kOwn ? own : set;
+  }
   friend bool operator==(const TraversalSettings&, const TraversalSettings&) = default;
 };
 
@@ -56,7 +58,7 @@ struct TraversalSettings {
 struct RayBatch {
   std::span<const Ray> rays;
   std::span<const float> times;  ///< within [0, 1], the time of the key frames; one a ray, or empty: 0 for all
-  bool coherent = false;         ///< a hint: neighbours in `rays` take much the same way, as primary rays in tile order do
+  bool coherent = false;  ///< a hint: neighbours in `rays` take much the same way, as primary rays in tile order do
   TraversalSettings settings;
 
   RayBatch() = default;
@@ -64,8 +66,8 @@ struct RayBatch {
   RayBatch(std::span<const Ray> r, std::span<const float> t) noexcept : rays(r), times(t) {}
   /// Of a vector, an array, a span.
   template <class Rays>
-    requires std::is_convertible_v<const Rays&, std::span<const Ray>>
-  RayBatch(const Rays& r) noexcept : rays(r) {}
+  requires std::is_convertible_v<const Rays&, std::span<const Ray>> RayBatch(const Rays& r)
+  noexcept : rays(r) {}
   [[nodiscard]] std::size_t size() const noexcept { return rays.size(); }
   [[nodiscard]] const Ray& operator[](std::size_t i) const noexcept { return rays[i]; }
   /// `count` rays from ray `begin` on.

@@ -1,7 +1,8 @@
 // ReservedArray: an array with room for the worst case, of which only the part in use is counted and takes memory.
 //
-// The system gives a page when it is first written, so address space for many elements costs nothing until they are used. A
-// builder reserves for the worst case, says how many elements it has handed out, and the MemoryMeter counts those; what it needs no more it may give back in parts.
+// The system gives a page when it is first written, so address space for many elements costs nothing until they are
+// used. A builder reserves for the worst case, says how many elements it has handed out, and the MemoryMeter counts
+// those; what it needs no more it may give back in parts.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +16,8 @@
 
 namespace arboretum {
 
-/// Uninitialised elements of a trivial type. resize() is a vector's: all elements count. reserve() then hand_out() is for who
-/// does not know how many he will need.
+/// Uninitialised elements of a trivial type. resize() is a vector's: all elements count. reserve() then hand_out() is
+/// for who does not know how many he will need.
 template <class T>
 class ReservedArray {
   static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T> && alignof(T) <= 64);
@@ -43,8 +44,8 @@ class ReservedArray {
     counted_bytes_.fetch_add(n * sizeof(T), std::memory_order_relaxed);
     MemoryMeter::add(n * sizeof(T));
   }
-  /// The elements [begin, end), which were handed out, are needed no more: their whole pages go back to the system and count no longer. Thread-safe for
-  /// ranges that do not overlap.
+  /// The elements [begin, end), which were handed out, are needed no more: their whole pages go back to the system and
+  /// count no longer. Thread-safe for ranges that do not overlap.
   void give_back(std::size_t begin, std::size_t end) noexcept {
     const std::size_t bytes = give_back_pages(data_ + begin, data_ + end);
     counted_bytes_.fetch_sub(bytes, std::memory_order_relaxed);
@@ -54,7 +55,8 @@ class ReservedArray {
   void resize(std::size_t n) {
     ReservedArray to;
     to.reserve(n), to.hand_out(n);
-    if (const std::size_t kept = std::min(n, size_); kept > 0) std::memcpy(static_cast<void*>(to.data_), data_, kept * sizeof(T));
+    if (const std::size_t kept = std::min(n, size_); kept > 0)
+      std::memcpy(static_cast<void*>(to.data_), data_, kept * sizeof(T));
     swap(to);
   }
   void clear() noexcept {

@@ -12,9 +12,16 @@ struct TypeList {
 };
 
 namespace detail {
-template <class... Lists> struct Concat;
-template <> struct Concat<> { using Type = TypeList<>; };
-template <class... Ts> struct Concat<TypeList<Ts...>> { using Type = TypeList<Ts...>; };
+template <class... Lists>
+struct Concat;
+template <>
+struct Concat<> {
+  using Type = TypeList<>;
+};
+template <class... Ts>
+struct Concat<TypeList<Ts...>> {
+  using Type = TypeList<Ts...>;
+};
 template <class... Ts, class... Us, class... Rest>
 struct Concat<TypeList<Ts...>, TypeList<Us...>, Rest...> {
   using Type = typename Concat<TypeList<Ts..., Us...>, Rest...>::Type;

@@ -36,7 +36,8 @@ bool collinear(double ax, double ay, double bx, double by, double cx, double cy)
 
 bool is_exactly_flat(Vec3f a, Vec3f b, Vec3f c) noexcept {
   // Walls have no area in a projection or two: the cheap answer of another before exact sums.
-  if (clearly_not_collinear(a.y, a.z, b.y, b.z, c.y, c.z) || clearly_not_collinear(a.z, a.x, b.z, b.x, c.z, c.x)) return false;
+  if (clearly_not_collinear(a.y, a.z, b.y, b.z, c.y, c.z) || clearly_not_collinear(a.z, a.x, b.z, b.x, c.z, c.x))
+    return false;
   return collinear(a.x, a.y, b.x, b.y, c.x, c.y) && collinear(a.y, a.z, b.y, b.z, c.y, c.z) &&
          collinear(a.z, a.x, b.z, b.x, c.z, c.x);
 }

@@ -1,4 +1,5 @@
-// Whether three float32 points are exactly collinear: such a triangle is never hit, whatever rounding makes of its normal.
+// Whether three float32 points are exactly collinear: such a triangle is never hit, whatever rounding makes of its
+// normal.
 #pragma once
 
 #include <cmath>
@@ -8,7 +9,8 @@
 namespace arboretum {
 
 /// Whether three points of the plane, float32 numbers in doubles, are clearly not collinear.
-[[nodiscard]] inline bool clearly_not_collinear(double ax, double ay, double bx, double by, double cx, double cy) noexcept {
+[[nodiscard]] inline bool clearly_not_collinear(double ax, double ay, double bx, double by, double cx,
+                                                double cy) noexcept {
   const double left = (bx - ax) * (cy - ay), right = (by - ay) * (cx - ax);
   constexpr double kErrorBound = 4.0 * 0x1p-53;  // Shewchuk's ccwerrboundA is (3 + 16 u) u
   return std::abs(left - right) > kErrorBound * (std::abs(left) + std::abs(right));

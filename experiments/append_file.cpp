@@ -19,9 +19,9 @@ namespace {
 
 [[noreturn]] void cannot_write(const std::filesystem::path& path, int error) {
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
-  throw UserError(
-      fmt::format("{}: cannot be written: {}; {}", path.string(), std::strerror(error),
-                  full ? "free some space and start again (a run goes on with --resume)" : "name a file in a folder that exists and may be written to"));
+  throw UserError(fmt::format("{}: cannot be written: {}; {}", path.string(), std::strerror(error),
+                              full ? "free some space and start again (a run goes on with --resume)"
+                                   : "name a file in a folder that exists and may be written to"));
 }
 
 /// Bytes up to and with the last newline.
@@ -113,17 +113,16 @@ void require_writable(const std::filesystem::path& path) {
 
 void make_output_folder(const std::filesystem::path& folder) {
   std::error_code error, ignored;
-  const bool taken =
-      std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored);
+  const bool taken = std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored);
   if (!taken) std::filesystem::create_directories(folder, error);
   if (taken || !std::filesystem::is_directory(folder, ignored)) {
     const std::string why = taken ? "there is a file of that name" : error ? error.message() : "it vanished";
-    throw UserError(fmt::format("{}: the output folder cannot be made: {}; choose another with --out",
-                                folder.string(), why));
+    throw UserError(
+        fmt::format("{}: the output folder cannot be made: {}; choose another with --out", folder.string(), why));
   }
   if (::access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
-    throw UserError(fmt::format("{}: the output folder cannot be used: {}; choose another with --out",
-                                folder.string(), std::strerror(errno)));
+    throw UserError(fmt::format("{}: the output folder cannot be used: {}; choose another with --out", folder.string(),
+                                std::strerror(errno)));
   }
   const std::filesystem::path probe = folder / ".arboretum-probe";
   const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);

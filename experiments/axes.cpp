@@ -16,8 +16,7 @@ struct Summary {
 
 constexpr Summary kBuilders[] = {
     {"in_order", "nothing is sorted: triangles in the mesh's order"},
-    {"binned_sah",
-     "top-down, surface area heuristic over bins of centroids, then collapsed to the structure's width"},
+    {"binned_sah", "top-down, surface area heuristic over bins of centroids, then collapsed to the structure's width"},
     {"sweep_sah", "top-down, surface area heuristic at every candidate plane"},
     {"spatial_sah", "binned SAH with spatial splits (references may be duplicated)"},
     {"morton", "sorted along a Morton curve (linear BVH)"},
@@ -48,7 +47,8 @@ constexpr Summary kIntersectors[] = {
 };
 constexpr Summary kBoxes[] = {
     {"fast", "slab test as rounded: may miss a box that the exact ray touches"},
-    {"ize", "Ize 2013: far planes' reciprocals two ulp larger; misses of the boxes that a ray only touches some in a million"},
+    {"ize",
+     "Ize 2013: far planes' reciprocals two ulp larger; misses of the boxes that a ray only touches some in a million"},
     {"padded", "slab test widened by its error bound: never misses a box that the exact ray touches"},
     {"auto", "padded for intersectors that promise to lose no hit, fast for moller_trumbore and its like"},
 };
@@ -62,7 +62,9 @@ constexpr Summary kTraversals[] = {
     {"stream_coherent", "Embree's stream of single rays, always with its coherent flag"},
     {"stream_incoherent", "Embree's stream of single rays, never with its coherent flag"},
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
-    {"auto", "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (single rays where there are none)"},
+    {"auto",
+     "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (single rays where there "
+     "are none)"},
 };
 constexpr Summary kIsas[] = {
     {"scalar", "no vector instructions: the reference that every machine runs"},
@@ -122,8 +124,7 @@ std::string leaf_summary(std::string_view leaf) {
     break;
   }
   if (rest.empty() || split_number(rest).second != rest) return {};
-  return "blocks of " + std::string(rest) + (rest == "1" ? " triangle: " : " triangles: ") +
-         std::string(what);
+  return "blocks of " + std::string(rest) + (rest == "1" ? " triangle: " : " triangles: ") + std::string(what);
 }
 
 std::string traversal_summary(std::string_view traversal) {
@@ -131,7 +132,8 @@ std::string traversal_summary(std::string_view traversal) {
   for (std::string_view flag : {"_coherent", "_incoherent"}) {
     if (!traversal.ends_with(flag)) continue;
     const std::string plain = traversal_summary(traversal.substr(0, traversal.size() - flag.size()));
-    return plain + (flag == "_coherent" ? ", always with Embree's coherent flag" : ", never with Embree's coherent flag");
+    return plain +
+           (flag == "_coherent" ? ", always with Embree's coherent flag" : ", never with Embree's coherent flag");
   }
   const auto [kind, number] = split_number(traversal);
   if (kind == "packet") return "packets of " + std::string(number) + " rays";
@@ -193,8 +195,7 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
       for (std::string_view way : {"packet4", "packet8", "packet16", "stream"})
         for (std::string_view flag : {"_coherent", "_incoherent"}) append_new(list, std::string(way).append(flag));
       for (std::string_view family : {"packet", "hybrid"}) {
-        if (std::ranges::any_of(list,
-                                [&](const std::string& t) { return split_number(t).first == family; })) {
+        if (std::ranges::any_of(list, [&](const std::string& t) { return split_number(t).first == family; })) {
           append_new(list, family);
         }
       }
@@ -207,8 +208,7 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
       for (std::string_view name : rendered_workload_names()) append_new(list, name);
       for (std::string_view name : hard_workload_names()) append_new(list, name);
       break;
-    case Axis::threads:
-      break;
+    case Axis::threads: break;
   }
   std::erase(list, std::string(kNone));
   return list;
@@ -219,22 +219,14 @@ std::string summary_of(Axis axis, std::string_view value, const Registry& regist
     case Axis::structure:
       if (const StructureEntry* e = registry.structure(value)) return std::string(e->info.summary);
       return "not in this build: libembree was not found";
-    case Axis::builder:
-      return builder_summary(value);
-    case Axis::leaf:
-      return leaf_summary(value);
-    case Axis::intersector:
-      return std::string(look_up(kIntersectors, value));
-    case Axis::box:
-      return std::string(look_up(kBoxes, value));
-    case Axis::traversal:
-      return traversal_summary(value);
-    case Axis::isa:
-      return std::string(look_up(kIsas, value));
-    case Axis::workload:
-      return std::string(look_up(kWorkloads, value));
-    case Axis::threads:
-      return {};
+    case Axis::builder: return builder_summary(value);
+    case Axis::leaf: return leaf_summary(value);
+    case Axis::intersector: return std::string(look_up(kIntersectors, value));
+    case Axis::box: return std::string(look_up(kBoxes, value));
+    case Axis::traversal: return traversal_summary(value);
+    case Axis::isa: return std::string(look_up(kIsas, value));
+    case Axis::workload: return std::string(look_up(kWorkloads, value));
+    case Axis::threads: return {};
   }
   return {};
 }

@@ -12,17 +12,7 @@
 
 namespace arboretum {
 
-enum class Axis : unsigned char {
-  structure,
-  builder,
-  leaf,
-  intersector,
-  box,
-  traversal,
-  isa,
-  workload,
-  threads
-};
+enum class Axis : unsigned char { structure, builder, leaf, intersector, box, traversal, isa, workload, threads };
 inline constexpr std::size_t kAxisCount = 9;
 inline constexpr std::array<std::string_view, kAxisCount> kAxisNames{
     "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads"};
@@ -30,16 +20,12 @@ inline constexpr std::array<std::string_view, kAxisCount> kAxisNames{
 /// One list of values an axis.
 using AxisLists = std::array<std::vector<std::string>, kAxisCount>;
 
-[[nodiscard]] constexpr std::size_t index_of(Axis axis) noexcept {
-  return static_cast<std::size_t>(axis);
-}
-[[nodiscard]] constexpr std::string_view to_string(Axis axis) noexcept {
-  return kAxisNames[index_of(axis)];
-}
+[[nodiscard]] constexpr std::size_t index_of(Axis axis) noexcept { return static_cast<std::size_t>(axis); }
+[[nodiscard]] constexpr std::string_view to_string(Axis axis) noexcept { return kAxisNames[index_of(axis)]; }
 [[nodiscard]] std::optional<Axis> parse_axis(std::string_view name) noexcept;
 
-// kAuto (traversal/kernel_keys.h) stands for the structure's first builder, the kernel's own leaf, the box test that the intersector calls
-// for: builder, leaf and box take it.
+// kAuto (traversal/kernel_keys.h) stands for the structure's first builder, the kernel's own leaf, the box test that
+// the intersector calls for: builder, leaf and box take it.
 /// Of the builder axis: each builder that the structure takes.
 inline constexpr std::string_view kAll = "all";
 /// The value of an axis that does not apply.

@@ -33,15 +33,16 @@ void refuse_repeated_axes(const std::vector<std::string>& words) {
   std::set<std::string> seen;
   for (const std::string& word : words) {
     const std::string key = word.substr(0, word.find('='));
-    if (!seen.insert(key).second) throw UserError(fmt::format("command line: {} is given twice; name its values together, as in {}=value,value", key, key));
+    if (!seen.insert(key).second)
+      throw UserError(
+          fmt::format("command line: {} is given twice; name its values together, as in {}=value,value", key, key));
   }
 }
 
 AxisWord read_axis_word(const std::string& word, const Registry& registry, const std::vector<std::string>& further) {
   const std::size_t equals = word.find('=');
   if (equals == std::string::npos) {
-    throw UserError(
-        fmt::format("command line: '{}' is no axis=value,value; for example isa=avx2,avx512", word));
+    throw UserError(fmt::format("command line: '{}' is no axis=value,value; for example isa=avx2,avx512", word));
   }
   const std::string key = word.substr(0, equals);
   std::vector<std::string> names{kAxisNames.begin(), kAxisNames.end()};
@@ -54,8 +55,7 @@ AxisWord read_axis_word(const std::string& word, const Registry& registry, const
     std::string value = word.substr(begin, comma - begin);
     begin = comma + 1;
     if (value.empty())
-      throw UserError(
-          fmt::format("command line: '{}' holds an empty value; give {}=value,value", word, key));
+      throw UserError(fmt::format("command line: '{}' holds an empty value; give {}=value,value", word, key));
     if (const auto axis = parse_axis(key)) {
       if (const std::string wrong = check_axis_value(*axis, value, registry); !wrong.empty())
         throw UserError(fmt::format("command line: {}", wrong));

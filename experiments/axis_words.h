@@ -19,9 +19,10 @@ struct AxisWord {
 
 /// Checks one value of an axis and brings it to its one spelling. Returns why not, or empty.
 [[nodiscard]] std::string check_axis_value(Axis axis, std::string& value, const Registry& registry);
-/// Throws UserError for a word that is no axis=value,value, an unknown axis or value and a value given twice. `further` names keys
-/// beside the axes, whose values are taken as they are.
-[[nodiscard]] AxisWord read_axis_word(const std::string& word, const Registry& registry, const std::vector<std::string>& further);
+/// Throws UserError for a word that is no axis=value,value, an unknown axis or value and a value given twice. `further`
+/// names keys beside the axes, whose values are taken as they are.
+[[nodiscard]] AxisWord read_axis_word(const std::string& word, const Registry& registry,
+                                      const std::vector<std::string>& further);
 /// Throws UserError where two words are of one axis: the later would silently replace the earlier.
 void refuse_repeated_axes(const std::vector<std::string>& words);
 

@@ -21,8 +21,8 @@ void BuildJob::prepare(Json& facts, StructurePool& pool, const MeasureSettings& 
     static_cast<void>(registry_.build(cell_.structure, mesh_, settings_of(cell_), again));
   });
   const double enough = std::min(kEnoughSeconds, measure.min_time);
-  builds_ = static_cast<std::uint64_t>(
-      std::clamp(std::ceil(enough / std::max(report.seconds, 1e-9)), 1.0, kMostBuilds));
+  builds_ =
+      static_cast<std::uint64_t>(std::clamp(std::ceil(enough / std::max(report.seconds, 1e-9)), 1.0, kMostBuilds));
 }
 
 Repetition BuildJob::measure(TimedLoop& loop) const {

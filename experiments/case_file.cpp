@@ -48,7 +48,8 @@ class CaseReader {
  public:
   CaseReader(const std::filesystem::path& file, std::size_t number, const Json& entry) : entry_(entry) {
     where_ = fmt::format("{}: case {}", file.string(), number);
-    if (!entry.is_object()) fail("is no object; a case is {\"id\": …, \"triangles\": […], \"origin\": …, \"direction\": …}");
+    if (!entry.is_object())
+      fail("is no object; a case is {\"id\": …, \"triangles\": […], \"origin\": …, \"direction\": …}");
     id_ = entry.contains("id") && entry["id"].is_string() ? entry["id"].get<std::string>() : std::to_string(number);
     where_ = fmt::format("{}: case {}", file.string(), id_);
   }
@@ -59,7 +60,8 @@ class CaseReader {
     expect_known_keys();
     if (entry_.contains("why")) c.why = entry_["why"];
     const Json& triangles = member("triangles");
-    if (!triangles.is_array() || triangles.empty()) fail("triangles must be a list of [[x, y, z], [x, y, z], [x, y, z]]");
+    if (!triangles.is_array() || triangles.empty())
+      fail("triangles must be a list of [[x, y, z], [x, y, z], [x, y, z]]");
     for (std::uint32_t i = 0; i < triangles.size(); ++i) add_triangle(c, i, triangles[i]);
     c.ray.origin = point(member("origin"), "origin"), c.ray.direction = point(member("direction"), "direction");
     if (entry_.contains("tnear")) c.ray.tnear = number(entry_["tnear"], "tnear");
@@ -79,7 +81,8 @@ class CaseReader {
   }
   float number(const Json& value, std::string_view what) const {
     if (value.is_number()) {
-      const float x = static_cast<float>(value.get<double>());  // the shortest decimal of a float may lie beyond it, as that of the largest does
+      // The shortest decimal of a float may lie beyond it, as that of the largest does
+      const float x = static_cast<float>(value.get<double>());
       if (!std::isfinite(x)) fail(fmt::format("{}: {} is beyond float32", what, value.dump()));
       return x;
     }
@@ -93,7 +96,8 @@ class CaseReader {
     return {number(value[0], what), number(value[1], what), number(value[2], what)};
   }
   void add_triangle(VerifyCase& c, std::uint32_t id, const Json& corners) const {
-    if (!corners.is_array() || corners.size() != 3) fail(fmt::format("triangle {} must have three corners [x, y, z]", id));
+    if (!corners.is_array() || corners.size() != 3)
+      fail(fmt::format("triangle {} must have three corners [x, y, z]", id));
     const Vec3f p[3] = {point(corners[0], "triangles"), point(corners[1], "triangles"), point(corners[2], "triangles")};
     if (!is_finite(p[0]) || !is_finite(p[1]) || !is_finite(p[2])) return;
     const auto first = static_cast<std::uint32_t>(c.mesh.vertices.size());
@@ -107,7 +111,8 @@ class CaseReader {
     for (const auto& [key, value] : entry_.items())
       if (std::ranges::find(known, key) == known.end()) fail(unknown_name_message("key", key, known));
     for (const char* name : {"id", "why", "source"})
-      if (entry_.contains(name) && !entry_[name].is_string()) fail(fmt::format("{} must be a string, not {}", name, entry_[name].dump()));
+      if (entry_.contains(name) && !entry_[name].is_string())
+        fail(fmt::format("{} must be a string, not {}", name, entry_[name].dump()));
   }
   /// A tnear below 0 is no ray's (core/ray.h), and no kernel's answer to it is promised: it may stand where 0 would do.
   void expect_nothing_below_zero(const VerifyCase& c, const ExactAnswer& truth) const {
@@ -115,7 +120,8 @@ class CaseReader {
     Ray ray = c.ray;
     ray.tnear = 0;
     if (exact_answer(c.mesh, ray).nearest != truth.nearest)
-      fail(fmt::format("tnear {} is below 0 and something lies there; rays look from their origin on (core/ray.h)", c.ray.tnear));
+      fail(fmt::format("tnear {} is below 0 and something lies there; rays look from their origin on (core/ray.h)",
+                       c.ray.tnear));
   }
   /// The answer that the file gives must be the exact one, as far as it gives it.
   void expect_truth(const VerifyCase& c, const ExactAnswer& truth) const {
@@ -125,13 +131,19 @@ class CaseReader {
       return &entry_[name];
     };
     const auto expect = [&](const char* name, bool holds, const std::string& found) {
-      if (!holds) fail(fmt::format("{} is {}, but exact arithmetic finds {}; correct the file", name, entry_[name].dump(), found));
+      if (!holds)
+        fail(
+            fmt::format("{} is {}, but exact arithmetic finds {}; correct the file", name, entry_[name].dump(), found));
     };
     const auto is_whole = [](const Json& j) { return j.is_number_unsigned(); };
-    if (const Json* hit = given("hit", [](const Json& j) { return j.is_boolean(); }, "true or false"))
+    if (const Json* hit = given(
+            "hit", [](const Json& j) { return j.is_boolean(); }, "true or false"))
       expect("hit", *hit == truth.hit(), truth.hit() ? "a hit" : "a miss");
-    if (const Json* t = given("t", [](const Json& j) { return j.is_number() || j.is_null(); }, "a number, or null for a miss")) {
-      const bool holds = truth.hit() ? t->is_number() && std::fabs(t->get<double>() - truth.t) <= std::fabs(truth.t) * 0x1p-48 : t->is_null();
+    if (const Json* t = given(
+            "t", [](const Json& j) { return j.is_number() || j.is_null(); }, "a number, or null for a miss")) {
+      const bool holds = truth.hit()
+                             ? t->is_number() && std::fabs(t->get<double>() - truth.t) <= std::fabs(truth.t) * 0x1p-48
+                             : t->is_null();
       expect("t", holds, truth.hit() ? fmt::format("{}", truth.t) : "a miss");
     }
     const auto is_list = [&](const Json& j) { return j.is_array() && std::ranges::all_of(j, is_whole); };
@@ -148,7 +160,8 @@ class CaseReader {
   std::string id_, where_;
 };
 
-/// The file as JSON. A number beyond double ends the parser's work, so that no CaseReader sees it: it is told here, with the case.
+/// The file as JSON. A number beyond double ends the parser's work, so that no CaseReader sees it: it is told here,
+/// with the case.
 Json parse(const std::filesystem::path& file, std::istream& stream) {
   constexpr int kInDocument = 1, kEntry = 2, kInEntry = 3;  // the parser's depths
   std::size_t number = 1;
@@ -163,10 +176,12 @@ Json parse(const std::filesystem::path& file, std::istream& stream) {
   try {
     return Json::parse(stream, watch);
   } catch (const Json::out_of_range& e) {
-    const std::string what = e.what(), place = list == "cases" ? fmt::format(": case {}", id.empty() ? std::to_string(number) : id) : "";
+    const std::string what = e.what(),
+                      place = list == "cases" ? fmt::format(": case {}", id.empty() ? std::to_string(number) : id) : "";
     const std::size_t quote = what.find('\'');
-    throw UserError(fmt::format("{}{}: {} is beyond float32", file.string(), place,
-                                quote == std::string::npos ? "a number" : what.substr(quote + 1, what.rfind('\'') - quote - 1)));
+    throw UserError(
+        fmt::format("{}{}: {} is beyond float32", file.string(), place,
+                    quote == std::string::npos ? "a number" : what.substr(quote + 1, what.rfind('\'') - quote - 1)));
   } catch (const Json::exception& e) {
     throw UserError(fmt::format("{}: no JSON: {}", file.string(), e.what()));
   }
@@ -178,9 +193,7 @@ std::string decimal(float x) {
   if (std::isinf(x)) return x > 0 ? "\"inf\"" : "\"-inf\"";
   return fmt::format("{}", x);
 }
-std::string decimal(Vec3f p) {
-  return fmt::format("[{},{},{}]", decimal(p.x), decimal(p.y), decimal(p.z));
-}
+std::string decimal(Vec3f p) { return fmt::format("[{},{},{}]", decimal(p.x), decimal(p.y), decimal(p.z)); }
 
 }  // namespace
 
@@ -188,8 +201,10 @@ std::vector<VerifyCase> read_case_file(const std::filesystem::path& file) {
   std::ifstream stream(file);
   if (!stream) throw UserError(fmt::format("{}: no such file, or it cannot be read", file.string()));
   const Json document = parse(file, stream);
-  if (!document.is_object() || !document.contains("cases") || !document["cases"].is_array() || document["cases"].empty())
-    throw UserError(fmt::format("{}: holds no {{\"cases\": [...]}}; docs/command-line.md shows the format", file.string()));
+  if (!document.is_object() || !document.contains("cases") || !document["cases"].is_array() ||
+      document["cases"].empty())
+    throw UserError(
+        fmt::format("{}: holds no {{\"cases\": [...]}}; docs/command-line.md shows the format", file.string()));
   std::vector<VerifyCase> cases;
   std::set<std::string> ids;
   for (const Json& entry : document["cases"]) {
@@ -209,8 +224,9 @@ std::string case_json(const std::string& id, const std::string& why, const Trian
   const ExactAnswer truth = exact_answer(mesh, ray);
   return fmt::format(
       R"({{"id":{},"triangles":[{}],"origin":{},"direction":{},"tnear":{},"tfar":{},"hit":{},"t":{},"nearest_ids":[{}],"closed_hits":{},"why":{},"source":"arboretum verify"}})",
-      Json(id).dump(), fmt::join(triangles, ","), decimal(ray.origin), decimal(ray.direction), decimal(ray.tnear), decimal(ray.tfar),
-      truth.hit(), truth.hit() ? fmt::format("{}", truth.t) : "null", fmt::join(truth.nearest, ","), truth.closed_hits, Json(why).dump());
+      Json(id).dump(), fmt::join(triangles, ","), decimal(ray.origin), decimal(ray.direction), decimal(ray.tnear),
+      decimal(ray.tfar), truth.hit(), truth.hit() ? fmt::format("{}", truth.t) : "null", fmt::join(truth.nearest, ","),
+      truth.closed_hits, Json(why).dump());
 }
 
 }  // namespace arboretum

@@ -19,12 +19,14 @@ struct VerifyCase {
 };
 
 /// Reads `{"cases": [{"id", "triangles": [[[x, y, z] x 3] ...], "origin", "direction", "tnear", "tfar", "hit", "t",
-/// "nearest_ids", "closed_hits", "why", "source"} ...]}`; numbers are float32 in decimal, or "inf", "-inf", "nan". tnear is 0 and tfar
-/// infinite where they are left out; hit, t (of a miss null), nearest_ids and closed_hits may be left out, and where they are given
-/// must be what exact arithmetic finds, each by itself. Throws UserError, for a key of another name too.
+/// "nearest_ids", "closed_hits", "why", "source"} ...]}`; numbers are float32 in decimal, or "inf", "-inf", "nan".
+/// tnear is 0 and tfar infinite where they are left out; hit, t (of a miss null), nearest_ids and closed_hits may be
+/// left out, and where they are given must be what exact arithmetic finds, each by itself. Throws UserError, for a key
+/// of another name too.
 [[nodiscard]] std::vector<VerifyCase> read_case_file(const std::filesystem::path& file);
 
 /// A case of the format on one line, with the exact answers filled in.
-[[nodiscard]] std::string case_json(const std::string& id, const std::string& why, const TriangleMesh& mesh, const Ray& ray);
+[[nodiscard]] std::string case_json(const std::string& id, const std::string& why, const TriangleMesh& mesh,
+                                    const Ray& ray);
 
 }  // namespace arboretum

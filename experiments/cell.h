@@ -18,7 +18,7 @@ struct Cell {
   Isa isa = Isa::scalar;
   unsigned threads = 1;
   BuilderParameters parameters;
-  std::string parameter_label;        ///< what of `parameters` is swept: ":bins=16"; part of the name
+  std::string parameter_label;  ///< what of `parameters` is swept: ":bins=16"; part of the name
   TraversalSettings settings;
   std::string setting_label;          ///< what of `settings` is swept: ":hybrid_threshold=2"; part of the name
   SurfaceStart start;                 ///< of workloads whose rays start on surfaces

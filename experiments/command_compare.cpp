@@ -21,8 +21,10 @@ void filter_cells(ResultFolder& folder, const std::string& filter, const std::st
 void refuse_different_machines(const ResultFolder& a, const ResultFolder& b) {
   const std::vector<std::string> differences = machine_differences(a.context, b.context);
   if (differences.empty()) return;
-  throw UserError(fmt::format("{} and {} were measured on different machines or builds ({}); measure both on one, or compare all the same with --allow-different-machines",
-                              a.path.string(), b.path.string(), fmt::join(differences, "; ")));
+  throw UserError(
+      fmt::format("{} and {} were measured on different machines or builds ({}); measure both on one, or compare all "
+                  "the same with --allow-different-machines",
+                  a.path.string(), b.path.string(), fmt::join(differences, "; ")));
 }
 
 void refuse_unknown_format(const std::filesystem::path& plot) {
@@ -41,10 +43,12 @@ void write(const std::string& path, const std::string& text) {
 }  // namespace
 
 ExitStatus command_compare(const CompareCommand& command) {
-  if (command.json == "-" && command.csv == "-") throw UserError("compare: --json and --csv cannot both go to stdout; give one of them a file");
+  if (command.json == "-" && command.csv == "-")
+    throw UserError("compare: --json and --csv cannot both go to stdout; give one of them a file");
   refuse_unknown_format(command.plot);
   if (!command.plot.empty()) require_chosen_python();
-  for (const std::filesystem::path& file : {std::filesystem::path(command.json), std::filesystem::path(command.csv), command.plot})
+  for (const std::filesystem::path& file :
+       {std::filesystem::path(command.json), std::filesystem::path(command.csv), command.plot})
     if (!file.empty() && file != "-") require_writable(file);
   ResultFolder a = read_result_folder(command.a), b = read_result_folder(command.b);
   if (!command.allow_different_machines) refuse_different_machines(a, b);
@@ -60,7 +64,8 @@ ExitStatus command_compare(const CompareCommand& command) {
   write(command.csv, comparison_csv(comparison));
   if (!command.plot.empty() && !comparison.cells.empty()) {
     std::fflush(stdout);  // the script may print too
-    if (const std::string problem = draw_ratios(comparison_json(comparison, a, b), command.plot); !problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
+    if (const std::string problem = draw_ratios(comparison_json(comparison, a, b), command.plot); !problem.empty())
+      fmt::print(stderr, "warning: {}\n", problem);
   }
   std::fflush(stdout);
   if (status == ExitStatus::kNothingMeasured) fmt::print(stderr, "arboretum: {}\n", why);

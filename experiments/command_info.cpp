@@ -44,8 +44,8 @@ ExitStatus command_info(const std::string& word, bool json) {
   const Vec3f lower = info.bounds.lower, upper = info.bounds.upper;
   fmt::print("scene         {}\n", scene.name);
   fmt::print("triangles     {} ({} vertices)\n", info.triangles, info.vertices);
-  fmt::print("bounds        [{:.6g} {:.6g} {:.6g}] to [{:.6g} {:.6g} {:.6g}]\n", lower.x, lower.y, lower.z,
-             upper.x, upper.y, upper.z);
+  fmt::print("bounds        [{:.6g} {:.6g} {:.6g}] to [{:.6g} {:.6g} {:.6g}]\n", lower.x, lower.y, lower.z, upper.x,
+             upper.y, upper.z);
   fmt::print("dropped       {} with NaN or infinity, {} out of range, {} of zero area (degenerate)\n",
              info.report.non_finite, info.report.out_of_range, info.report.degenerate);
   fmt::print("duplicates    {}\n", info.duplicates);
@@ -60,16 +60,16 @@ ExitStatus command_info(const std::string& word, bool json) {
   else
     fmt::print("motion        nothing moves\n");
   if (info.instances > 0)
-    fmt::print("instances     {} of {} meshes with {} triangles; {} named by the scene\n", info.instances, info.prototypes,
-               info.prototype_triangles, info.named_instances);
+    fmt::print("instances     {} of {} meshes with {} triangles; {} named by the scene\n", info.instances,
+               info.prototypes, info.prototype_triangles, info.named_instances);
   else if (info.named_instances > 0)
-    fmt::print("instances     {} named by the scene, laid out in one mesh{}\n", info.named_instances, info.key_frames > 1 ? " because it moves" : "");
+    fmt::print("instances     {} named by the scene, laid out in one mesh{}\n", info.named_instances,
+               info.key_frames > 1 ? " because it moves" : "");
   else
     fmt::print("instances     none\n");
   for (const std::string& warning : info.report.warnings) fmt::print("warning       {}\n", warning);
   fmt::print("effects\n");
-  for (const Effect& e : info.effects)
-    fmt::print("  {} {:<14} {}\n", e.called_for ? "+" : "-", e.name, e.reason);
+  for (const Effect& e : info.effects) fmt::print("  {} {:<14} {}\n", e.called_for ? "+" : "-", e.name, e.reason);
   return ExitStatus::kDone;
 }
 

@@ -37,19 +37,18 @@ struct Arguments {
 std::string refuse_no_count(const std::string& word) {
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  return error == std::errc{} && end == word.data() + word.size() ? "" : fmt::format("'{}' is no whole number from 0 to {}", word, ~std::uint64_t{0});
+  return error == std::errc{} && end == word.data() + word.size()
+             ? ""
+             : fmt::format("'{}' is no whole number from 0 to {}", word, ~std::uint64_t{0});
 }
 
 void declare_run(CLI::App& app, RunCommand& run) {
-  CLI::App* c =
-      app.add_subcommand("run", "Run the sweep of a configuration; table, results, plots and report");
+  CLI::App* c = app.add_subcommand("run", "Run the sweep of a configuration; table, results, plots and report");
   c->add_option("CONFIG", run.config, "The configuration, a YAML file")->required();
-  c->add_option("AXIS", run.overrides.axes,
-                "axis=value,value in place of the configuration's (isa=avx2,avx512)");
+  c->add_option("AXIS", run.overrides.axes, "axis=value,value in place of the configuration's (isa=avx2,avx512)");
   c->add_option("--out", run.out, "Result folder (default: results/<experiment>)");
   c->add_flag("--list", run.list, "Print the cells' names and measure nothing");
-  c->add_flag("--dry-run", run.dry_run,
-              "Print cells, skipped ones with reasons and a time estimate; measure nothing");
+  c->add_flag("--dry-run", run.dry_run, "Print cells, skipped ones with reasons and a time estimate; measure nothing");
   c->add_option("--filter", run.filter, "Only cells whose name this regular expression finds");
   c->add_option("--skip", run.skip, "No cells whose name this regular expression finds");
   c->add_flag("--resume", run.resume, "Go on with a run that was cut off");
@@ -68,41 +67,64 @@ void declare_merge(CLI::App& app, MergeCommand& merge) {
   CLI::App* c = app.add_subcommand("merge", "Join result folders (shards) of one configuration into one");
   c->add_option("OUT", merge.out, "The folder to write; must hold no results yet")->required();
   c->add_option("PART", merge.parts, "Result folders, as `run --shard` wrote them")->required();
-  c->add_flag("--allow-different-machines", merge.options.allow_different_machines, "Also parts measured on different machines or builds");
-  c->add_flag("--allow-different-revisions", merge.options.allow_different_revisions, "Also parts of different git revisions");
+  c->add_flag("--allow-different-machines", merge.options.allow_different_machines,
+              "Also parts measured on different machines or builds");
+  c->add_flag("--allow-different-revisions", merge.options.allow_different_revisions,
+              "Also parts of different git revisions");
   c->add_flag("--require-all", merge.require_all, "An error where a cell of the plan is missing; nothing is written");
   c->add_flag("--no-plots", merge.no_plots, "Draw no plots and write no report");
 }
 
 void declare_compare(CLI::App& app, CompareCommand& compare) {
-  CLI::App* c = app.add_subcommand("compare", "Two result folders, cell by cell: what of B is faster, slower, or indistinguishable from A");
+  CLI::App* c = app.add_subcommand(
+      "compare", "Two result folders, cell by cell: what of B is faster, slower, or indistinguishable from A");
   c->add_option("A", compare.a, "The result folder compared with (before)")->required();
   c->add_option("B", compare.b, "The result folder compared (after)")->required();
-  c->add_option("--min-difference", compare.options.min_difference, "Smallest difference of speed that counts, in per cent (default 3)")->check(CLI::Range(0.0, 1000.0));
-  c->add_option("--significance", compare.options.significance, "Share of false findings among the findings at most (default 0.05)")->check(CLI::Range(1e-6, 0.5));
-  c->add_option("--control", compare.options.control, "Cells whose code did not change, by a regular expression (/embree/): speeds are taken relative to theirs");
-  c->add_flag("--strict", compare.options.strict, "Undecided cells whose whole interval is beyond the smallest difference on the slow side count as slower");
+  c->add_option("--min-difference", compare.options.min_difference,
+                "Smallest difference of speed that counts, in per cent (default 3)")
+      ->check(CLI::Range(0.0, 1000.0));
+  c->add_option("--significance", compare.options.significance,
+                "Share of false findings among the findings at most (default 0.05)")
+      ->check(CLI::Range(1e-6, 0.5));
+  c->add_option(
+      "--control", compare.options.control,
+      "Cells whose code did not change, by a regular expression (/embree/): speeds are taken relative to theirs");
+  c->add_flag(
+      "--strict", compare.options.strict,
+      "Undecided cells whose whole interval is beyond the smallest difference on the slow side count as slower");
   c->add_option("--filter", compare.filter, "Only cells whose name this regular expression finds");
   c->add_option("--skip", compare.skip, "No cells whose name this regular expression finds");
   c->add_flag("--all", compare.all, "Also list indistinguishable cells where there are many");
-  c->add_flag("--allow-different-machines", compare.allow_different_machines, "Compare although CPU, compiler or flags differ");
+  c->add_flag("--allow-different-machines", compare.allow_different_machines,
+              "Compare although CPU, compiler or flags differ");
   c->add_option("--json", compare.json, "Write the comparison to this file as JSON (-: stdout)");
   c->add_option("--csv", compare.csv, "Write the cells to this file as CSV (-: stdout)");
   c->add_option("--plot", compare.plot, "Draw the ratios with their intervals to this file (.png, .svg, .pdf)");
-  c->footer("Exit status: 0 no regression, 2 usage error, 3 a cell is slower or has new wrong answers, 4 no cell is in both.");
+  c->footer(
+      "Exit status: 0 no regression, 2 usage error, 3 a cell is slower or has new wrong answers, 4 no cell is in "
+      "both.");
 }
 
 void declare_verify(CLI::App& app, VerifyCommand& verify) {
   CLI::App* c = app.add_subcommand("verify", "Combinations against exact arithmetic, ray by ray, on hard rays");
-  c->add_option("SUBJECT", verify.subject, "A scene as for `info`, a cases file (.json), or `random`: random small meshes")->required();
+  c->add_option("SUBJECT", verify.subject,
+                "A scene as for `info`, a cases file (.json), or `random`: random small meshes")
+      ->required();
   c->add_option("AXIS", verify.axes, "axis=value,value: which combinations (isa=avx2,avx512); axis=all");
-  c->add_option("--rays", verify.rays, "Rays in all (default 100000; a cases file: each case once, and mutations of them beyond that)")
+  c->add_option("--rays", verify.rays,
+                "Rays in all (default 100000; a cases file: each case once, and mutations of them beyond that)")
       ->check(refuse_no_count);
   c->add_option("--seed", verify.seed, "Seed of the rays (default 1)")->check(refuse_no_count);
-  c->add_option("--offset", verify.offsets, "Moves the scene by these distances along (1, -3/4, 1/2)")->delimiter(',')->allow_extra_args(false);
-  c->add_option("--scale", verify.scales, "Scales the moved scene by these powers of two: -60,0,60")->delimiter(',')->allow_extra_args(false);
-  c->add_option("--kinds", verify.kinds, "Kinds of rays: vertex, edge, border, interior, grazing, axis, plane, surface, far, interval, invalid")
-      ->delimiter(',')->allow_extra_args(false);
+  c->add_option("--offset", verify.offsets, "Moves the scene by these distances along (1, -3/4, 1/2)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  c->add_option("--scale", verify.scales, "Scales the moved scene by these powers of two: -60,0,60")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  c->add_option("--kinds", verify.kinds,
+                "Kinds of rays: vertex, edge, border, interior, grazing, axis, plane, surface, far, interval, invalid")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   c->add_option("--out", verify.out, "Folder for verify.csv and the cases found");
   c->add_option("--threads", verify.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
   c->add_flag("--spread", verify.spread, "Share the rays among the combinations instead of giving each all of them");
@@ -115,23 +137,36 @@ void declare_render(CLI::App& app, RenderCommand& render) {
   c->add_option("SCENE", render.scene, "A catalogue name, a file, or generator:triangles[:seed]")->required();
   c->add_option("--out", render.out, "The picture: .png, or .pfm for radiance in float32 (default image.png)");
   c->add_option("--effects", render.effects, "auto (what the scene calls for), all, or some of `list effects`: a,b,c");
-  CLI::Option* heat_map = c->add_option("--heatmap", render.heat_map, "In place of light: nodes or triangles that the ray through each pixel visits");
-  c->add_option("--integrator", render.integrator, "path, whitted, ambient_occlusion, normals (default: path; ambient_occlusion where nothing emits light)");
+  CLI::Option* heat_map = c->add_option("--heatmap", render.heat_map,
+                                        "In place of light: nodes or triangles that the ray through each pixel visits");
+  c->add_option(
+      "--integrator", render.integrator,
+      "path, whitted, ambient_occlusion, normals (default: path; ambient_occlusion where nothing emits light)");
   c->add_option("--spp", render.settings.samples, "Samples a pixel (default 16)")->check(CLI::Range(1, 65536));
-  c->add_option("--resolution", render.resolution, "WIDTHxHEIGHT (default: the camera's, up to 640 a side; else 512x512)");
-  c->add_option("--depth", render.depth, "Scatterings of a path at most (default 32, the most of whitted; 1: direct light)")->check(CLI::Range(0, 4096));
-  c->add_option("--clamp", render.clamp, "Most light that one path brings at once from beyond its first hit: fewer bright specks, some light lost (default: none)")
+  c->add_option("--resolution", render.resolution,
+                "WIDTHxHEIGHT (default: the camera's, up to 640 a side; else 512x512)");
+  c->add_option("--depth", render.depth,
+                "Scatterings of a path at most (default 32, the most of whitted; 1: direct light)")
+      ->check(CLI::Range(0, 4096));
+  c->add_option("--clamp", render.clamp,
+                "Most light that one path brings at once from beyond its first hit: fewer bright specks, some light "
+                "lost (default: none)")
       ->check(CLI::PositiveNumber);
-  c->add_option("--exposure", render.exposure, "auto, or stops: radiance 1 is white at 0 (default auto; of ambient_occlusion and normals 0)");
+  c->add_option("--exposure", render.exposure,
+                "auto, or stops: radiance 1 is white at 0 (default auto; of ambient_occlusion and normals 0)");
   c->add_option("--seed", render.settings.seed, "Seed of the random numbers (default 1)")->check(refuse_no_count);
-  for (const char* const of_light : {"--integrator", "--spp", "--depth", "--clamp", "--exposure", "--seed"}) c->get_option(of_light)->excludes(heat_map);
+  for (const char* const of_light : {"--integrator", "--spp", "--depth", "--clamp", "--exposure", "--seed"})
+    c->get_option(of_light)->excludes(heat_map);
   c->add_option("--threads", render.settings.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
-  c->add_option("--structure", render.kernel.structure, "Structure to trace with (default bvh8, bvh4_motion for what moves)");
+  c->add_option("--structure", render.kernel.structure,
+                "Structure to trace with (default bvh8, bvh4_motion for what moves)");
   c->add_option("--builder", render.kernel.builder, "Its builder");
   c->add_option("--leaf", render.kernel.leaf, "Its leaf block");
-  c->add_option("--intersector", render.kernel.intersector, "Ray/triangle test (default watertight; of embree pluecker)");
+  c->add_option("--intersector", render.kernel.intersector,
+                "Ray/triangle test (default watertight; of embree pluecker)");
   c->add_option("--box", render.kernel.box, "Box test (default: what suits the intersector)");
-  c->add_option("--traversal", render.kernel.traversal, "Way of traversal (default auto, or single where the structure has none)");
+  c->add_option("--traversal", render.kernel.traversal,
+                "Way of traversal (default auto, or single where the structure has none)");
   c->add_option("--isa", render.kernel.isa, "Instruction set (default: the best)");
 }
 
@@ -156,8 +191,7 @@ void declare(CLI::App& app, Arguments& a) {
   plot->add_option("--only", a.figures, "These figures alone")->delimiter(',');
   CLI::App* fetch = app.add_subcommand("fetch", "Bring catalogue scenes from their packages");
   fetch->add_option("SCENE", a.fetched, "Names of `list scenes`")->required();
-  for (CLI::App* c : app.get_subcommands({}))
-    c->allow_extras();  // unknown options are named by us, with the nearest
+  for (CLI::App* c : app.get_subcommands({})) c->allow_extras();  // unknown options are named by us, with the nearest
 }
 
 std::vector<std::string> command_names(const CLI::App& app) {
@@ -169,8 +203,8 @@ std::vector<std::string> command_names(const CLI::App& app) {
 void refuse_extras(const CLI::App& command) {
   for (const std::string& word : command.remaining()) {
     if (!word.starts_with("-"))
-      throw UserError(fmt::format("{}: '{}' is one word too many; see `arboretum {} --help`",
-                                  command.get_name(), word, command.get_name()));
+      throw UserError(fmt::format("{}: '{}' is one word too many; see `arboretum {} --help`", command.get_name(), word,
+                                  command.get_name()));
     std::vector<std::string> options;
     for (const CLI::Option* option : command.get_options({})) {
       for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
@@ -188,8 +222,7 @@ ExitStatus dispatch(std::vector<std::string> words) {
   declare(app, a);
   const std::vector<std::string> commands = command_names(app);
   if (words.empty())
-    throw UserError(
-        fmt::format("no command; one of {} (arboretum --help says more)", fmt::join(commands, ", ")));
+    throw UserError(fmt::format("no command; one of {} (arboretum --help says more)", fmt::join(commands, ", ")));
   if (!words.front().starts_with("-") && std::ranges::find(commands, words.front()) == commands.end()) {
     throw UserError(unknown_name_message("command", words.front(), commands));
   }
@@ -223,7 +256,8 @@ ExitStatus dispatch(std::vector<std::string> words) {
 }
 
 /// One line, whatever the message holds.
-/// What a shell reports of a program that SIGPIPE ends, as in `arboretum run … --list | head`: no error, and nobody to tell of it.
+/// What a shell reports of a program that SIGPIPE ends, as in `arboretum run … --list | head`: no error, and nobody to
+/// tell of it.
 constexpr int kReaderLeft = 128 + SIGPIPE;
 
 int fail(std::string message) {
@@ -241,8 +275,7 @@ int command_line(int argc, char** argv) {
     const int status = static_cast<int>(dispatch({argv + 1, argv + argc}));
     errno = 0;
     if (std::fflush(stdout) != 0 && errno == EPIPE) return kReaderLeft;
-    if (std::ferror(stdout))
-      return fail("output cannot be written: stdout is full or closed");
+    if (std::ferror(stdout)) return fail("output cannot be written: stdout is full or closed");
     return status;
   } catch (const UserError& e) {
     std::fflush(stdout);
@@ -251,8 +284,7 @@ int command_line(int argc, char** argv) {
     return fail("out of memory; lower the number of triangles or the resolution");
   } catch (const std::system_error& e) {
     if (e.code() == std::errc::broken_pipe) return kReaderLeft;
-    return fail(
-        fmt::format("output cannot be written: {}; free some space or write elsewhere", e.code().message()));
+    return fail(fmt::format("output cannot be written: {}; free some space or write elsewhere", e.code().message()));
   } catch (const std::exception& e) {
     return fail(fmt::format("internal error: {}; please report it with the command line", e.what()));
   }

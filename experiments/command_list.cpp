@@ -16,12 +16,9 @@ namespace {
 
 std::string plural(Axis axis) {
   switch (axis) {
-    case Axis::leaf:
-      return "leaves";
-    case Axis::box:
-      return "boxes";
-    default:
-      return std::string(to_string(axis)) + "s";
+    case Axis::leaf: return "leaves";
+    case Axis::box: return "boxes";
+    default: return std::string(to_string(axis)) + "s";
   }
 }
 
@@ -31,7 +28,8 @@ Json parameters_of(const StructureInfo& info, const Registry& registry) {
   for (std::string_view builder : info.builders) {
     Json& list = read[std::string(builder)] = Json::array();
     for (const std::string& name : parameter_names())
-      if (!is_of_traversal(name) && registry.reads(name, info.name, builder, BuilderParameters{}.below)) list.push_back(name);
+      if (!is_of_traversal(name) && registry.reads(name, info.name, builder, BuilderParameters{}.below))
+        list.push_back(name);
   }
   return read;
 }
@@ -40,7 +38,9 @@ Json parameters_of(const StructureInfo& info, const Registry& registry) {
 Json traversals_of(const std::string& structure, const Registry& registry) {
   Json list = Json::array();
   for (const std::string& value : known_values(Axis::traversal, registry)) {
-    const auto has = [&](const KernelRow& row) { return row.structure == structure && row.traversal == value && registry.has(row.isa); };
+    const auto has = [&](const KernelRow& row) {
+      return row.structure == structure && row.traversal == value && registry.has(row.isa);
+    };
     if (std::ranges::any_of(registry.kernels, has)) list.push_back(value);
   }
   return list;
@@ -50,7 +50,8 @@ Json traversals_of(const std::string& structure, const Registry& registry) {
 Json parameters_of(const std::string& builder, const Registry& registry) {
   Json read = Json::object();
   for (const StructureEntry& entry : registry.structures)
-    if (Json all = parameters_of(entry.info, registry); all.contains(builder)) read[std::string(entry.info.name)] = all[builder];
+    if (Json all = parameters_of(entry.info, registry); all.contains(builder))
+      read[std::string(entry.info.name)] = all[builder];
   return read;
 }
 
@@ -62,7 +63,9 @@ Json axis_entries(Axis axis, const Registry& registry) {
       const StructureEntry* structure = registry.structure(value);
       entry["available"] = structure != nullptr;
       if (structure) entry["builders"] = structure->info.builders, entry["leaves"] = structure->info.leaves;
-      if (structure) entry["traversals"] = traversals_of(value, registry), entry["parameters"] = parameters_of(structure->info, registry);
+      if (structure)
+        entry["traversals"] = traversals_of(value, registry),
+        entry["parameters"] = parameters_of(structure->info, registry);
     }
     if (axis == Axis::builder) entry["parameters"] = parameters_of(value, registry);
     if (axis == Axis::isa) entry["available"] = registry.has(*parse_isa(value));
@@ -103,8 +106,7 @@ Json effect_entries() {
       {"multi_light", "more than one light"}};
   Json entries = Json::array();
   for (std::string_view name : kEffectNames) {
-    const auto found =
-        std::ranges::find(kSummaries, name, &std::pair<std::string_view, std::string_view>::first);
+    const auto found = std::ranges::find(kSummaries, name, &std::pair<std::string_view, std::string_view>::first);
     entries.push_back({{"name", name}, {"summary", found == std::end(kSummaries) ? "" : found->second}});
   }
   return entries;
@@ -116,7 +118,10 @@ Json promise_entries(const Registry& registry) {
     for (const std::string& box : known_values(Axis::box, registry)) {
       if (box == kAuto) continue;
       const Promise promise = promise_of("", intersector, box);
-      Json entry = {{"name", intersector + "/" + box}, {"summary", to_words(promise)}, {"intersector", intersector}, {"box", box}};
+      Json entry = {{"name", intersector + "/" + box},
+                    {"summary", to_words(promise)},
+                    {"intersector", intersector},
+                    {"box", box}};
       entry["crack_free_at_edges"] = promise.coverage != Coverage::none;
       entry["crack_free"] = promise.coverage == Coverage::closed || promise.coverage == Coverage::exact;
       entry["exact"] = promise.coverage == Coverage::exact;
@@ -137,14 +142,15 @@ std::string remark(const Json& entry) {
     const std::size_t all = names.size();
     const std::vector<std::string> every = names;
     std::erase_if(names, [&](const std::string& name) {
-      return name.ends_with(kAgain) && std::ranges::find(every, name.substr(0, name.size() - kAgain.size())) != every.end();
+      return name.ends_with(kAgain) &&
+             std::ranges::find(every, name.substr(0, name.size() - kAgain.size())) != every.end();
     });
-    line += fmt::format(" [builders: {}{}]", fmt::join(names, " "), names.size() < all ? fmt::format("; each also as …{}", kAgain) : "");
+    line += fmt::format(" [builders: {}{}]", fmt::join(names, " "),
+                        names.size() < all ? fmt::format("; each also as …{}", kAgain) : "");
   }
   if (entry.contains("generator")) {
-    line += entry["generator"].get<bool>()
-                ? " (generated, any triangle count)"
-                : fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>());
+    line += entry["generator"].get<bool>() ? " (generated, any triangle count)"
+                                           : fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>());
   }
   if (entry.contains("available") && !entry["available"].get<bool>()) {
     line += entry.contains("generator")
@@ -165,7 +171,8 @@ ExitStatus command_list(const std::string& wanted, bool json) {
   titles.emplace_back("effects");
   titles.emplace_back("promises");
   const bool known = std::ranges::any_of(titles, [&](const std::string& t) { return t == wanted; }) ||
-                     wanted == "scene" || wanted == "effect" || wanted == "promise" || (parse_axis(wanted) && wanted != "threads");
+                     wanted == "scene" || wanted == "effect" || wanted == "promise" ||
+                     (parse_axis(wanted) && wanted != "threads");
   if (!wanted.empty() && !known) throw UserError(unknown_name_message("axis", wanted, titles));
 
   Json document = Json::object();
@@ -186,11 +193,9 @@ ExitStatus command_list(const std::string& wanted, bool json) {
   for (const auto& [title, entries] : document.items()) {
     if (wanted.empty()) fmt::print("{}\n", title);
     std::size_t width = 0;
-    for (const Json& entry : entries)
-      width = std::max(width, entry["name"].get_ref<const std::string&>().size());
+    for (const Json& entry : entries) width = std::max(width, entry["name"].get_ref<const std::string&>().size());
     for (const Json& entry : entries) {
-      fmt::print("{}{:<{}}  {}\n", wanted.empty() ? "  " : "", entry["name"].get<std::string>(), width,
-                 remark(entry));
+      fmt::print("{}{:<{}}  {}\n", wanted.empty() ? "  " : "", entry["name"].get<std::string>(), width, remark(entry));
     }
   }
   return ExitStatus::kDone;

@@ -21,7 +21,9 @@ constexpr std::size_t kMostNamed = 10;
 
 void refuse_results_there(const fs::path& out) {
   for (const char* file : {"cells.jsonl", "results.json"})
-    if (fs::exists(out / file)) throw UserError(fmt::format("{}: already holds results ({}); choose another folder, or remove it", out.string(), file));
+    if (fs::exists(out / file))
+      throw UserError(
+          fmt::format("{}: already holds results ({}); choose another folder, or remove it", out.string(), file));
 }
 
 std::vector<ResultFolder> read_parts(const std::vector<fs::path>& paths) {
@@ -29,7 +31,8 @@ std::vector<ResultFolder> read_parts(const std::vector<fs::path>& paths) {
   std::error_code ignored;
   for (std::size_t i = 0; i < paths.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j)
-      if (fs::equivalent(paths[i], paths[j], ignored)) throw UserError(fmt::format("{}: given twice; each part counts once", paths[i].string()));
+      if (fs::equivalent(paths[i], paths[j], ignored))
+        throw UserError(fmt::format("{}: given twice; each part counts once", paths[i].string()));
     parts.push_back(read_result_folder(paths[i]));
   }
   return parts;
@@ -40,7 +43,8 @@ std::string whole_file(const fs::path& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// What stands beside the results: the effective configuration without the shard, repetitions of cells that have not ended, points of pictures.
+/// What stands beside the results: the effective configuration without the shard, repetitions of cells that have not
+/// ended, points of pictures.
 void write_beside(const fs::path& out, const std::vector<ResultFolder>& parts, const Merged& merged) {
   std::string repetitions;
   for (const ResultFolder& part : parts)
@@ -55,7 +59,8 @@ void write_beside(const fs::path& out, const std::vector<ResultFolder>& parts, c
   for (const ResultFolder& part : parts) {
     for (const fs::directory_entry& entry : fs::directory_iterator(part.path)) {
       const std::string name = entry.path().filename().string();
-      if (name.starts_with("camera_edges-") && name.ends_with(".json")) write_whole(out / name, whole_file(entry.path()));
+      if (name.starts_with("camera_edges-") && name.ends_with(".json"))
+        write_whole(out / name, whole_file(entry.path()));
     }
   }
 }
@@ -63,11 +68,15 @@ void write_beside(const fs::path& out, const std::vector<ResultFolder>& parts, c
 void print_missing(const MergeCommand& command, const Merged& merged) {
   if (merged.missing.empty()) return;
   fmt::print("\nmissing:\n");
-  for (std::size_t i = 0; i < std::min(merged.missing.size(), kMostNamed); ++i) fmt::print("  {}\n", merged.missing[i].name);
-  if (merged.missing.size() > kMostNamed) fmt::print("  and {} more: `missing` in results.json\n", merged.missing.size() - kMostNamed);
-  const auto option = [](const char* name, const std::string& value) { return value.empty() ? "" : fmt::format(" {} '{}'", name, value); };
-  fmt::print("to measure them: arboretum run {} --resume --out {}{}{}\n", (command.out / "effective.yaml").string(), command.out.string(),
-             option("--filter", merged.record.filter), option("--skip", merged.record.skip));
+  for (std::size_t i = 0; i < std::min(merged.missing.size(), kMostNamed); ++i)
+    fmt::print("  {}\n", merged.missing[i].name);
+  if (merged.missing.size() > kMostNamed)
+    fmt::print("  and {} more: `missing` in results.json\n", merged.missing.size() - kMostNamed);
+  const auto option = [](const char* name, const std::string& value) {
+    return value.empty() ? "" : fmt::format(" {} '{}'", name, value);
+  };
+  fmt::print("to measure them: arboretum run {} --resume --out {}{}{}\n", (command.out / "effective.yaml").string(),
+             command.out.string(), option("--filter", merged.record.filter), option("--skip", merged.record.skip));
 }
 
 }  // namespace
@@ -77,7 +86,8 @@ ExitStatus command_merge(const MergeCommand& command) {
   const std::vector<ResultFolder> parts = read_parts(command.parts);
   Merged merged = merge_folders(parts, command.options, command.command_line);
   if (const std::string missing = missing_line(merged); !missing.empty()) {
-    if (command.require_all) throw UserError(missing + "; give the folders that hold them too, or leave out --require-all");
+    if (command.require_all)
+      throw UserError(missing + "; give the folders that hold them too, or leave out --require-all");
     merged.outcome.warnings.insert(merged.outcome.warnings.begin(), missing);
   }
   if (!command.no_plots) require_chosen_python();

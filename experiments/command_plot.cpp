@@ -28,18 +28,16 @@ std::vector<std::string> figures_of(const std::filesystem::path& results) {
 
 ExitStatus command_plot(const std::filesystem::path& results, const std::vector<std::string>& figures) {
   if (!std::filesystem::is_directory(results)) {
-    throw UserError(fmt::format("{}: no such folder; give the folder that `run` wrote, as in results/quick",
-                                results.string()));
+    throw UserError(
+        fmt::format("{}: no such folder; give the folder that `run` wrote, as in results/quick", results.string()));
   }
-  if (!std::filesystem::exists(results / "results.json") &&
-      !std::filesystem::exists(results / "cells.jsonl")) {
-    throw UserError(fmt::format(
-        "{}: no results.json and no cells.jsonl in it; give the folder that `run` wrote", results.string()));
+  if (!std::filesystem::exists(results / "results.json") && !std::filesystem::exists(results / "cells.jsonl")) {
+    throw UserError(fmt::format("{}: no results.json and no cells.jsonl in it; give the folder that `run` wrote",
+                                results.string()));
   }
   const std::vector<std::string> known(plot_names().begin(), plot_names().end());
   for (const std::string& figure : figures) {
-    if (std::ranges::find(known, figure) == known.end())
-      throw UserError(unknown_name_message("plot", figure, known));
+    if (std::ranges::find(known, figure) == known.end()) throw UserError(unknown_name_message("plot", figure, known));
   }
   const std::string problem = draw_plots(results, figures.empty() ? figures_of(results) : figures, false);
   if (!problem.empty()) throw UserError(problem);

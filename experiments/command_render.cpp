@@ -57,14 +57,17 @@ std::optional<double> parse_exposure(const std::string& word, Integrator integra
 bool takes_part(EffectKind kind, Integrator integrator) {
   if (integrator == Integrator::path) return true;
   if (integrator == Integrator::whitted) return kind != EffectKind::diffuse_gi;
-  return kind == EffectKind::dof || kind == EffectKind::motion_blur || kind == EffectKind::alpha_cutout || kind == EffectKind::instancing;
+  return kind == EffectKind::dof || kind == EffectKind::motion_blur || kind == EffectKind::alpha_cutout ||
+         kind == EffectKind::instancing;
 }
 
 /// What is said of paths where none are followed would change nothing.
 void set_paths(const RenderCommand& command, RenderSettings& settings) {
   if (!draws_light(settings.integrator) && (command.depth || command.clamp))
-    throw UserError(fmt::format("{} has no effect: {} follows no paths{}; take it out, or choose --integrator path", command.depth ? "--depth" : "--clamp",
-                                to_string(settings.integrator), command.integrator.empty() || command.integrator == "auto" ? ", and nothing in the scene emits light" : ""));
+    throw UserError(fmt::format(
+        "{} has no effect: {} follows no paths{}; take it out, or choose --integrator path",
+        command.depth ? "--depth" : "--clamp", to_string(settings.integrator),
+        command.integrator.empty() || command.integrator == "auto" ? ", and nothing in the scene emits light" : ""));
   settings.depth = command.depth.value_or(settings.depth), settings.clamp = command.clamp.value_or(settings.clamp);
 }
 
@@ -107,7 +110,8 @@ std::string threads_in_words(unsigned threads) {
 void print_rays(const RenderStatistics& statistics) {
   fmt::print("rays                     rays   CPU ms   Mray/s\n");
   const auto line = [](std::string_view name, const RenderStatistics::Rays& r) {
-    fmt::print("  {:<17} {:>9} {:>8.1f} {:>8.2f}\n", name, r.rays, 1e3 * r.seconds, r.seconds > 0.0 ? 1e-6 * double(r.rays) / r.seconds : 0.0);
+    fmt::print("  {:<17} {:>9} {:>8.1f} {:>8.2f}\n", name, r.rays, 1e3 * r.seconds,
+               r.seconds > 0.0 ? 1e-6 * double(r.rays) / r.seconds : 0.0);
   };
   for (std::size_t i = 0; i < kRayKindNames.size(); ++i)
     if (statistics.of[i].rays > 0) line(kRayKindNames[i], statistics.of[i]);
@@ -129,7 +133,8 @@ class Bar {
     const double now = wall_seconds();
     if (!terminal_ || (now - drawn_ < 0.1 && done < 1.0)) return;
     drawn_ = now;
-    fmt::print(stderr, "\r\033[K{:>4.0f} %  {} left", 100.0 * done, format_duration((now - begin_) * (1.0 - done) / std::max(done, 1e-3)));
+    fmt::print(stderr, "\r\033[K{:>4.0f} %  {} left", 100.0 * done,
+               format_duration((now - begin_) * (1.0 - done) / std::max(done, 1e-3)));
     std::fflush(stderr);
   }
 
@@ -139,7 +144,8 @@ class Bar {
 };
 
 /// The work of the camera's rays in place of light.
-void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSettings settings, const std::filesystem::path& out) {
+void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSettings settings,
+                     const std::filesystem::path& out) {
   const HeatCount what = parse_heat_count(command.heat_map);
   if (out.extension() != ".png") throw UserError(fmt::format("{}: heat maps are written as .png", out.string()));
   const std::string unit = command.heat_map + " a ray";
@@ -164,9 +170,10 @@ void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSet
   fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
   fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
   for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
-  if (!no_part.empty()) fmt::print("effects       no part of heat maps, though asked for: {}\n", fmt::join(no_part, ", "));
-  fmt::print("heat map      {} a camera ray: mean {:.2f}, median {}, most {}; the brightest colour is {}\n", command.heat_map, map.mean, map.median,
-             map.most, map.top);
+  if (!no_part.empty())
+    fmt::print("effects       no part of heat maps, though asked for: {}\n", fmt::join(no_part, ", "));
+  fmt::print("heat map      {} a camera ray: mean {:.2f}, median {}, most {}; the brightest colour is {}\n",
+             command.heat_map, map.mean, map.median, map.most, map.top);
   std::fflush(stdout);
   write_png(out, picture.width, picture.height, picture.rgb);
   fmt::print("picture       {} ({} x {} rays)\n", out.string(), map.width, map.height);
@@ -191,14 +198,17 @@ ExitStatus command_render(const RenderCommand& command) {
   }
   if (out.extension() == ".png") check_png_size(settings.width, settings.height);
   const std::optional<double> exposure = parse_exposure(command.exposure, settings.integrator);
-  const EffectSet chosen = parse_effects(command.effects, called_for(effects)), set = simulated(chosen, settings.integrator);
+  const EffectSet chosen = parse_effects(command.effects, called_for(effects)),
+                  set = simulated(chosen, settings.integrator);
   const RenderScene ready(scene, set);
   const BuiltKernel built = build_kernel(command.kernel, ready.mesh(), this_registry());
   fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
-  fmt::print("integrator    {}, {} x {}, {} sample{} a pixel, seed {}, {}\n", to_string(settings.integrator), settings.width, settings.height,
-             settings.samples, settings.samples == 1 ? "" : "s", settings.seed, threads_in_words(settings.threads));
+  fmt::print("integrator    {}, {} x {}, {} sample{} a pixel, seed {}, {}\n", to_string(settings.integrator),
+             settings.width, settings.height, settings.samples, settings.samples == 1 ? "" : "s", settings.seed,
+             threads_in_words(settings.threads));
   if (draws_light(settings.integrator))
-    fmt::print("paths         depth {}, {}\n", settings.depth, std::isinf(settings.clamp) ? "no clamp" : fmt::format("clamp {}", settings.clamp));
+    fmt::print("paths         depth {}, {}\n", settings.depth,
+               std::isinf(settings.clamp) ? "no clamp" : fmt::format("clamp {}", settings.clamp));
   fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
   for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
   for (const std::string& warning : ready.warnings()) fmt::print("warning       {}\n", warning);
@@ -213,10 +223,12 @@ ExitStatus command_render(const RenderCommand& command) {
   const double seconds = wall_seconds() - begin;
   const double stops = exposure.value_or(auto_exposure(picture));
   print_rays(statistics);
-  if (statistics.not_finite > 0) fmt::print("warning       {} samples were no finite number and are left out\n", statistics.not_finite);
+  if (statistics.not_finite > 0)
+    fmt::print("warning       {} samples were no finite number and are left out\n", statistics.not_finite);
   std::fflush(stdout);
   write_picture(out, picture, stops);
-  fmt::print("picture       {} ({}exposure {:+.2f} stops; {:.2f} s)\n", out.string(), exposure ? "" : "automatic ", stops, seconds);
+  fmt::print("picture       {} ({}exposure {:+.2f} stops; {:.2f} s)\n", out.string(), exposure ? "" : "automatic ",
+             stops, seconds);
   return ExitStatus::kDone;
 }
 

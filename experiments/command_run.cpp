@@ -45,15 +45,16 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
   for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.name());
   for (const SkippedCell& cell : plan.skipped) fmt::print("{}  skipped: {}\n", cell.name, cell.reason);
   const std::string others = plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "";
-  fmt::print("\n{} cells, {} skipped,{} {} excluded, {} filtered out; about {}\n", plan.cells.size(), plan.skipped.size(), others,
-             plan.excluded, plan.filtered, format_duration(total_seconds(experiment, plan)));
+  fmt::print("\n{} cells, {} skipped,{} {} excluded, {} filtered out; about {}\n", plan.cells.size(),
+             plan.skipped.size(), others, plan.excluded, plan.filtered,
+             format_duration(total_seconds(experiment, plan)));
   fmt::print("{}", skipped_lines(plan, {}));
   return ExitStatus::kDone;
 }
 
-/// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each that is read or placed is loaded
-/// for this, one at a time. Where it is the only scene it stays; of several each is loaded again when its turn comes: a long sweep does not hold all
-/// of them.
+/// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each
+/// that is read or placed is loaded for this, one at a time. Where it is the only scene it stays; of several each is
+/// loaded again when its turn comes: a long sweep does not hold all of them.
 LoadedScene require_scenes(const Experiment& experiment, const Plan& plan) {
   LoadedScene loaded;
   std::size_t wanted = 0;
@@ -61,7 +62,8 @@ LoadedScene require_scenes(const Experiment& experiment, const Plan& plan) {
     const SceneChoice& scene = experiment.scenes[i];
     if (std::ranges::none_of(plan.cells, [i](const Cell& cell) { return cell.scene_index == i; })) continue;
     ++wanted, loaded.data.reset();
-    if (!scene.spec.generator.empty() && scene.placing.label.empty()) continue;  // what is generated was checked with the configuration
+    // What is generated was checked with the configuration
+    if (!scene.spec.generator.empty() && scene.placing.label.empty()) continue;
     try {
       loaded = {i, std::make_unique<SceneData>(scene, experiment.measure)};
     } catch (const UserError& e) {
@@ -84,20 +86,25 @@ void refuse_other_configuration(const std::filesystem::path& folder, const std::
                   folder.string()));
 }
 
-/// A shard's folder takes no other shard: its results.json would lose what is there. The whole plan may go on from a shard.
+/// A shard's folder takes no other shard: its results.json would lose what is there. The whole plan may go on from a
+/// shard.
 void refuse_other_shard(const std::filesystem::path& folder, const Shard& shard) {
   const std::optional<PlanRecord> before = read_plan_record(folder);
   if (!before || shard.is_whole() || before->shard == shard) return;
-  throw UserError(fmt::format("{}: holds {}, this is shard {}; choose another folder with --out, then `merge` them", folder.string(),
-                              before->shard.is_whole() ? "results of the whole plan" : "shard " + before->shard.text(), shard.text()));
+  throw UserError(fmt::format(
+      "{}: holds {}, this is shard {}; choose another folder with --out, then `merge` them", folder.string(),
+      before->shard.is_whole() ? "results of the whole plan" : "shard " + before->shard.text(), shard.text()));
 }
 
 /// How two runs differ that should be one; empty where their results compare with each other.
 std::vector<std::string> differing_conditions(const Json& before, const Json& now) {
   std::vector<std::string> differences;
-  for (const std::string& difference : machine_differences(before, now)) differences.push_back("begun under other conditions: " + difference);
+  for (const std::string& difference : machine_differences(before, now))
+    differences.push_back("begun under other conditions: " + difference);
   const std::string then = before.value("git_revision", ""), at = now.value("git_revision", "");
-  if (then != at) differences.push_back(fmt::format("begun at revision {}, gone on with at {}", then.substr(0, 12), at.substr(0, 12)));
+  if (then != at)
+    differences.push_back(
+        fmt::format("begun at revision {}, gone on with at {}", then.substr(0, 12), at.substr(0, 12)));
   return differences;
 }
 
@@ -128,7 +135,8 @@ void write_results(const std::filesystem::path& folder, const RunOutcome& outcom
     return format == "csv" ? results_csv(outcome, form) : results_json(outcome, plan, context, form);
   };
   if (!flags.out.empty()) write_whole(flags.out, text(flags.out_format, flags.report_aggregates_only));
-  if (flags.format != "console") fmt::print("{}", text(flags.format, flags.report_aggregates_only || flags.display_aggregates_only));
+  if (flags.format != "console")
+    fmt::print("{}", text(flags.format, flags.report_aggregates_only || flags.display_aggregates_only));
 }
 
 /// What a run concludes with, its figures among it.
@@ -142,7 +150,8 @@ std::vector<std::string> concluding_files() {
 /// Files of `names` that are in the folder. Others there are not ours.
 std::vector<std::string> present(const std::filesystem::path& folder, std::vector<std::string> names) {
   std::error_code ignored;
-  std::erase_if(names, [&](const std::string& name) { return !std::filesystem::is_regular_file(folder / name, ignored); });
+  std::erase_if(names,
+                [&](const std::string& name) { return !std::filesystem::is_regular_file(folder / name, ignored); });
   return names;
 }
 
@@ -163,7 +172,8 @@ std::vector<std::string> files_of_run(const std::filesystem::path& folder) {
   return present(folder, std::move(names));
 }
 
-/// Nothing measured is lost by a run that begins anew: what the last one left goes to a folder beside it, in place of the one before.
+/// Nothing measured is lost by a run that begins anew: what the last one left goes to a folder beside it, in place of
+/// the one before.
 void set_aside(const std::filesystem::path& folder) {
   std::error_code error;
   if (const auto bytes = std::filesystem::file_size(folder / "cells.jsonl", error); error || bytes == 0) return;
@@ -172,7 +182,9 @@ void set_aside(const std::filesystem::path& folder) {
   remove_files(aside, files_of_run(aside));
   for (const std::string& name : files_of_run(folder)) {
     std::filesystem::rename(folder / name, aside / name, error);
-    if (error) throw UserError(fmt::format("{} cannot be moved to {}: {}; choose another folder with --out", (folder / name).string(), aside.string(), error.message()));
+    if (error)
+      throw UserError(fmt::format("{} cannot be moved to {}: {}; choose another folder with --out",
+                                  (folder / name).string(), aside.string(), error.message()));
   }
   fmt::print(stderr, "{}: the results of the run before are in {}\n", folder.string(), aside.string());
 }
@@ -180,16 +192,19 @@ void set_aside(const std::filesystem::path& folder) {
 /// What --benchmark_context says of the run goes into the context, beside what is there already and will be.
 void add_custom_context(Json& context, const BenchmarkFlags& flags) {
   for (const auto& [key, value] : flags.context) {
-    for (const char* later : {"shard", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"})
-      if (key == later) throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
-    if (context.contains(key)) throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
+    for (const char* later :
+         {"shard", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"})
+      if (key == later)
+        throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
+    if (context.contains(key))
+      throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
     context[key] = value;
   }
 }
 
 /// `whole`: the plan before the filter. What the folder of a run that is gone on with holds of it stays in the results.
-ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, PlanRecord record, const Registry& registry,
-                   const RunCommand& command) {
+ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, PlanRecord record,
+                   const Registry& registry, const RunCommand& command) {
   const Shard shard = record.shard;
   const std::filesystem::path folder = command.out.empty() ? default_folder(experiment, shard) : command.out;
   const std::string hash = configuration_hash(experiment);
@@ -200,28 +215,32 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   LoadedScene loaded = require_scenes(experiment, plan);
   make_output_folder(folder);
   if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
-  if (!command.benchmark.out.empty())
-    AppendFile(command.benchmark.out, true);  // cannot be written: say so now
+  if (!command.benchmark.out.empty()) AppendFile(command.benchmark.out, true);  // cannot be written: say so now
   if (!command.resume) set_aside(folder);
   Journal journal(folder, hash, whole, command.resume);
   const double seconds = total_seconds(experiment, plan);
   keep_measured(plan, record, whole, journal.done());
   remove_files(folder, present(folder, concluding_files()));
   write_whole(folder / "effective.yaml",
-              fmt::format("# configuration hash: {}\n{}{}", hash, shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
+              fmt::format("# configuration hash: {}\n{}{}", hash,
+                          shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
   if (!shard.is_whole()) context["shard"] = shard.text();
   record.context = context;
   if (command.resume) record.earlier = other_contexts(folder, context);
   std::vector<std::string> changed;
-  for (const Json& earlier : record.earlier) std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
+  for (const Json& earlier : record.earlier)
+    std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
   write_whole(folder / kPlanFile, to_text(record));
-  fmt::print(stderr, "{}: {} cells ({} done before), {} skipped{}; about {}\n", experiment.name, plan.cells.size(), journal.done().size(),
-             plan.skipped.size(), shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
+  fmt::print(stderr, "{}: {} cells ({} done before), {} skipped{}; about {}\n", experiment.name, plan.cells.size(),
+             journal.done().size(), plan.skipped.size(),
+             shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
              format_duration(seconds));
 
-  RunOutcome outcome = run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast}, std::move(loaded));
+  RunOutcome outcome =
+      run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast}, std::move(loaded));
   outcome.warnings = changed;
-  std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())), std::back_inserter(outcome.warnings));
+  std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
+                    std::back_inserter(outcome.warnings));
   try {
     write_results(folder, outcome, plan, context, command.benchmark);
   } catch (const UserError&) {
@@ -236,13 +255,19 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   return conclude(folder, outcome, plan, !command.no_plots);
 }
 
-/// --filter, --skip and --benchmark_filter, as one expression of each kind: a plan's record, and the command that `merge` prints, have one.
+/// --filter, --skip and --benchmark_filter, as one expression of each kind: a plan's record, and the command that
+/// `merge` prints, have one.
 std::pair<std::string, std::string> filters_of(const RunCommand& command) {
   const BenchmarkFlags& google = command.benchmark;
-  static_cast<void>(NameFilter(command.filter, command.skip)), static_cast<void>(NameFilter(google.filter, google.skip));
-  const auto both = [](const std::string& a, const std::string& b, auto join) { return a.empty() ? b : b.empty() ? a : join(a, b); };
-  return {both(command.filter, google.filter, [](const auto& a, const auto& b) { return fmt::format("^(?=.*(?:{}))(?=.*(?:{}))", a, b); }),
-          both(command.skip, google.skip, [](const auto& a, const auto& b) { return fmt::format("(?:{})|(?:{})", a, b); })};
+  static_cast<void>(NameFilter(command.filter, command.skip)),
+      static_cast<void>(NameFilter(google.filter, google.skip));
+  const auto both = [](const std::string& a, const std::string& b, auto join) {
+    return a.empty() ? b : b.empty() ? a : join(a, b);
+  };
+  return {
+      both(command.filter, google.filter,
+           [](const auto& a, const auto& b) { return fmt::format("^(?=.*(?:{}))(?=.*(?:{}))", a, b); }),
+      both(command.skip, google.skip, [](const auto& a, const auto& b) { return fmt::format("(?:{})|(?:{})", a, b); })};
 }
 
 }  // namespace
@@ -269,8 +294,10 @@ ExitStatus command_run(RunCommand command) {
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
     std::fflush(stdout);
-    fmt::print(stderr, "arboretum: nothing to measure: {} combinations skipped,{} {} excluded, {} filtered out\n", plan.skipped.size(),
-               plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded, plan.filtered);
+    fmt::print(stderr, "arboretum: nothing to measure: {} combinations skipped,{} {} excluded, {} filtered out\n",
+               plan.skipped.size(),
+               plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded,
+               plan.filtered);
     return ExitStatus::kNothingMeasured;
   }
   return measure(experiment, std::move(plan), whole, std::move(record), registry, command);

@@ -26,31 +26,34 @@
 namespace arboretum {
 namespace {
 
-constexpr std::size_t kBatch = std::size_t{1} << 17;     // rays made, answered and traced at a time
+constexpr std::size_t kBatch = std::size_t{1} << 17;  // rays made, answered and traced at a time
 constexpr std::size_t kSpreadBatch = std::size_t{1} << 14, kLeastSpreadBatch = 256;
-constexpr std::size_t kSubjectRays = 64;                 // of one random mesh
-constexpr std::size_t kBruteForceTriangles = 2000;       // left out above it, unless it is asked for
-constexpr std::size_t kMostCases = 20;                   // breaches that are told
+constexpr std::size_t kSubjectRays = 64;            // of one random mesh
+constexpr std::size_t kBruteForceTriangles = 2000;  // left out above it, unless it is asked for
+constexpr std::size_t kMostCases = 20;              // breaches that are told
 
 enum class Subject { scene, cases, random };
 
 class Verify {
  public:
   Verify(const VerifyCommand& command, const Registry& registry)
-      : command_(command), registry_(registry), threads_(command.threads.value_or(std::max(1u, std::thread::hardware_concurrency()))) {
+      : command_(command), registry_(registry),
+        threads_(command.threads.value_or(std::max(1u, std::thread::hardware_concurrency()))) {
     if (command.subject == "random")
       subject_ = Subject::random;
     else if (std::filesystem::path(command.subject).extension() == ".json")
       subject_ = Subject::cases;
     if (subject_ != Subject::scene && (!command.offsets.empty() || !command.scales.empty()))
-      throw UserError("verify: --offset and --scale move and scale a scene; leave them out for cases files and random meshes");
+      throw UserError(
+          "verify: --offset and --scale move and scale a scene; leave them out for cases files and random meshes");
     if (subject_ != Subject::scene && (!command.kinds.empty() || command.spread))
       throw UserError("verify: --kinds and --spread are for scenes; leave them out for cases files and random meshes");
     if (command.rays && *command.rays == 0) throw UserError("verify: --rays must be 1 or more");
     for (double offset : command.offsets)
       if (!(std::fabs(offset) <= 1e30)) throw UserError(fmt::format("verify: --offset {} is not within 1e30", offset));
     for (int exponent : command.scales)
-      if (std::abs(exponent) > 120) throw UserError(fmt::format("verify: --scale {} is an exponent of two, -120 to 120", exponent));
+      if (std::abs(exponent) > 120)
+        throw UserError(fmt::format("verify: --scale {} is an exponent of two, -120 to 120", exponent));
     for (const std::string& kind : command.kinds) (void)kind_of(kind);
   }
 
@@ -68,21 +71,25 @@ class Verify {
   static HardKind kind_of(const std::string& name) {
     std::vector<std::string> known(kHardKindNames.begin(), kHardKindNames.begin() + kMadeKinds);
     const auto found = std::ranges::find(known, name);
-    if (found == known.end()) throw UserError(fmt::format("verify: --kinds: {}", unknown_name_message("kind of ray", name, known)));
+    if (found == known.end())
+      throw UserError(fmt::format("verify: --kinds: {}", unknown_name_message("kind of ray", name, known)));
     return static_cast<HardKind>(found - known.begin());
   }
 
   // Cells.
 
   void make_cells(const SceneChoice& scene, std::size_t triangles, bool instances = false) {
-    plan_ = make_verify_plan(command_, scene, subject_ == Subject::scene && triangles > kBruteForceTriangles, registry_);
-    for (const Cell& cell : plan_.cells) cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box, instances), {}, {}});
+    plan_ =
+        make_verify_plan(command_, scene, subject_ == Subject::scene && triangles > kBruteForceTriangles, registry_);
+    for (const Cell& cell : plan_.cells)
+      cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box, instances), {}, {}});
   }
 
   ExitStatus nothing() const {
     fmt::print("{}", skipped_lines(plan_, {}));
     std::fflush(stdout);
-    fmt::print(stderr, "arboretum: nothing to verify: {} combinations skipped, {} filtered out\n", plan_.skipped.size(), plan_.filtered);
+    fmt::print(stderr, "arboretum: nothing to verify: {} combinations skipped, {} filtered out\n", plan_.skipped.size(),
+               plan_.filtered);
     return ExitStatus::kNothingMeasured;
   }
 
@@ -96,7 +103,8 @@ class Verify {
     if (cells_.empty()) return;
     variants_.clear();
     for (double offset : command_.offsets.empty() ? std::vector<double>{0.0} : command_.offsets)
-      for (int exponent : command_.scales.empty() ? std::vector<int>{0} : command_.scales) variants_.push_back({offset, exponent});
+      for (int exponent : command_.scales.empty() ? std::vector<int>{0} : command_.scales)
+        variants_.push_back({offset, exponent});
     const std::uint64_t rays = command_.rays.value_or(100'000), each = (rays + variants_.size() - 1) / variants_.size();
     expect_instances_stay(choice.name, mesh);
     title_ = fmt::format("{}: {} triangles", choice.name, mesh.size());
@@ -107,35 +115,46 @@ class Verify {
       const TriangleMesh placed = moved_and_scaled(mesh, variant.offset, variant.exponent);
       const Bounds3f box = placed.bounds();
       if (!is_finite(box.lower) || !is_finite(box.upper))
-        throw UserError(fmt::format("verify: {}: coordinates beyond float32; choose a smaller --offset or --scale", name));
+        throw UserError(
+            fmt::format("verify: {}: coordinates beyond float32; choose a smaller --offset or --scale", name));
       const double begin = wall_seconds();
       trace(placed, v, each, progress, name);
-      progress.cell_done(name, fmt::format("{} rays on {} cells in {}", each, cells_.size(), format_duration(wall_seconds() - begin)));
+      progress.cell_done(
+          name, fmt::format("{} rays on {} cells in {}", each, cells_.size(), format_duration(wall_seconds() - begin)));
     }
   }
 
-  /// moved_and_scaled() leaves instances out, and two_level would then be verified on one: an answer about something else.
+  /// moved_and_scaled() leaves instances out, and two_level would then be verified on one: an answer about something
+  /// else.
   void expect_instances_stay(const std::string& name, const TriangleMesh& mesh) const {
-    const bool moves = std::ranges::any_of(variants_, [](const VerifyVariant& v) { return v.offset != 0.0 || v.exponent != 0; });
-    const bool reads = std::ranges::any_of(cells_, [this](const VerifiedCell& v) { return registry_.structure(v.cell.structure)->info.takes_below; });
+    const bool moves =
+        std::ranges::any_of(variants_, [](const VerifyVariant& v) { return v.offset != 0.0 || v.exponent != 0; });
+    const bool reads = std::ranges::any_of(
+        cells_, [this](const VerifiedCell& v) { return registry_.structure(v.cell.structure)->info.takes_below; });
     if (mesh.instancing && moves && reads)
-      throw UserError(fmt::format("verify: {}: --offset and --scale move its triangles and not its {} instances, which two_level is built over; "
-                                  "leave those out, or two_level by --skip two_level", name, mesh.instancing->instances.size()));
+      throw UserError(
+          fmt::format("verify: {}: --offset and --scale move its triangles and not its {} instances, which two_level "
+                      "is built over; "
+                      "leave those out, or two_level by --skip two_level",
+                      name, mesh.instancing->instances.size()));
   }
 
-  void trace(const TriangleMesh& mesh, std::size_t variant, std::uint64_t rays, Progress& progress, const std::string& name) {
+  void trace(const TriangleMesh& mesh, std::size_t variant, std::uint64_t rays, Progress& progress,
+             const std::string& name) {
     const Oracle oracle(mesh);
     const HardRayMaker maker(mesh);
     std::vector<HardKind> kinds;
     for (std::size_t k = 0; k < kMadeKinds; ++k) {
-      const bool wanted = command_.kinds.empty() || std::ranges::find(command_.kinds, kHardKindNames[k]) != command_.kinds.end();
+      const bool wanted =
+          command_.kinds.empty() || std::ranges::find(command_.kinds, kHardKindNames[k]) != command_.kinds.end();
       if (!wanted) continue;
       if (maker.has(static_cast<HardKind>(k)))
         kinds.push_back(static_cast<HardKind>(k));
       else if (!command_.kinds.empty())
         progress.note(fmt::format("{}: has no {} to aim at", name, kHardKindNames[k]));
     }
-    if (kinds.empty()) throw UserError(fmt::format("verify: {}: has nothing that rays of these --kinds are aimed at", name));
+    if (kinds.empty())
+      throw UserError(fmt::format("verify: {}: has nothing that rays of these --kinds are aimed at", name));
     StructureShelf shelf(mesh, registry_, threads_);
     const std::size_t batch_size = command_.spread ? spread_batch(rays) : kBatch;
     for (std::uint64_t begin = 0; begin < rays; begin += batch_size) {
@@ -188,7 +207,8 @@ class Verify {
     if (given) {
       for (const VerifyCase& c : *given)
         if (c.mesh.size() > 0) bases.push_back(&c);
-      if (bases.empty()) return Progress(1, 1).note("no case has a triangle of finite corners to mutate: each goes alone");
+      if (bases.empty())
+        return Progress(1, 1).note("no case has a triangle of finite corners to mutate: each goes alone");
     } else {
       make_cells({.spec = {}, .name = "random"}, 0);
       if (cells_.empty()) return;
@@ -199,9 +219,10 @@ class Verify {
     for (std::uint64_t i = 0; i < subjects; ++i) {
       const std::size_t count = std::min<std::uint64_t>(kSubjectRays, rays - i * kSubjectRays);
       const VerifyCase* base = given ? bases[i % bases.size()] : nullptr;
-      const RandomSubject subject =
-          base ? mutated_subject(base->mesh, base->ray, command_.seed, i, count) : random_subject(command_.seed, i, count);
-      small_subject(subject.mesh, subject.rays, total_rays_, fmt::format("{}-seed{}-{}", base ? base->id : "random", command_.seed, i));
+      const RandomSubject subject = base ? mutated_subject(base->mesh, base->ray, command_.seed, i, count)
+                                         : random_subject(command_.seed, i, count);
+      small_subject(subject.mesh, subject.rays, total_rays_,
+                    fmt::format("{}-seed{}-{}", base ? base->id : "random", command_.seed, i));
       total_rays_ += count;
       progress.step("random meshes", 1);
     }
@@ -231,7 +252,8 @@ class Verify {
       if (cases_.size() >= kMostCases || !case_rays_.insert(sum.first.ray).second) continue;
       if (const auto part = reduce(cells_[i], registry_, mesh, sum.first)) {
         cases_.push_back(case_json(fmt::format("{}-ray{}", name, sum.first.ray),
-                                   fmt::format("{}: {}", cell_label(cells_[i].cell), sum.first.what), *part, sum.first.given));
+                                   fmt::format("{}: {}", cell_label(cells_[i].cell), sum.first.what), *part,
+                                   sum.first.given));
       }
     }
   }
@@ -263,12 +285,14 @@ class Verify {
       fmt::print("\n{}\n", (command_.out / "verify.csv").string());
     }
     if (untested > 0)
-      fmt::print("{} of {} cells had no ray and are not judged: --rays {} and more reaches all of them\n", untested, cells_.size(), kLeastSpreadBatch * cells_.size());
+      fmt::print("{} of {} cells had no ray and are not judged: --rays {} and more reaches all of them\n", untested,
+                 cells_.size(), kLeastSpreadBatch * cells_.size());
     if (broken > 0) {
       fmt::print("{} of {} cells that promise something break it\n", broken, promising);
       return ExitStatus::kWrongAnswers;
     }
-    fmt::print("all {} cells that promise something keep it; {} promise nothing\n", promising, cells_.size() - untested - promising);
+    fmt::print("all {} cells that promise something keep it; {} promise nothing\n", promising,
+               cells_.size() - untested - promising);
     return ExitStatus::kDone;
   }
 

@@ -29,8 +29,8 @@ struct RunCommand {
 };
 
 struct VerifyCommand {
-  std::string subject;             ///< a scene word, a cases file (.json), or `random`
-  std::vector<std::string> axes;   ///< `isa=avx2,avx512`, as typed
+  std::string subject;                ///< a scene word, a cases file (.json), or `random`
+  std::vector<std::string> axes;      ///< `isa=avx2,avx512`, as typed
   std::optional<std::uint64_t> rays;  ///< in all; empty: 100 000, or each case of a file once
   std::uint64_t seed = 1;
   std::vector<double> offsets;
@@ -38,7 +38,7 @@ struct VerifyCommand {
   std::vector<std::string> kinds;  ///< of rays; empty: all that the scene has
   std::filesystem::path out;       ///< empty: nothing is written
   std::optional<unsigned> threads;
-  bool spread = false;             ///< each batch of rays goes to one cell instead of all
+  bool spread = false;  ///< each batch of rays goes to one cell instead of all
   std::string filter, skip;
 };
 
@@ -55,20 +55,20 @@ struct CompareCommand {
   CompareOptions options;
   std::string filter, skip;
   bool allow_different_machines = false, all = false;
-  std::string json, csv;  ///< files; "-": stdout; empty: none
+  std::string json, csv;       ///< files; "-": stdout; empty: none
   std::filesystem::path plot;  ///< empty: none
 };
 
 struct RenderCommand {
   std::string scene;
-  std::filesystem::path out;     ///< empty: image.png
+  std::filesystem::path out;  ///< empty: image.png
   std::string effects = "auto", integrator = "auto";
-  std::string exposure;          ///< auto or stops; empty: auto, or 0 where what is drawn is no light
-  std::string heat_map;          ///< empty, nodes or triangles
-  std::string resolution;        ///< WIDTHxHEIGHT; empty: the camera's
-  std::optional<unsigned> depth; ///< of paths, as `clamp`
+  std::string exposure;           ///< auto or stops; empty: auto, or 0 where what is drawn is no light
+  std::string heat_map;           ///< empty, nodes or triangles
+  std::string resolution;         ///< WIDTHxHEIGHT; empty: the camera's
+  std::optional<unsigned> depth;  ///< of paths, as `clamp`
   std::optional<float> clamp;
-  RenderSettings settings;       ///< but what is said above
+  RenderSettings settings;  ///< but what is said above
   KernelChoice kernel;
 };
 

@@ -21,16 +21,17 @@ namespace {
 constexpr const char* kEmbree = "machine";  // the group that is no axis of the table
 
 /// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
-std::vector<double> rates(const CellResult& r) {
-  return r.rates(r.cell.threads == 1);
-}
+std::vector<double> rates(const CellResult& r) { return r.rates(r.cell.threads == 1); }
 
 class Comparer {
  public:
-  Comparer(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options) { out_.options = options, match(a, b); }
+  Comparer(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options) {
+    out_.options = options, match(a, b);
+  }
 
   Comparison run() {
-    for (const ComparedCell& cell : out_.cells) centres_.push_back(std::log(median(rates(cell.b)) / median(rates(cell.a))));
+    for (const ComparedCell& cell : out_.cells)
+      centres_.push_back(std::log(median(rates(cell.b)) / median(rates(cell.a))));
     if (!out_.options.control.empty()) take_relative();
     choose_tests();
     const std::vector<Group> groups = make_groups();
@@ -75,11 +76,13 @@ class Comparer {
   /// Why the two do not compare although their names are equal; empty where they do.
   static std::string other_work(const CellResult& a, const CellResult& b) {
     for (const char* fact : {"triangles", "rays"}) {
-      if (a.fact(fact) != b.fact(fact)) return fmt::format("{:.0f} {} in A, {:.0f} in B", a.fact(fact), fact, b.fact(fact));
+      if (a.fact(fact) != b.fact(fact))
+        return fmt::format("{:.0f} {} in A, {:.0f} in B", a.fact(fact), fact, b.fact(fact));
     }
     for (const CellResult* r : {&a, &b}) {
       const std::vector<double> of = rates(*r);
-      if (of.empty() || std::ranges::min(of) <= 0.0) return fmt::format("no time was measured in {}", r == &a ? "A" : "B");
+      if (of.empty() || std::ranges::min(of) <= 0.0)
+        return fmt::format("no time was measured in {}", r == &a ? "A" : "B");
     }
     return {};
   }
@@ -120,10 +123,14 @@ class Comparer {
   /// Of the sums of its cells' replicates.
   MeanRatio mean_of(const Group& group, Replicates sums) const {
     for (double& v : sums) v /= static_cast<double>(group.cells.size());
-    MeanRatio mean{group.axis, group.value, ratio_interval(mean_centre(group.cells), std::move(sums)), group.cells.size()};
+    MeanRatio mean{group.axis, group.value, ratio_interval(mean_centre(group.cells), std::move(sums)),
+                   group.cells.size()};
     for (std::size_t i : group.cells) {
       const Verdict v = out_.cells[i].verdict;
-      ++(v == Verdict::faster ? mean.faster : v == Verdict::slower ? mean.slower : v == Verdict::undecided ? mean.undecided : mean.indistinguishable);
+      ++(v == Verdict::faster      ? mean.faster
+         : v == Verdict::slower    ? mean.slower
+         : v == Verdict::undecided ? mean.undecided
+                                   : mean.indistinguishable);
     }
     return mean;
   }
@@ -142,11 +149,15 @@ class Comparer {
     try {
       expression.assign(out_.options.control);
     } catch (const std::regex_error&) {
-      throw UserError(fmt::format("--control '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes", out_.options.control));
+      throw UserError(
+          fmt::format("--control '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes",
+                      out_.options.control));
     }
     bool any = false;
     for (bool trace : {true, false}) {
-      const auto is_control = [&](const ComparedCell& c) { return c.is_trace() == trace && std::regex_search(c.a.cell.name(), expression); };
+      const auto is_control = [&](const ComparedCell& c) {
+        return c.is_trace() == trace && std::regex_search(c.a.cell.name(), expression);
+      };
       const std::vector<std::size_t> cells = places(is_control);
       if (cells.empty()) continue;
       any = true;
@@ -158,7 +169,11 @@ class Comparer {
       for (double& v : sum) v /= static_cast<double>(cells.size());
       control_[trace] = std::move(sum);
     }
-    if (!any) throw UserError(fmt::format("--control '{}' finds no cell that is in both; it is a regular expression on cell names, as in --control /embree/", out_.options.control));
+    if (!any)
+      throw UserError(
+          fmt::format("--control '{}' finds no cell that is in both; it is a regular expression on cell names, as in "
+                      "--control /embree/",
+                      out_.options.control));
   }
 
   void estimate(std::size_t i, Replicates logs) {
@@ -175,10 +190,12 @@ class Comparer {
 
   /// The same for all cells of as many repetitions, whatever was measured.
   void choose_tests() {
-    const std::vector<std::size_t> tested = places([](const ComparedCell& c) { return std::min(c.a.repetitions.size(), c.b.repetitions.size()) > 1; });
+    const std::vector<std::size_t> tested =
+        places([](const ComparedCell& c) { return std::min(c.a.repetitions.size(), c.b.repetitions.size()) > 1; });
     for (std::size_t i : tested) {
       ComparedCell& cell = out_.cells[i];
-      const double least = smallest_p(cell.a.repetitions.size(), cell.b.repetitions.size()) * static_cast<double>(tested.size());
+      const double least =
+          smallest_p(cell.a.repetitions.size(), cell.b.repetitions.size()) * static_cast<double>(tested.size());
       cell.test = least <= out_.options.significance ? SignificanceTest::mann_whitney : SignificanceTest::welch;
     }
   }
@@ -212,7 +229,8 @@ class Comparer {
     add_group("", "rays", traced);
     std::vector<Json> axes(traced.size(), Json::object());
     for (std::size_t k = 0; k < traced.size(); ++k) add_axes(axes[k], out_.cells[traced[k]].a.cell);
-    for (const char* axis : {"scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads"}) {
+    for (const char* axis :
+         {"scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads"}) {
       std::vector<std::pair<std::string, std::vector<std::size_t>>> by_value;
       for (std::size_t k = 0; k < traced.size(); ++k) {
         std::string text = plain_text(axes[k][axis]);
@@ -224,7 +242,9 @@ class Comparer {
       for (auto& [value, cells] : by_value) add_group(axis, std::move(value), std::move(cells));
     }
     add_group("", "builds", places([](const ComparedCell& c) { return !c.is_trace(); }));
-    if (out_.options.control.empty()) add_group(kEmbree, "embree", places([](const ComparedCell& c) { return c.is_trace() && c.a.cell.structure == "embree"; }));
+    if (out_.options.control.empty())
+      add_group(kEmbree, "embree",
+                places([](const ComparedCell& c) { return c.is_trace() && c.a.cell.structure == "embree"; }));
     return groups;
   }
 
@@ -232,13 +252,20 @@ class Comparer {
   void add_structures() {
     std::set<std::string> seen;
     for (const ComparedCell& c : out_.cells) {
-      const auto fact = [](const CellResult& r, const char* name) { return r.has_fact(name) ? std::optional(r.fact(name)) : std::nullopt; };
-      StructureChange change{fmt::format("{}/{}/{}/{}", c.a.cell.scene, c.a.cell.structure, c.a.cell.builder_name(), c.a.cell.leaf),
-                             fact(c.a, "sah_cost"), fact(c.b, "sah_cost"), fact(c.a, "bytes"), fact(c.b, "bytes")};
-      const auto changed = [](const std::optional<double>& a, const std::optional<double>& b) { return a && b && std::abs(*a - *b) > 1e-9 * std::abs(*a); };
+      const auto fact = [](const CellResult& r, const char* name) {
+        return r.has_fact(name) ? std::optional(r.fact(name)) : std::nullopt;
+      };
+      StructureChange change{
+          fmt::format("{}/{}/{}/{}", c.a.cell.scene, c.a.cell.structure, c.a.cell.builder_name(), c.a.cell.leaf),
+          fact(c.a, "sah_cost"), fact(c.b, "sah_cost"), fact(c.a, "bytes"), fact(c.b, "bytes")};
+      const auto changed = [](const std::optional<double>& a, const std::optional<double>& b) {
+        return a && b && std::abs(*a - *b) > 1e-9 * std::abs(*a);
+      };
       if (!changed(change.sah_a, change.sah_b) && !changed(change.bytes_a, change.bytes_b)) continue;
       const auto figure = [](const std::optional<double>& v) { return v.value_or(0.0); };
-      if (seen.insert(fmt::format("{} {} {} {} {}", change.structure, figure(change.sah_a), figure(change.sah_b), figure(change.bytes_a), figure(change.bytes_b))).second)
+      if (seen.insert(fmt::format("{} {} {} {} {}", change.structure, figure(change.sah_a), figure(change.sah_b),
+                                  figure(change.bytes_a), figure(change.bytes_b)))
+              .second)
         out_.structures.push_back(std::move(change));
     }
   }
@@ -270,14 +297,16 @@ std::size_t Comparison::count(Verdict verdict) const {
 }
 
 std::size_t Comparison::more_wrong() const {
-  return static_cast<std::size_t>(std::ranges::count_if(cells, [](const ComparedCell& c) { return c.more_wrong_answers().value_or(0.0) > 0.0; }));
+  return static_cast<std::size_t>(
+      std::ranges::count_if(cells, [](const ComparedCell& c) { return c.more_wrong_answers().value_or(0.0) > 0.0; }));
 }
 
 std::size_t Comparison::suspects() const {
   return static_cast<std::size_t>(std::ranges::count_if(cells, &ComparedCell::is_suspect));
 }
 
-Comparison compare_results(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options) {
+Comparison compare_results(const std::vector<CellResult>& a, const std::vector<CellResult>& b,
+                           const CompareOptions& options) {
   return Comparer(a, b, options).run();
 }
 

@@ -1,9 +1,10 @@
 // Two runs cell by cell: how much faster B is than A, how sure that is, and what else changed.
 //
-// A cell is faster or slower where the whole bootstrap interval of the ratio of medians lies beyond the smallest difference that counts,
-// and a test adjusted for the number of cells finds it significant: the Mann-Whitney test, or, where there are so few repetitions that its
-// smallest p-value would not stand out among so many cells, Welch's of the logarithms of the times. Which of the two is a matter of numbers, not of
-// times, so p-values stay p-values. A cell of one repetition is undecided, never indistinguishable.
+// A cell is faster or slower where the whole bootstrap interval of the ratio of medians lies beyond the smallest
+// difference that counts, and a test adjusted for the number of cells finds it significant: the Mann-Whitney test, or,
+// where there are so few repetitions that its smallest p-value would not stand out among so many cells, Welch's of the
+// logarithms of the times. Which of the two is a matter of numbers, not of times, so p-values stay p-values. A cell of
+// one repetition is undecided, never indistinguishable.
 #pragma once
 
 #include <optional>
@@ -20,8 +21,9 @@ namespace arboretum {
 struct CompareOptions {
   double min_difference = 3.0;  ///< per cent
   double significance = 0.05;   ///< of the adjusted p-values
-  std::string control = {};     ///< regular expression: cells whose geometric mean all speeds are taken relative to; empty: none
-  bool strict = false;          ///< an undecided cell whose whole interval is beyond the limit on the slow side is a regression
+  /// regular expression: cells whose geometric mean all speeds are taken relative to; empty: none
+  std::string control = {};
+  bool strict = false;  ///< an undecided cell whose whole interval is beyond the limit on the slow side is a regression
 };
 
 enum class Verdict { faster, slower, indistinguishable, undecided };
@@ -29,8 +31,9 @@ enum class Verdict { faster, slower, indistinguishable, undecided };
 
 struct ComparedCell {
   CellResult a, b;
-  Interval rate_a, rate_b;  ///< rays (trace) or triangles (build) a second: thread CPU time with one thread, else wall time
-  Interval ratio;           ///< rate of B over rate of A, with the 95 % bootstrap interval of the ratio of the medians
+  /// rays (trace) or triangles (build) a second: thread CPU time with one thread, else wall time
+  Interval rate_a, rate_b;
+  Interval ratio;  ///< rate of B over rate of A, with the 95 % bootstrap interval of the ratio of the medians
   SignificanceTest test = SignificanceTest::none;
   double p = 1.0, adjusted_p = 1.0;
   Verdict verdict = Verdict::undecided;
@@ -39,7 +42,9 @@ struct ComparedCell {
 
   [[nodiscard]] bool is_trace() const noexcept { return a.is_trace(); }
   [[nodiscard]] bool is_tested() const noexcept { return test != SignificanceTest::none; }
-  [[nodiscard]] bool is_suspect() const noexcept { return verdict == Verdict::undecided && beyond && ratio.median < 1.0; }
+  [[nodiscard]] bool is_suspect() const noexcept {
+    return verdict == Verdict::undecided && beyond && ratio.median < 1.0;
+  }
   /// Wrong answers that B has more than A; std::nullopt where one of them was not checked.
   [[nodiscard]] std::optional<double> more_wrong_answers() const;
 };
@@ -59,8 +64,8 @@ struct StructureChange {
 
 struct Comparison {
   CompareOptions options;
-  std::vector<ComparedCell> cells;          ///< in A's order
-  std::vector<std::string> only_a, only_b;  ///< names
+  std::vector<ComparedCell> cells;                                ///< in A's order
+  std::vector<std::string> only_a, only_b;                        ///< names
   std::vector<std::pair<std::string, std::string>> incomparable;  ///< in both, but not the same work: name and reason
   std::vector<MeanRatio> means;
   std::vector<StructureChange> structures;
@@ -71,10 +76,13 @@ struct Comparison {
   [[nodiscard]] std::size_t more_wrong() const;
   /// Undecided cells that look slower: their whole interval is beyond the smallest difference.
   [[nodiscard]] std::size_t suspects() const;
-  [[nodiscard]] bool is_regression() const { return count(Verdict::slower) > 0 || more_wrong() > 0 || (options.strict && suspects() > 0); }
+  [[nodiscard]] bool is_regression() const {
+    return count(Verdict::slower) > 0 || more_wrong() > 0 || (options.strict && suspects() > 0);
+  }
 };
 
 /// Throws UserError for a control that finds no cell of both.
-[[nodiscard]] Comparison compare_results(const std::vector<CellResult>& a, const std::vector<CellResult>& b, const CompareOptions& options);
+[[nodiscard]] Comparison compare_results(const std::vector<CellResult>& a, const std::vector<CellResult>& b,
+                                         const CompareOptions& options);
 
 }  // namespace arboretum

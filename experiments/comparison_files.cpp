@@ -8,9 +8,7 @@
 namespace arboretum {
 namespace {
 
-Json interval_json(const Interval& i) {
-  return {{"median", i.median}, {"low", i.low}, {"high", i.high}};
-}
+Json interval_json(const Interval& i) { return {{"median", i.median}, {"low", i.low}, {"high", i.high}}; }
 
 /// One cell, flat: the columns of the CSV.
 Json cell_json(const ComparedCell& c) {
@@ -21,7 +19,8 @@ Json cell_json(const ComparedCell& c) {
                               : (c.a.cell.threads == 1 ? "triangles_per_cpu_second" : "triangles_per_second");
   json["rate_a"] = c.rate_a.median, json["rate_b"] = c.rate_b.median;
   json["ratio"] = c.ratio.median, json["ratio_low"] = c.ratio.low, json["ratio_high"] = c.ratio.high;
-  json["test"] = to_string(c.test), json["p"] = c.is_tested() ? Json(c.p) : Json(), json["adjusted_p"] = c.is_tested() ? Json(c.adjusted_p) : Json();
+  json["test"] = to_string(c.test), json["p"] = c.is_tested() ? Json(c.p) : Json(),
+  json["adjusted_p"] = c.is_tested() ? Json(c.adjusted_p) : Json();
   json["verdict"] = to_string(c.verdict), json["equal"] = c.equal, json["beyond"] = c.beyond;
   json["repetitions_a"] = c.a.repetitions.size(), json["repetitions_b"] = c.b.repetitions.size();
   for (const char* fact : {"rays", "wrong_answers", "sah_cost", "bytes"}) {
@@ -32,12 +31,21 @@ Json cell_json(const ComparedCell& c) {
 }
 
 Json mean_json(const MeanRatio& m) {
-  return {{"axis", m.axis.empty() ? "all" : m.axis}, {"value", m.value}, {"ratio", interval_json(m.ratio)}, {"cells", m.cells}, {"faster", m.faster},
-          {"slower", m.slower}, {"indistinguishable", m.indistinguishable}, {"undecided", m.undecided}};
+  return {{"axis", m.axis.empty() ? "all" : m.axis},
+          {"value", m.value},
+          {"ratio", interval_json(m.ratio)},
+          {"cells", m.cells},
+          {"faster", m.faster},
+          {"slower", m.slower},
+          {"indistinguishable", m.indistinguishable},
+          {"undecided", m.undecided}};
 }
 
 Json folder_json(const ResultFolder& folder) {
-  return {{"folder", folder.path.string()}, {"complete", folder.complete}, {"cells", folder.cells.size()}, {"context", folder.context}};
+  return {{"folder", folder.path.string()},
+          {"complete", folder.complete},
+          {"cells", folder.cells.size()},
+          {"context", folder.context}};
 }
 
 }  // namespace
@@ -47,7 +55,10 @@ std::string comparison_json(const Comparison& comparison, const ResultFolder& a,
   const auto [status, why] = verdict(comparison);
   Json json = Json::object();
   json["verdict"] = why, json["exit_status"] = static_cast<int>(status);
-  json["options"] = {{"min_difference_percent", o.min_difference}, {"significance", o.significance}, {"control", o.control}, {"strict", o.strict}};
+  json["options"] = {{"min_difference_percent", o.min_difference},
+                     {"significance", o.significance},
+                     {"control", o.control},
+                     {"strict", o.strict}};
   json["a"] = folder_json(a), json["b"] = folder_json(b);
   Json& differences = json["differences"] = Json::array();
   for (const std::string& line : machine_differences(a.context, b.context)) differences.push_back(line);
@@ -55,9 +66,11 @@ std::string comparison_json(const Comparison& comparison, const ResultFolder& a,
   for (const ComparedCell& c : comparison.cells) cells.push_back(cell_json(c));
   Json& means = json["geometric_means"] = Json::array();
   for (const MeanRatio& m : comparison.means) means.push_back(mean_json(m));
-  if (comparison.control) json["control"] = {{"cells", comparison.control->cells}, {"ratio", interval_json(comparison.control->ratio)}};
+  if (comparison.control)
+    json["control"] = {{"cells", comparison.control->cells}, {"ratio", interval_json(comparison.control->ratio)}};
   Json& incomparable = json["incomparable"] = Json::array();
-  for (const auto& [name, reason] : comparison.incomparable) incomparable.push_back({{"name", name}, {"reason", reason}});
+  for (const auto& [name, reason] : comparison.incomparable)
+    incomparable.push_back({{"name", name}, {"reason", reason}});
   json["only_a"] = comparison.only_a, json["only_b"] = comparison.only_b;
   return json.dump(1) + "\n";
 }

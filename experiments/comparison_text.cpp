@@ -22,14 +22,16 @@ std::string repetitions(const std::vector<CellResult>& cells) {
   if (cells.empty()) return "no cells";
   const auto [least, most] = std::ranges::minmax(cells, {}, [](const CellResult& r) { return r.repetitions.size(); });
   const std::size_t a = least.repetitions.size(), b = most.repetitions.size();
-  return fmt::format("{} cells, {} repetitions", cells.size(), a == b ? std::to_string(a) : fmt::format("{} to {}", a, b));
+  return fmt::format("{} cells, {} repetitions", cells.size(),
+                     a == b ? std::to_string(a) : fmt::format("{} to {}", a, b));
 }
 
 std::string origin(const char* letter, const ResultFolder& f) {
   const std::string date = f.context_text("date");
   const bool dirty = f.context.contains("git_dirty") && f.context_text("git_dirty") != "false";
-  return fmt::format("{}  {}: {}, revision {}{}, {}{}\n", letter, f.path.string(), repetitions(f.cells), f.context_text("git_revision").substr(0, 12),
-                     dirty ? " with changes" : "", date.substr(0, date.find('T')), f.complete ? "" : ", cut off");
+  return fmt::format("{}  {}: {}, revision {}{}, {}{}\n", letter, f.path.string(), repetitions(f.cells),
+                     f.context_text("git_revision").substr(0, 12), dirty ? " with changes" : "",
+                     date.substr(0, date.find('T')), f.complete ? "" : ", cut off");
 }
 
 /// The axes by which some of the cells differ, and what is the same for all.
@@ -41,7 +43,8 @@ struct Axes {
 Axes axes_of(const std::vector<Json>& cells) {
   Axes axes;
   for (const auto& [axis, value] : cells.front().items()) {
-    const bool same = std::ranges::all_of(cells, [&, &key = axis, &of_first = value](const Json& cell) { return cell[key] == of_first; });
+    const bool same = std::ranges::all_of(
+        cells, [&, &key = axis, &of_first = value](const Json& cell) { return cell[key] == of_first; });
     if (!same)
       axes.varying.push_back(axis);
     else if (axis != "metric" && plain_text(value) != "-")
@@ -50,13 +53,9 @@ Axes axes_of(const std::vector<Json>& cells) {
   return axes;
 }
 
-std::string p_text(double p) {
-  return p < 0.0001 ? "<0.0001" : fmt::format("{:.4f}", p);
-}
+std::string p_text(double p) { return p < 0.0001 ? "<0.0001" : fmt::format("{:.4f}", p); }
 
-std::string interval_text(const Interval& i) {
-  return fmt::format("[{:.3f}, {:.3f}]", i.low, i.high);
-}
+std::string interval_text(const Interval& i) { return fmt::format("[{:.3f}, {:.3f}]", i.low, i.high); }
 
 /// Cells of one kind: what they have in common, then a row each.
 std::string cell_table(const Comparison& comparison, bool trace, bool all) {
@@ -70,7 +69,9 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
   const bool some = !all && cells.size() > kMostRows;
   TableRow titles = axes.varying;
   if (titles.empty()) titles = {trace ? "cell" : "structure"};
-  for (const char* title : {trace ? "A Mray/s" : "A ms", trace ? "B Mray/s" : "B ms", trace ? "B/A" : "speed B/A", "95 %", "p", "verdict"}) titles.emplace_back(title);
+  for (const char* title :
+       {trace ? "A Mray/s" : "A ms", trace ? "B Mray/s" : "B ms", trace ? "B/A" : "speed B/A", "95 %", "p", "verdict"})
+    titles.emplace_back(title);
   std::vector<TableRow> rows{titles};
   std::size_t left_out = 0;
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -83,9 +84,12 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
     for (const std::string& axis : axes.varying) row.push_back(plain_text(values[i][axis]));
     if (row.empty()) row.push_back(c->a.cell.structure);
     const double triangles = c->a.fact("triangles");
-    const auto speed = [&](double rate) { return trace ? fmt::format("{:.2f}", rate * 1e-6) : fmt::format("{:.2f}", 1e3 * triangles / rate); };
-    row.insert(row.end(), {speed(c->rate_a.median), speed(c->rate_b.median), fmt::format("{:.3f}", c->ratio.median), interval_text(c->ratio),
-                           c->is_tested() ? p_text(c->adjusted_p) : "-", std::string(to_string(c->verdict))});
+    const auto speed = [&](double rate) {
+      return trace ? fmt::format("{:.2f}", rate * 1e-6) : fmt::format("{:.2f}", 1e3 * triangles / rate);
+    };
+    row.insert(row.end(), {speed(c->rate_a.median), speed(c->rate_b.median), fmt::format("{:.3f}", c->ratio.median),
+                           interval_text(c->ratio), c->is_tested() ? p_text(c->adjusted_p) : "-",
+                           std::string(to_string(c->verdict))});
     rows.push_back(std::move(row));
   }
   std::string text = fmt::format("\n{}", trace ? "rays" : "builds");
@@ -97,10 +101,13 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
 }
 
 std::string mean_table(const Comparison& comparison) {
-  std::vector<TableRow> rows{{"geometric mean", "", "B/A", "95 %", "cells", "faster", "slower", "indistinguishable", "undecided"}};
+  std::vector<TableRow> rows{
+      {"geometric mean", "", "B/A", "95 %", "cells", "faster", "slower", "indistinguishable", "undecided"}};
   for (const MeanRatio& m : comparison.means) {
-    rows.push_back({m.axis.empty() ? "all " + m.value : m.axis, m.axis.empty() ? "" : m.value, fmt::format("{:.3f}", m.ratio.median), interval_text(m.ratio),
-                    std::to_string(m.cells), std::to_string(m.faster), std::to_string(m.slower), std::to_string(m.indistinguishable), std::to_string(m.undecided)});
+    rows.push_back({m.axis.empty() ? "all " + m.value : m.axis, m.axis.empty() ? "" : m.value,
+                    fmt::format("{:.3f}", m.ratio.median), interval_text(m.ratio), std::to_string(m.cells),
+                    std::to_string(m.faster), std::to_string(m.slower), std::to_string(m.indistinguishable),
+                    std::to_string(m.undecided)});
   }
   return rows.size() == 1 ? "" : "\n" + format_table(rows, 2);
 }
@@ -114,7 +121,9 @@ double usual_half_width(const Comparison& comparison) {
 }
 
 std::string tests_text(const Comparison& comparison) {
-  const auto with = [&](SignificanceTest test) { return std::ranges::count(comparison.cells, test, &ComparedCell::test); };
+  const auto with = [&](SignificanceTest test) {
+    return std::ranges::count(comparison.cells, test, &ComparedCell::test);
+  };
   const auto by_ranks = with(SignificanceTest::mann_whitney), by_logs = with(SignificanceTest::welch);
   const std::string few = "Welch's test of logarithms, as ranks of so few repetitions tell nothing among so many cells";
   if (by_logs == 0) return "Mann-Whitney test";
@@ -124,18 +133,26 @@ std::string tests_text(const Comparison& comparison) {
 std::string legend(const Comparison& comparison) {
   const CompareOptions& o = comparison.options;
   std::string text = fmt::format(
-      "\nB/A: speed of B over that of A, so 1.10 is a tenth faster; medians of thread CPU time with one thread, else of wall time, with the 95 % bootstrap interval\n"
-      "of their ratio. p: {}, adjusted for the number of cells (Benjamini-Hochberg). faster, slower: the whole interval is beyond {:g} %, and p at\n"
+      "\nB/A: speed of B over that of A, so 1.10 is a tenth faster; medians of thread CPU time with one thread, else "
+      "of wall time, with the 95 % bootstrap interval\n"
+      "of their ratio. p: {}, adjusted for the number of cells (Benjamini-Hochberg). faster, slower: the whole "
+      "interval is beyond {:g} %, and p at\n"
       "most {:g}.\n",
       tests_text(comparison), o.min_difference, o.significance);
-  if (!comparison.control) text += "Drift of the machine between the two runs is in neither the interval nor p; --control REGEX (cells whose code did not change) takes it out.\n";
+  if (!comparison.control)
+    text +=
+        "Drift of the machine between the two runs is in neither the interval nor p; --control REGEX (cells whose code "
+        "did not change) takes it out.\n";
   if (const std::size_t n = comparison.count(Verdict::indistinguishable); n > 0) {
-    text += fmt::format("Of the {} indistinguishable cells {} are known to be equal: their whole interval is within {:g} %.\n", n,
-                        std::ranges::count(comparison.cells, true, &ComparedCell::equal), o.min_difference);
+    text += fmt::format(
+        "Of the {} indistinguishable cells {} are known to be equal: their whole interval is within {:g} %.\n", n,
+        std::ranges::count(comparison.cells, true, &ComparedCell::equal), o.min_difference);
   }
   if (const double width = usual_half_width(comparison); width > 0.01 * o.min_difference) {
-    text += fmt::format("Half of the intervals reach {:.0f} % or more to either side: smaller differences go unseen. More repetitions, a longer min_time or a quieter machine narrow them.\n",
-                        100.0 * width);
+    text += fmt::format(
+        "Half of the intervals reach {:.0f} % or more to either side: smaller differences go unseen. More repetitions, "
+        "a longer min_time or a quieter machine narrow them.\n",
+        100.0 * width);
   }
   if (comparison.count(Verdict::undecided) > 0) {
     text += "undecided: one repetition tells nothing of noise; run both with --repetitions 3 or more\n";
@@ -147,14 +164,17 @@ std::string legend(const Comparison& comparison) {
 std::string machine_text(const Comparison& comparison) {
   if (comparison.control) {
     const MeanRatio& c = *comparison.control;
-    return fmt::format("\nAll speeds are relative to the {} cells of --control '{}', whose geometric mean B/A is {:.3f} {}.\n", c.cells, c.value, c.ratio.median,
-                       interval_text(c.ratio));
+    return fmt::format(
+        "\nAll speeds are relative to the {} cells of --control '{}', whose geometric mean B/A is {:.3f} {}.\n",
+        c.cells, c.value, c.ratio.median, interval_text(c.ratio));
   }
   if (!comparison.embree) return {};
   const Interval& r = comparison.embree->ratio;
   if ((r.low <= 1.0 && r.high >= 1.0) || std::abs(r.median - 1.0) < 0.01) return {};
-  return fmt::format("\nnote: embree's {} cells ran at {:.3f} {} of A's speed: if nothing of Embree changed, the machine did. --control /embree/ takes that out of all ratios.\n",
-                     comparison.embree->cells, r.median, interval_text(r));
+  return fmt::format(
+      "\nnote: embree's {} cells ran at {:.3f} {} of A's speed: if nothing of Embree changed, the machine did. "
+      "--control /embree/ takes that out of all ratios.\n",
+      comparison.embree->cells, r.median, interval_text(r));
 }
 
 std::string wrong_table(const Comparison& comparison) {
@@ -163,21 +183,28 @@ std::string wrong_table(const Comparison& comparison) {
   for (const ComparedCell& c : comparison.cells) {
     if (c.a.has_fact("wrong_answers") != c.b.has_fact("wrong_answers")) ++unchecked;
     if (c.more_wrong_answers().value_or(0.0) == 0.0) continue;
-    rows.push_back({c.a.cell.name(), fmt::format("{:.0f}", c.a.fact("wrong_answers")), fmt::format("{:.0f}", c.b.fact("wrong_answers")),
-                    fmt::format("{:.0f}", c.a.fact("rays"))});
+    rows.push_back({c.a.cell.name(), fmt::format("{:.0f}", c.a.fact("wrong_answers")),
+                    fmt::format("{:.0f}", c.b.fact("wrong_answers")), fmt::format("{:.0f}", c.a.fact("rays"))});
   }
   std::string text = rows.size() == 1 ? "" : "\n" + format_table(rows, 1);
-  if (unchecked > 0) text += fmt::format("\n{} cells had their answers checked in only one of A and B: whether they are right does not compare\n", unchecked);
+  if (unchecked > 0)
+    text += fmt::format(
+        "\n{} cells had their answers checked in only one of A and B: whether they are right does not compare\n",
+        unchecked);
   return text;
 }
 
 std::string structure_table(const Comparison& comparison) {
   std::vector<TableRow> rows{{"structure changed", "SAH A", "SAH B", "B/A", "bytes A", "bytes B", "B/A"}};
   for (const StructureChange& s : comparison.structures) {
-    const auto figure = [](const std::optional<double>& v, const char* format) { return v ? fmt::format(fmt::runtime(format), *v) : "-"; };
-    const auto ratio = [](const std::optional<double>& a, const std::optional<double>& b) { return a && b && *a > 0.0 ? fmt::format("{:.4f}", *b / *a) : "-"; };
-    rows.push_back({s.structure, figure(s.sah_a, "{:.3f}"), figure(s.sah_b, "{:.3f}"), ratio(s.sah_a, s.sah_b), figure(s.bytes_a, "{:.0f}"),
-                    figure(s.bytes_b, "{:.0f}"), ratio(s.bytes_a, s.bytes_b)});
+    const auto figure = [](const std::optional<double>& v, const char* format) {
+      return v ? fmt::format(fmt::runtime(format), *v) : "-";
+    };
+    const auto ratio = [](const std::optional<double>& a, const std::optional<double>& b) {
+      return a && b && *a > 0.0 ? fmt::format("{:.4f}", *b / *a) : "-";
+    };
+    rows.push_back({s.structure, figure(s.sah_a, "{:.3f}"), figure(s.sah_b, "{:.3f}"), ratio(s.sah_a, s.sah_b),
+                    figure(s.bytes_a, "{:.0f}"), figure(s.bytes_b, "{:.0f}"), ratio(s.bytes_a, s.bytes_b)});
   }
   return rows.size() == 1 ? "" : "\n" + format_table(rows, 1);
 }
@@ -186,37 +213,45 @@ std::string name_list(const std::vector<std::string>& names, const std::string& 
   if (names.empty()) return {};
   std::string text = fmt::format("\n{} {}\n", names.size(), title);
   for (std::size_t i = 0; i < std::min(names.size(), kMostNames); ++i) text += "  " + names[i] + "\n";
-  if (names.size() > kMostNames) text += fmt::format("  and {} more (--json FILE has them)\n", names.size() - kMostNames);
+  if (names.size() > kMostNames)
+    text += fmt::format("  and {} more (--json FILE has them)\n", names.size() - kMostNames);
   return text;
 }
 
-/// Of the undecided cells those whose whole interval is beyond the smallest difference, for the last line: "no regression found" alone would hide them.
+/// Of the undecided cells those whose whole interval is beyond the smallest difference, for the last line: "no
+/// regression found" alone would hide them.
 std::string beyond_text(const Comparison& comparison) {
   const auto undecided = [](const ComparedCell& c) { return c.verdict == Verdict::undecided && c.beyond; };
   const auto cells = std::ranges::count_if(comparison.cells, undecided);
   if (cells == 0) return {};
   std::vector<std::string> names;
   for (const ComparedCell& c : comparison.cells)
-    if (undecided(c) && names.size() < kMostBeyond) names.push_back(fmt::format("{} (B/A {:.3f})", c.a.cell.name(), c.ratio.median));
-  return fmt::format("; {} {} wholly beyond {:g} % but undecided, {} on the slow side: {}{}; more than one repetition would tell", cells, cells == 1 ? "cell is" : "cells are",
-                     comparison.options.min_difference, comparison.suspects(), fmt::join(names, ", "), static_cast<std::size_t>(cells) > names.size() ? ", …" : "");
+    if (undecided(c) && names.size() < kMostBeyond)
+      names.push_back(fmt::format("{} (B/A {:.3f})", c.a.cell.name(), c.ratio.median));
+  return fmt::format(
+      "; {} {} wholly beyond {:g} % but undecided, {} on the slow side: {}{}; more than one repetition would tell",
+      cells, cells == 1 ? "cell is" : "cells are", comparison.options.min_difference, comparison.suspects(),
+      fmt::join(names, ", "), static_cast<std::size_t>(cells) > names.size() ? ", …" : "");
 }
 
 /// One-minute load average when the run began.
 std::optional<double> load_of(const ResultFolder& f) {
   const std::string text = f.context_text("load");
   double load = 0.0;
-  return std::from_chars(text.data(), text.data() + text.size(), load).ec == std::errc{} ? std::optional(load) : std::nullopt;
+  return std::from_chars(text.data(), text.data() + text.size(), load).ec == std::errc{} ? std::optional(load)
+                                                                                         : std::nullopt;
 }
 
 /// What speaks for a machine that was busy while A or B was measured.
 std::string busy_text(const ResultFolder& a, const ResultFolder& b) {
   std::string text;
   const std::optional<double> of_a = load_of(a), of_b = load_of(b);
-  if (of_a && of_b && std::abs(*of_a - *of_b) > kLoadDifference) text += fmt::format("differs: load average at the start: {:.2f} against {:.2f}\n", *of_a, *of_b);
+  if (of_a && of_b && std::abs(*of_a - *of_b) > kLoadDifference)
+    text += fmt::format("differs: load average at the start: {:.2f} against {:.2f}\n", *of_a, *of_b);
   for (const auto& [letter, folder] : {std::pair{"A", &a}, std::pair{"B", &b}}) {
     for (const Json& warning : folder->context.value("warnings", Json::array()))
-      if (warning.is_string() && warning.get<std::string>().starts_with("noisy machine")) text += fmt::format("{} warned: {}\n", letter, warning.get<std::string>());
+      if (warning.is_string() && warning.get<std::string>().starts_with("noisy machine"))
+        text += fmt::format("{} warned: {}\n", letter, warning.get<std::string>());
   }
   return text;
 }
@@ -229,36 +264,44 @@ std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
   for (const std::string& difference : machine) text += fmt::format("differs: {}\n", difference);
   if (machine.empty()) text += fmt::format("both: {}, {}\n", a.context_text("cpu"), a.context_text("compiler"));
   for (const auto& [key, title] : {std::pair{"host_name", "host"}, std::pair{"seed", "seed, and so the rays"}})
-    if (a.context_text(key) != b.context_text(key)) text += fmt::format("differs: {}: {} against {}\n", title, a.context_text(key), b.context_text(key));
-  if (a.configuration_hash != b.configuration_hash) text += "differs: configuration (effective.yaml); cells are matched by name, and compared where rays and triangles are as many\n";
+    if (a.context_text(key) != b.context_text(key))
+      text += fmt::format("differs: {}: {} against {}\n", title, a.context_text(key), b.context_text(key));
+  if (a.configuration_hash != b.configuration_hash)
+    text +=
+        "differs: configuration (effective.yaml); cells are matched by name, and compared where rays and triangles are "
+        "as many\n";
   return text + busy_text(a, b);
 }
 
 std::string comparison_text(const Comparison& comparison, bool all) {
   std::string text;
   if (!comparison.cells.empty()) {
-    text += cell_table(comparison, true, all) + cell_table(comparison, false, all) + mean_table(comparison) + legend(comparison) + machine_text(comparison) +
-            wrong_table(comparison) + structure_table(comparison);
+    text += cell_table(comparison, true, all) + cell_table(comparison, false, all) + mean_table(comparison) +
+            legend(comparison) + machine_text(comparison) + wrong_table(comparison) + structure_table(comparison);
   }
   std::vector<std::string> other;
   for (const auto& [name, why] : comparison.incomparable) other.push_back(fmt::format("{}: {}", name, why));
-  return text + name_list(other, "cells are in both but did other work, and are not compared:") + name_list(comparison.only_a, "cells only in A:") +
-         name_list(comparison.only_b, "cells only in B:");
+  return text + name_list(other, "cells are in both but did other work, and are not compared:") +
+         name_list(comparison.only_a, "cells only in A:") + name_list(comparison.only_b, "cells only in B:");
 }
 
 std::pair<ExitStatus, std::string> verdict(const Comparison& comparison) {
   if (comparison.cells.empty()) {
-    return {ExitStatus::kNothingMeasured, fmt::format("nothing to compare: {} cells only in A, {} only in B, {} in both but not the same work", comparison.only_a.size(),
-                                                      comparison.only_b.size(), comparison.incomparable.size())};
+    return {ExitStatus::kNothingMeasured,
+            fmt::format("nothing to compare: {} cells only in A, {} only in B, {} in both but not the same work",
+                        comparison.only_a.size(), comparison.only_b.size(), comparison.incomparable.size())};
   }
   std::vector<std::string> counts;
   for (Verdict v : {Verdict::faster, Verdict::slower, Verdict::indistinguishable, Verdict::undecided})
     if (const std::size_t n = comparison.count(v); n > 0) counts.push_back(fmt::format("{} {}", n, to_string(v)));
-  if (const std::size_t n = comparison.more_wrong(); n > 0) counts.push_back(fmt::format("{} with more wrong answers", n));
+  if (const std::size_t n = comparison.more_wrong(); n > 0)
+    counts.push_back(fmt::format("{} with more wrong answers", n));
   const std::string of = fmt::format("of {} cells {}", comparison.cells.size(), fmt::join(counts, ", "));
   const std::string beyond = beyond_text(comparison);
-  if (comparison.is_regression()) return {ExitStatus::kRegression, fmt::format("regression: {}{}; exit status 3", of, beyond)};
-  return {ExitStatus::kDone, fmt::format("no regression{}: {}{}", comparison.count(Verdict::undecided) > 0 ? " found" : "", of, beyond)};
+  if (comparison.is_regression())
+    return {ExitStatus::kRegression, fmt::format("regression: {}{}; exit status 3", of, beyond)};
+  return {ExitStatus::kDone,
+          fmt::format("no regression{}: {}{}", comparison.count(Verdict::undecided) > 0 ? " found" : "", of, beyond)};
 }
 
 }  // namespace arboretum

@@ -12,8 +12,9 @@ namespace arboretum {
 
 void print_warnings(const std::vector<std::string>& warnings);
 
-/// Warnings, tables, skipped cells, where the report is, and what the exit status says. `draw`: the configuration's figures, and the report, which is there
-/// without any figure too.
-[[nodiscard]] ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan, bool draw);
+/// Warnings, tables, skipped cells, where the report is, and what the exit status says. `draw`: the configuration's
+/// figures, and the report, which is there without any figure too.
+[[nodiscard]] ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan,
+                                  bool draw);
 
 }  // namespace arboretum

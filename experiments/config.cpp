@@ -17,26 +17,22 @@
 namespace arboretum {
 namespace {
 
-std::vector<std::string> strings(std::span<const std::string_view> views) {
-  return {views.begin(), views.end()};
-}
+std::vector<std::string> strings(std::span<const std::string_view> views) { return {views.begin(), views.end()}; }
 
 class ConfigReader {
  public:
-  ConfigReader(const std::filesystem::path& file, const Registry& registry)
-      : yaml_(file), registry_(registry) {
+  ConfigReader(const std::filesystem::path& file, const Registry& registry) : yaml_(file), registry_(registry) {
     experiment_.file = file;
   }
 
   Experiment read(const Overrides& overrides) {
     const YAML::Node& root = yaml_.root();
     yaml_.check_map(root, "the configuration",
-                    std::vector<std::string>{"experiment", "scenes", "axes", "parameters", "rays", "include",
-                                             "exclude", "measure", "metrics", "plots"});
+                    std::vector<std::string>{"experiment", "scenes", "axes", "parameters", "rays", "include", "exclude",
+                                             "measure", "metrics", "plots"});
     experiment_.name = experiment_.file.stem().string();
     if (const auto node = root["experiment"]) read_name(node);
-    if (!root["scenes"])
-      yaml_.fail(root, "no scenes; add `scenes: [bunny]` or another of `arboretum list scenes`");
+    if (!root["scenes"]) yaml_.fail(root, "no scenes; add `scenes: [bunny]` or another of `arboretum list scenes`");
     experiment_.scenes = read_scenes(yaml_, root["scenes"], experiment_.file.parent_path());
     if (const auto node = root["measure"]) read_measure(node);
     if (const auto node = root["axes"]) experiment_.axes = read_axes(node, "axes", false, nullptr);
@@ -60,12 +56,11 @@ class ConfigReader {
 
   void read_name(const YAML::Node& node) {
     experiment_.name = yaml_.text(node, "experiment");
-    const bool plain = std::ranges::all_of(experiment_.name, [](unsigned char c) {
-      return std::isalnum(c) || c == '_' || c == '-' || c == '.';
-    });
+    const bool plain = std::ranges::all_of(
+        experiment_.name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-' || c == '.'; });
     if (!plain || experiment_.name.front() == '.') {
-      yaml_.fail(node, fmt::format("experiment '{}' names a folder: use letters, digits, '_', '-' and '.'",
-                                   experiment_.name));
+      yaml_.fail(
+          node, fmt::format("experiment '{}' names a folder: use letters, digits, '_', '-' and '.'", experiment_.name));
     }
   }
 
@@ -85,8 +80,7 @@ class ConfigReader {
       const Axis a = *parse_axis(key);
       for (const YAML::Node& node : nodes) {
         std::string value = node.Scalar();
-        if (const std::string wrong = check_axis_value(a, value, registry_); !wrong.empty())
-          yaml_.fail(node, wrong);
+        if (const std::string wrong = check_axis_value(a, value, registry_); !wrong.empty()) yaml_.fail(node, wrong);
         auto& list = lists[index_of(a)];
         if (std::ranges::find(list, value) != list.end())
           yaml_.fail(node, fmt::format("{}: '{}' is given twice; keep one", key, value));
@@ -107,8 +101,7 @@ class ConfigReader {
 
   std::vector<CellChoice> read_choices(const YAML::Node& node, std::string_view what) {
     if (!node.IsSequence() || node.size() == 0) {
-      yaml_.fail(node,
-                 fmt::format("{} must be a list of maps, as in {}: [{{structure: embree}}]", what, what));
+      yaml_.fail(node, fmt::format("{} must be a list of maps, as in {}: [{{structure: embree}}]", what, what));
     }
     std::vector<CellChoice> choices;
     for (const YAML::Node& entry : node) {
@@ -117,8 +110,7 @@ class ConfigReader {
       choice.axes = read_axes(entry, what, true, &choice);
       if (entry.size() == 0) yaml_.fail(entry, fmt::format("{}: an entry names no axis", what));
       if (what == "include" && choice.axes[index_of(Axis::structure)].empty()) {
-        yaml_.fail(entry,
-                   "include: an entry names its structure, as in {structure: embree, builder: medium}");
+        yaml_.fail(entry, "include: an entry names its structure, as in {structure: embree, builder: medium}");
       }
       choices.push_back(std::move(choice));
     }
@@ -167,18 +159,20 @@ class ConfigReader {
   void refuse_ineffective_rays(const YAML::Node& node) {
     if (!node || experiment_.overridden) return;
     if (!has_rays_on_surfaces(experiment_))
-      yaml_.fail(node, "rays has no effect: no workload starts on surfaces (shadow, ambient_occlusion, reflection, diffuse)");
+      yaml_.fail(node,
+                 "rays has no effect: no workload starts on surfaces (shadow, ambient_occlusion, reflection, diffuse)");
   }
 
   void read_measure(const YAML::Node& map) {
     yaml_.check_map(map, "measure",
-                    std::vector<std::string>{"repetitions", "warmup", "min_warmup_time", "min_time", "resolution", "threads",
-                                             "memory", "seed", "structure_cache"});
+                    std::vector<std::string>{"repetitions", "warmup", "min_warmup_time", "min_time", "resolution",
+                                             "threads", "memory", "seed", "structure_cache"});
     MeasureSettings& m = experiment_.measure;
     if (const auto n = map["repetitions"])
       m.repetitions = static_cast<unsigned>(yaml_.integer(n, "repetitions", 1, 100000));
     if (const auto n = map["warmup"]) m.warmup = static_cast<unsigned>(yaml_.integer(n, "warmup", 0, 1000));
-    if (const auto n = map["min_warmup_time"]) m.min_warmup_time = yaml_.number(n, "min_warmup_time (seconds)", 0.0, 3600.0);
+    if (const auto n = map["min_warmup_time"])
+      m.min_warmup_time = yaml_.number(n, "min_warmup_time (seconds)", 0.0, 3600.0);
     if (const auto n = map["min_time"]) m.min_time = yaml_.number(n, "min_time (seconds)", 0.0, 3600.0);
     if (const auto n = map["threads"]) threads_ = std::to_string(yaml_.integer(n, "threads", 1, kMaxThreads));
     if (const auto n = map["memory"]) m.memory = yaml_.bytes(n, "memory");
@@ -186,8 +180,7 @@ class ConfigReader {
     if (const auto n = map["structure_cache"])
       m.structure_cache = experiment_.file.parent_path() / yaml_.text(n, "structure_cache");
     if (const auto n = map["resolution"]) {
-      if (!n.IsSequence() || n.size() != 2)
-        yaml_.fail(n, "resolution must be [width, height], as in [512, 512]");
+      if (!n.IsSequence() || n.size() != 2) yaml_.fail(n, "resolution must be [width, height], as in [512, 512]");
       m.width = static_cast<unsigned>(yaml_.integer(n[0], "resolution: width", 1, 32768));
       m.height = static_cast<unsigned>(yaml_.integer(n[1], "resolution: height", 1, 32768));
     }
@@ -199,12 +192,8 @@ class ConfigReader {
     const std::vector<std::string> known = strings(kMetricNames);
     for (const YAML::Node& value : yaml_.list(node, "metrics")) {
       const std::string name = value.Scalar();
-      if (std::ranges::find(known, name) == known.end())
-        yaml_.fail(value, unknown_name_message("metric", name, known));
-      (name == "trace"     ? m.trace
-       : name == "build"   ? m.build
-       : name == "quality" ? m.quality
-                           : m.accuracy) = true;
+      if (std::ranges::find(known, name) == known.end()) yaml_.fail(value, unknown_name_message("metric", name, known));
+      (name == "trace" ? m.trace : name == "build" ? m.build : name == "quality" ? m.quality : m.accuracy) = true;
     }
     if (m.accuracy && !m.trace)
       yaml_.fail(node, "metric accuracy has no effect without trace: add trace or take accuracy out");
@@ -219,8 +208,7 @@ class ConfigReader {
       if (std::ranges::any_of(overrides.axes, [](const std::string& word) { return word.starts_with("threads="); }))
         throw UserError("command line: --threads and threads= say the same; keep one");
       if (*overrides.threads < 1 || *overrides.threads > kMaxThreads) {
-        throw UserError(
-            fmt::format("--threads: an integer from 1 to {}, not {}", kMaxThreads, *overrides.threads));
+        throw UserError(fmt::format("--threads: an integer from 1 to {}, not {}", kMaxThreads, *overrides.threads));
       }
       axis(Axis::threads) = {std::to_string(*overrides.threads)};
       experiment_.overridden = true;
@@ -245,7 +233,8 @@ class ConfigReader {
     std::vector<SceneChoice> chosen;
     for (const std::string& word : words) {
       const std::size_t before = chosen.size();
-      std::ranges::copy_if(experiment_.scenes, std::back_inserter(chosen), [&](const SceneChoice& s) { return s.is_called(word); });
+      std::ranges::copy_if(experiment_.scenes, std::back_inserter(chosen),
+                           [&](const SceneChoice& s) { return s.is_called(word); });
       if (chosen.size() == before) chosen.push_back(scene_of_word(word));
     }
     experiment_.scenes = chosen;
@@ -280,12 +269,14 @@ class ConfigReader {
 }  // namespace
 
 bool has_rays_on_surfaces(const Experiment& experiment) {
-  const auto has = [](const AxisLists& axes) { return std::ranges::any_of(axes[index_of(Axis::workload)], starts_on_surfaces); };
-  return has(experiment.axes) || std::ranges::any_of(experiment.include, [&](const CellChoice& c) { return has(c.axes); });
+  const auto has = [](const AxisLists& axes) {
+    return std::ranges::any_of(axes[index_of(Axis::workload)], starts_on_surfaces);
+  };
+  return has(experiment.axes) ||
+         std::ranges::any_of(experiment.include, [&](const CellChoice& c) { return has(c.axes); });
 }
 
-Experiment read_experiment(const std::filesystem::path& file, const Registry& registry,
-                           const Overrides& overrides) {
+Experiment read_experiment(const std::filesystem::path& file, const Registry& registry, const Overrides& overrides) {
   return ConfigReader(file, registry).read(overrides);
 }
 

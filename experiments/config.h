@@ -17,8 +17,8 @@ namespace arboretum {
 
 inline constexpr std::array<std::string_view, 4> kMetricNames{"trace", "build", "quality", "accuracy"};
 
-/// What is done to a scene's coordinates: stretched along y, sized, then moved by offset * (1, -3/4, 1/2), rounded once. A scene
-/// that is placed loses its camera and lights (it is framed whole) and its instances.
+/// What is done to a scene's coordinates: stretched along y, sized, then moved by offset * (1, -3/4, 1/2), rounded
+/// once. A scene that is placed loses its camera and lights (it is framed whole) and its instances.
 struct Placing {
   double stretch = 1.0, size = 1.0, offset = 0.0;
   std::string label = {};  ///< what the configuration says of it: ":size=100:offset=1e4"; empty: nothing
@@ -30,7 +30,7 @@ struct SceneChoice {
   bool moves = false;        ///< it has key frames, and its shutter opens
   std::string missing = {};  ///< why an optional scene is not here: its cells are skipped with this reason
   Placing placing = {};
-  std::string where = {};    ///< file:line, or `command line`
+  std::string where = {};  ///< file:line, or `command line`
   /// The name without the placing: include, exclude and the command line may name all placings of a scene by it.
   [[nodiscard]] std::string family() const { return name.substr(0, name.size() - placing.label.size()); }
   [[nodiscard]] bool is_called(std::string_view word) const { return word == name || word == family(); }
@@ -45,9 +45,9 @@ struct CellChoice {
 
 struct MeasureSettings {
   unsigned repetitions = 7;
-  unsigned warmup = 1;    ///< untimed passes over all rays before the first repetition
+  unsigned warmup = 1;           ///< untimed passes over all rays before the first repetition
   double min_warmup_time = 0.0;  ///< seconds that the untimed passes last at least
-  double min_time = 0.2;  ///< seconds that one repetition lasts at least
+  double min_time = 0.2;         ///< seconds that one repetition lasts at least
   unsigned width = 512, height = 512;
   std::size_t memory = std::size_t{8} << 30;  ///< bytes of structures held at once
   std::uint64_t seed = 1;

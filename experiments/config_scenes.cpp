@@ -45,10 +45,13 @@ std::filesystem::path find_file(const YamlReader& yaml, const YAML::Node& node, 
     return std::filesystem::path(scenes) / text;
   if (!optional) {
     yaml.fail(node, fmt::format("{} '{}' is no file; paths are relative to the configuration, or to the folder "
-                                "that ARBORETUM_SCENES names", what, path.string()));
+                                "that ARBORETUM_SCENES names",
+                                what, path.string()));
   }
-  missing = has_folder ? fmt::format("optional scene {} is not here: ARBORETUM_SCENES is {}", text, scenes)
-                       : fmt::format("optional scene {} is not here: ARBORETUM_SCENES, the folder to find it in, is not set", text);
+  missing =
+      has_folder
+          ? fmt::format("optional scene {} is not here: ARBORETUM_SCENES is {}", text, scenes)
+          : fmt::format("optional scene {} is not here: ARBORETUM_SCENES, the folder to find it in, is not set", text);
   return text;
 }
 
@@ -62,7 +65,8 @@ auto with_place(const YamlReader& yaml, const YAML::Node& node, const Read& read
   }
 }
 
-SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::filesystem::path& folder, std::string& missing) {
+SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::filesystem::path& folder,
+                     std::string& missing) {
   if (node.IsScalar()) {
     // As on the command line, but a name is never a file of the folder that the program happens to run in.
     const std::string word = yaml.text(node, "scene"), extension = std::filesystem::path(word).extension().string();
@@ -72,14 +76,18 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
     } else if (!extension.empty() || word.find('/') != std::string::npos) {
       spec.file = find_file(yaml, node, "file", folder, false, missing);
     } else {
-      spec = with_place(yaml, node, [&] { return word.find(':') == std::string::npos ? named(word) : parse_scene_word(word); });
-      if (!spec.generator.empty()) with_place(yaml, node, [&] { return check_generated(spec.generator, spec.triangles, spec.seed), 0; });
+      spec = with_place(yaml, node,
+                        [&] { return word.find(':') == std::string::npos ? named(word) : parse_scene_word(word); });
+      if (!spec.generator.empty())
+        with_place(yaml, node, [&] { return check_generated(spec.generator, spec.triangles, spec.seed), 0; });
     }
     return spec;
   }
-  yaml.check_map(node, "a scene", std::vector<std::string>{"file", "scene", "generate", "catalogue", "triangles", "seed", "optional",
-                                                           "stretch", "size", "offset"});
-  const int forms = int(bool(node["file"])) + int(bool(node["scene"])) + int(bool(node["generate"])) + int(bool(node["catalogue"]));
+  yaml.check_map(node, "a scene",
+                 std::vector<std::string>{"file", "scene", "generate", "catalogue", "triangles", "seed", "optional",
+                                          "stretch", "size", "offset"});
+  const int forms =
+      int(bool(node["file"])) + int(bool(node["scene"])) + int(bool(node["generate"])) + int(bool(node["catalogue"]));
   if (forms != 1) yaml.fail(node, "a scene has exactly one of file, scene, generate and catalogue");
   SceneSpec spec;
   if (const auto n = node["catalogue"]) {
@@ -106,12 +114,12 @@ SceneSpec read_scene(const YamlReader& yaml, const YAML::Node& node, const std::
     if (node[key] && !node["generate"])
       yaml.fail(node[key], fmt::format("{} has no effect without generate: take it out", key));
   }
-  if (const auto n = node["triangles"])
-    spec.triangles = yaml.integer(n, "triangles", 1, std::uint64_t{1} << 31);
-  if (const auto n = node["seed"])
-    spec.seed = yaml.integer(n, "seed", 0, std::numeric_limits<std::uint64_t>::max());
+  if (const auto n = node["triangles"]) spec.triangles = yaml.integer(n, "triangles", 1, std::uint64_t{1} << 31);
+  if (const auto n = node["seed"]) spec.seed = yaml.integer(n, "seed", 0, std::numeric_limits<std::uint64_t>::max());
   if (!spec.generator.empty()) {
-    const YAML::Node& at = node["triangles"] && spec.triangles > kMaxGeneratedTriangles ? node["triangles"] : node["seed"] ? node["seed"] : node;
+    const YAML::Node& at = node["triangles"] && spec.triangles > kMaxGeneratedTriangles ? node["triangles"]
+                           : node["seed"]                                               ? node["seed"]
+                                                                                        : node;
     with_place(yaml, at, [&] { check_generated(spec.generator, spec.triangles, spec.seed); });
   }
   return spec;
@@ -122,7 +130,8 @@ struct PlacingValue {
   double value;
   std::string label;
 };
-std::vector<PlacingValue> placing_values(const YamlReader& yaml, const YAML::Node& node, const std::string& key, double low, double high, double usual) {
+std::vector<PlacingValue> placing_values(const YamlReader& yaml, const YAML::Node& node, const std::string& key,
+                                         double low, double high, double usual) {
   if (!node.IsMap() || !node[key]) return {{usual, ""}};
   std::vector<PlacingValue> values;
   for (const YAML::Node& n : yaml.list(node[key], key)) {
@@ -137,7 +146,8 @@ std::vector<Placing> read_placings(const YamlReader& yaml, const YAML::Node& nod
   for (const auto& stretch : placing_values(yaml, node, "stretch", 1e-9, 1e9, 1.0))
     for (const auto& size : placing_values(yaml, node, "size", 1e-9, 1e9, 1.0))
       for (const auto& offset : placing_values(yaml, node, "offset", -kMaxCoordinate, kMaxCoordinate, 0.0))
-        placings.push_back({stretch.value, size.value, offset.value, fmt::format("{}{}{}", stretch.label, size.label, offset.label)});
+        placings.push_back(
+            {stretch.value, size.value, offset.value, fmt::format("{}{}{}", stretch.label, size.label, offset.label)});
   return placings;
 }
 
@@ -162,8 +172,9 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
     for (const Placing& placing : read_placings(yaml, entry)) {
       const std::string name = fmt::format("{}{}", cell_word(spec.name()), placing.label);
       if (std::ranges::find(scenes, name, &SceneChoice::name) != scenes.end()) {
-        yaml.fail(entry,
-                  fmt::format("scene '{}' is given twice; keep one, or name them apart: another file name, or {{scene: FILE.yaml}}, a scene file with a `name:` of its own", name));
+        yaml.fail(entry, fmt::format("scene '{}' is given twice; keep one, or name them apart: another file name, or "
+                                     "{{scene: FILE.yaml}}, a scene file with a `name:` of its own",
+                                     name));
       }
       scenes.push_back({spec, name, moves, missing, placing, yaml.where(entry)});
     }

@@ -12,7 +12,8 @@
 namespace arboretum {
 
 /// Paths are relative to `folder`, the configuration's own; what is not there is looked for in the folder that the
-/// environment variable ARBORETUM_SCENES names. `optional: true` takes a scene that is in neither as missing. Throws UserError; no two scenes may share a name.
+/// environment variable ARBORETUM_SCENES names. `optional: true` takes a scene that is in neither as missing. Throws
+/// UserError; no two scenes may share a name.
 [[nodiscard]] std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& node,
                                                    const std::filesystem::path& folder);
 /// A scene named on the command line.

@@ -37,7 +37,8 @@ void emit_scene(YAML::Emitter& out, const SceneChoice& scene) {
   // As the configuration has them: they are a part of the name.
   for (std::string_view label = placing.label; !label.empty();) {
     const std::string_view pair = label.substr(1, label.find(':', 1) - 1);
-    out << YAML::Key << std::string(pair.substr(0, pair.find('='))) << YAML::Value << std::string(pair.substr(pair.find('=') + 1));
+    out << YAML::Key << std::string(pair.substr(0, pair.find('='))) << YAML::Value
+        << std::string(pair.substr(pair.find('=') + 1));
     label.remove_prefix(pair.size() + 1);
   }
   out << YAML::EndMap;
@@ -65,7 +66,8 @@ void emit_choices(YAML::Emitter& out, std::string_view key, const std::vector<Ce
 void emit_rays(YAML::Emitter& out, const RaySettings& rays) {
   std::vector<std::string> ways;
   for (SelfIntersection way : rays.self_intersection) ways.emplace_back(to_string(way));
-  out << YAML::Key << "rays" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "self_intersection" << YAML::Value;
+  out << YAML::Key << "rays" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "self_intersection"
+      << YAML::Value;
   emit_list(out, ways);
   if (std::ranges::find(rays.self_intersection, SelfIntersection::epsilon) != rays.self_intersection.end())
     out << YAML::Key << "epsilon" << YAML::Value << fmt::format("{}", rays.epsilon);
@@ -87,8 +89,7 @@ std::string text(const Experiment& e, bool whole) {
   for (const std::string& name : parameter_names()) {
     const auto named = e.parameters.find(name);
     out << YAML::Key << name << YAML::Value;
-    emit_list(
-        out, named == e.parameters.end() ? std::vector<std::string>{default_parameter(name)} : named->second);
+    emit_list(out, named == e.parameters.end() ? std::vector<std::string>{default_parameter(name)} : named->second);
   }
   out << YAML::EndMap;
   if (has_rays_on_surfaces(e)) emit_rays(out, e.rays);
@@ -97,12 +98,14 @@ std::string text(const Experiment& e, bool whole) {
   const MeasureSettings& m = e.measure;
   out << YAML::Key << "measure" << YAML::Value << YAML::BeginMap << YAML::Key << "repetitions" << YAML::Value
       << m.repetitions << YAML::Key << "warmup" << YAML::Value << m.warmup;
-  if (whole || m.min_warmup_time > 0.0) out << YAML::Key << "min_warmup_time" << YAML::Value << fmt::format("{}", m.min_warmup_time);
-  out << YAML::Key << "min_time" << YAML::Value << fmt::format("{}", m.min_time) << YAML::Key << "resolution" << YAML::Value
-      << YAML::Flow << YAML::BeginSeq << m.width << m.height << YAML::EndSeq << YAML::Key << "memory"
+  if (whole || m.min_warmup_time > 0.0)
+    out << YAML::Key << "min_warmup_time" << YAML::Value << fmt::format("{}", m.min_warmup_time);
+  out << YAML::Key << "min_time" << YAML::Value << fmt::format("{}", m.min_time) << YAML::Key << "resolution"
+      << YAML::Value << YAML::Flow << YAML::BeginSeq << m.width << m.height << YAML::EndSeq << YAML::Key << "memory"
       << YAML::Value << m.memory << YAML::Key << "seed" << YAML::Value << m.seed;
   if (whole && !m.structure_cache.empty()) {
-    out << YAML::Key << "structure_cache" << YAML::Value << std::filesystem::absolute(m.structure_cache).lexically_normal().string();
+    out << YAML::Key << "structure_cache" << YAML::Value
+        << std::filesystem::absolute(m.structure_cache).lexically_normal().string();
   }
   out << YAML::EndMap;
   std::vector<std::string> metrics;
@@ -124,9 +127,7 @@ std::string text(const Experiment& e, bool whole) {
 
 }  // namespace
 
-std::string effective_yaml(const Experiment& experiment) {
-  return text(experiment, true);
-}
+std::string effective_yaml(const Experiment& experiment) { return text(experiment, true); }
 
 std::string configuration_hash(const Experiment& experiment) {
   std::uint64_t hash = 0xcbf29ce484222325u;

@@ -22,8 +22,9 @@ double triangles_per_second(std::string_view builder) {
     std::string_view builder;
     double rate;
   };
-  static constexpr Rate kRates[] = {{"embree_high", 1.5e5}, {"high", 2e5},  {"embree_", 1e6},  {"sweep_sah", 3.5e5}, {"ploc", 8e5}, {"morton", 4e6},
-                                    {"low", 6e6},           {"octants", 4e5}, {"uniform", 2e6}, {"two_level", 1e6}};
+  static constexpr Rate kRates[] = {{"embree_high", 1.5e5}, {"high", 2e5},     {"embree_", 1e6}, {"sweep_sah", 3.5e5},
+                                    {"ploc", 8e5},          {"morton", 4e6},   {"low", 6e6},     {"octants", 4e5},
+                                    {"uniform", 2e6},       {"two_level", 1e6}};
   for (const Rate& r : kRates)
     if (builder.starts_with(r.builder)) return r.rate;
   return 1.5e6;
@@ -40,10 +41,12 @@ std::vector<double> estimate_seconds(const Experiment& experiment, const std::ve
   for (const SceneChoice& scene : experiment.scenes) triangles.push_back(double(expected_triangles(scene.spec)));
   for (const Cell& cell : cells) {
     if (cell.metric == Cell::Metric::build) {
-      const double a_triangle = 1.0 / triangles_per_second(cell.builder) + (cell.builder.ends_with("_reinsertion") ? 1.0 / kReinsertedPerSecond : 0.0);
+      const double a_triangle = 1.0 / triangles_per_second(cell.builder) +
+                                (cell.builder.ends_with("_reinsertion") ? 1.0 / kReinsertedPerSecond : 0.0);
       seconds.push_back((1.0 + m.repetitions) * triangles[cell.scene_index] * a_triangle + m.min_warmup_time);
     } else {
-      seconds.push_back(m.repetitions * std::max(m.min_time, pass) + 3.0 * pass + std::max(m.warmup * pass, m.min_warmup_time));
+      seconds.push_back(m.repetitions * std::max(m.min_time, pass) + 3.0 * pass +
+                        std::max(m.warmup * pass, m.min_warmup_time));
     }
   }
   return seconds;

@@ -1,5 +1,5 @@
-// How long cells are likely to take: for the time estimate of a run, and to cut a plan into shards of equal length. Rough, and
-// the same on every machine: it knows the configuration and the catalogue, and looks at no file.
+// How long cells are likely to take: for the time estimate of a run, and to cut a plan into shards of equal length.
+// Rough, and the same on every machine: it knows the configuration and the catalogue, and looks at no file.
 #pragma once
 
 #include <vector>

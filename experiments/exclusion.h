@@ -1,7 +1,7 @@
-// Rays that pass through one primitive each, the one that they start on (SelfIntersection::exclusion), for tracers that know nothing of
-// it. A ray whose closest hit is its own primitive is traced again from beyond that hit, with the others of the batch of which it
-// is so, until it is of none: kernels pay nothing where nothing is excluded. What else lies at the very t of the excluded hit is passed
-// through with it.
+// Rays that pass through one primitive each, the one that they start on (SelfIntersection::exclusion), for tracers that
+// know nothing of it. A ray whose closest hit is its own primitive is traced again from beyond that hit, with the
+// others of the batch of which it is so, until it is of none: kernels pay nothing where nothing is excluded. What else
+// lies at the very t of the excluded hit is passed through with it.
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,8 @@ struct RaysThatGoOn {
 
 /// `trace(rays, answers)` finds closest hits; Answer is Hit or ExactHit. One excluded primitive a ray.
 template <class Answer, class Trace>
-void trace_excluding(RayBatch rays, std::span<const std::uint32_t> excluded, std::span<Answer> answers, const Trace& trace) {
+void trace_excluding(RayBatch rays, std::span<const std::uint32_t> excluded, std::span<Answer> answers,
+                     const Trace& trace) {
   trace(rays, answers);
   const auto add_own = [&](RaysThatGoOn& next, Ray ray, std::size_t place) {
     const Hit& hit = hit_of(answers[place]);
@@ -66,12 +67,14 @@ void trace_excluding(RayBatch rays, std::span<const std::uint32_t> excluded, std
 }
 
 /// By a kernel. `counters`, where given, count all that is traced.
-void closest_hit_excluding(const KernelRow& kernel, const Accel& accel, RayBatch rays, std::span<const std::uint32_t> excluded,
-                           std::span<Hit> hits, Counters* counters = nullptr);
+void closest_hit_excluding(const KernelRow& kernel, const Accel& accel, RayBatch rays,
+                           std::span<const std::uint32_t> excluded, std::span<Hit> hits, Counters* counters = nullptr);
 /// Any hit. Its kernels do not say what they met, so rays that met something are traced again for their closest hit.
-void any_hit_excluding(const KernelRow& kernel, const Accel& accel, RayBatch rays, std::span<const std::uint32_t> excluded,
-                       std::span<std::uint8_t> occluded, Counters* counters = nullptr);
+void any_hit_excluding(const KernelRow& kernel, const Accel& accel, RayBatch rays,
+                       std::span<const std::uint32_t> excluded, std::span<std::uint8_t> occluded,
+                       Counters* counters = nullptr);
 /// The exact answers.
-[[nodiscard]] std::vector<ExactHit> closest_hit_excluding(const Oracle& oracle, RayBatch rays, std::span<const std::uint32_t> excluded);
+[[nodiscard]] std::vector<ExactHit> closest_hit_excluding(const Oracle& oracle, RayBatch rays,
+                                                          std::span<const std::uint32_t> excluded);
 
 }  // namespace arboretum

@@ -32,9 +32,10 @@ class SilentReporter final : public benchmark::BenchmarkReporter {
 }  // namespace
 
 void initialize_benchmark(const std::vector<std::string>& flags) {
-  // Its own warm-up would call a job like a repetition, with other iterations; cells are warmed up before. This goes before
-  // the environment's BENCHMARK_MIN_WARMUP_TIME.
-  std::vector<std::string> words{"arboretum", "--benchmark_enable_random_interleaving=true", "--benchmark_min_warmup_time=0"};
+  // Its own warm-up would call a job like a repetition, with other iterations; cells are warmed up before. This goes
+  // before the environment's BENCHMARK_MIN_WARMUP_TIME.
+  std::vector<std::string> words{"arboretum", "--benchmark_enable_random_interleaving=true",
+                                 "--benchmark_min_warmup_time=0"};
   words.insert(words.end(), flags.begin(), flags.end());
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -50,27 +51,26 @@ void run_interleaved(std::vector<InterleavedJob> jobs) {
   benchmark::ClearRegisteredBenchmarks();
   for (InterleavedJob& job : jobs) {
     if (job.indices.empty()) continue;
-    benchmark::RegisterBenchmark(
-        job.name.c_str(),
-        [&job, &thrown, done = std::size_t{0}](benchmark::State& state) mutable {
-          StateLoop loop(state);
-          // After an error the loops still run, empty: Google Benchmark insists on equal iterations of all
-          // repetitions.
-          const auto run_empty = [&loop] {
-            while (loop.next()) {
-            }
-          };
-          if (thrown) return run_empty();
-          try {
-            Repetition repetition = job.measure(loop);
-            repetition.index = job.indices.at(done++);
-            repetition.iterations = job.iterations;
-            job.ended(repetition);
-          } catch (...) {  // Google Benchmark is no place to throw through; rethrown below
-            thrown = std::current_exception();
-            run_empty();
-          }
-        })
+    benchmark::RegisterBenchmark(job.name.c_str(),
+                                 [&job, &thrown, done = std::size_t{0}](benchmark::State& state) mutable {
+                                   StateLoop loop(state);
+                                   // After an error the loops still run, empty: Google Benchmark insists on equal
+                                   // iterations of all repetitions.
+                                   const auto run_empty = [&loop] {
+                                     while (loop.next()) {
+                                     }
+                                   };
+                                   if (thrown) return run_empty();
+                                   try {
+                                     Repetition repetition = job.measure(loop);
+                                     repetition.index = job.indices.at(done++);
+                                     repetition.iterations = job.iterations;
+                                     job.ended(repetition);
+                                   } catch (...) {  // Google Benchmark is no place to throw through; rethrown below
+                                     thrown = std::current_exception();
+                                     run_empty();
+                                   }
+                                 })
         ->Iterations(static_cast<benchmark::IterationCount>(job.iterations))
         ->Repetitions(static_cast<int>(job.indices.size()))
         ->Unit(benchmark::kMillisecond);

@@ -7,9 +7,7 @@
 namespace arboretum {
 namespace {
 
-Json parse(const std::string& line) {
-  return Json::parse(line, nullptr, false);
-}
+Json parse(const std::string& line) { return Json::parse(line, nullptr, false); }
 
 }  // namespace
 
@@ -60,8 +58,6 @@ void Journal::add(const std::string& name, const Repetition& repetition) {
   repetitions_.append(line.dump());
 }
 
-void Journal::finish(const CellResult& result) {
-  cells_.append(cell_line(result, hash_).dump());
-}
+void Journal::finish(const CellResult& result) { cells_.append(cell_line(result, hash_).dump()); }
 
 }  // namespace arboretum

@@ -15,8 +15,8 @@ namespace arboretum {
 
 class Journal {
  public:
-  /// Opens the files in `folder`. With `resume`, takes up what they hold of `plan`, cells of `elsewhere` too; without, starts them
-  /// anew. Throws UserError when the folder holds another configuration's results, or cannot be written.
+  /// Opens the files in `folder`. With `resume`, takes up what they hold of `plan`, cells of `elsewhere` too; without,
+  /// starts them anew. Throws UserError when the folder holds another configuration's results, or cannot be written.
   Journal(std::filesystem::path folder, std::string configuration_hash, const Plan& plan, bool resume);
 
   /// Results of the cells that are done, by name.

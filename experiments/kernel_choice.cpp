@@ -22,7 +22,8 @@ Isa chosen_isa(const std::string& name, const Registry& registry) {
   if (name == kAuto) return registry.isas.back();
   const std::optional<Isa> isa = parse_isa(name);
   if (!isa) throw UserError(unknown_name_message("isa", name, known_values(Axis::isa, registry)));
-  if (!registry.has(*isa)) throw UserError(fmt::format("isa {} is not available here; the best is {}", name, to_string(registry.isas.back())));
+  if (!registry.has(*isa))
+    throw UserError(fmt::format("isa {} is not available here; the best is {}", name, to_string(registry.isas.back())));
   return *isa;
 }
 
@@ -31,15 +32,16 @@ const StructureEntry& chosen_structure(const std::string& name, const TriangleMe
   const StructureEntry* entry = registry.structure(wanted);
   if (!entry) throw UserError(fmt::format("this build has no structure {}", wanted));
   if (mesh.moves() && !entry->info.holds_motion)
-    throw UserError(fmt::format("{} holds one moment, and the scene moves: take bvh4_motion, or leave the effect motion_blur out", wanted));
+    throw UserError(fmt::format(
+        "{} holds one moment, and the scene moves: take bvh4_motion, or leave the effect motion_blur out", wanted));
   return *entry;
 }
 
 }  // namespace
 
 std::string BuiltKernel::name() const {
-  return fmt::format("{}/{}/{}/{}/{}/{}/{}", kernel->structure, builder, kernel->leaf, kernel->intersector, kernel->box, kernel->traversal,
-                     to_string(kernel->isa));
+  return fmt::format("{}/{}/{}/{}/{}/{}/{}", kernel->structure, builder, kernel->leaf, kernel->intersector, kernel->box,
+                     kernel->traversal, to_string(kernel->isa));
 }
 
 BuiltKernel build_kernel(const KernelChoice& choice, const TriangleMesh& mesh, const Registry& registry) {
@@ -67,7 +69,8 @@ BuiltKernel build_kernel(const KernelChoice& choice, const TriangleMesh& mesh, c
   }
   const std::vector<std::string_view>& builders = below ? below->info.builders : info.builders;
   built.builder = choice.builder == kAuto && !builders.empty() ? std::string(builders.front()) : choice.builder;
-  BuildSettings settings{.builder = built.builder, .leaf = leaf, .isa = isa, .threads = choice.threads, .parameters = {}};
+  BuildSettings settings{
+      .builder = built.builder, .leaf = leaf, .isa = isa, .threads = choice.threads, .parameters = {}};
   if (settings.threads == 0) settings.threads = std::max(1u, std::thread::hardware_concurrency());
   built.accel = registry.build(info.name, mesh, settings, built.report);
   return built;

@@ -1,5 +1,5 @@
-// KernelChoice: one row of the kernel table by names, `auto` filled in, and a structure built for it: what commands need that trace
-// with one combination alone.
+// KernelChoice: one row of the kernel table by names, `auto` filled in, and a structure built for it: what commands
+// need that trace with one combination alone.
 #pragma once
 
 #include <memory>
@@ -27,8 +27,8 @@ struct BuiltKernel {
   [[nodiscard]] std::string name() const;  ///< structure/builder/leaf/intersector/box/traversal/isa
 };
 
-/// Throws UserError for a name that does not exist (naming the nearest), for what does not go together, and where the machine lacks the
-/// instruction set. The mesh must outlive the structure.
+/// Throws UserError for a name that does not exist (naming the nearest), for what does not go together, and where the
+/// machine lacks the instruction set. The mesh must outlive the structure.
 [[nodiscard]] BuiltKernel build_kernel(const KernelChoice& choice, const TriangleMesh& mesh, const Registry& registry);
 
 }  // namespace arboretum

@@ -40,10 +40,8 @@ std::string first_line(const char* path) {
 /// Output of git in the folder; empty when there is no git or no repository. Arguments are constants of ours.
 std::string git(const std::filesystem::path& folder, const std::string& arguments) {
   std::string quoted = folder.string();
-  for (std::size_t i = 0; (i = quoted.find('\'', i)) != std::string::npos; i += 4)
-    quoted.replace(i, 1, "'\\''");
-  const std::string command =
-      fmt::format("git -c safe.directory='*' -C '{}' {} 2>/dev/null", quoted, arguments);
+  for (std::size_t i = 0; (i = quoted.find('\'', i)) != std::string::npos; i += 4) quoted.replace(i, 1, "'\\''");
+  const std::string command = fmt::format("git -c safe.directory='*' -C '{}' {} 2>/dev/null", quoted, arguments);
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
   std::string text;
   char buffer[256];
@@ -57,8 +55,9 @@ struct Revision {
   bool dirty = false;
 };
 
-/// Of what was compiled: of the sources that the program's own build tree links to, else what was written down when it was installed. Only a
-/// program that has neither beside it (one with structures of its own) asks the folder that ARBORETUM_DATA names.
+/// Of what was compiled: of the sources that the program's own build tree links to, else what was written down when it
+/// was installed. Only a program that has neither beside it (one with structures of its own) asks the folder that
+/// ARBORETUM_DATA names.
 Revision revision() {
   const std::filesystem::path own = program_data_folder(), data = own.empty() ? data_folder() : own;
   Revision r;
@@ -76,8 +75,7 @@ Revision revision() {
 
 }  // namespace
 
-Json machine_context(const Experiment& experiment, const std::string& configuration_hash,
-                     const std::string& command) {
+Json machine_context(const Experiment& experiment, const std::string& configuration_hash, const std::string& command) {
   Json context = Json::object();
   const std::time_t now = std::time(nullptr);
   const benchmark::CPUInfo& cpu = benchmark::CPUInfo::Get();
@@ -89,10 +87,8 @@ Json machine_context(const Experiment& experiment, const std::string& configurat
   context["cpu_scaling_enabled"] = cpu.scaling == benchmark::CPUInfo::ENABLED;
   Json& caches = context["caches"] = Json::array();
   for (const auto& cache : cpu.caches) {
-    caches.push_back({{"type", cache.type},
-                      {"level", cache.level},
-                      {"size", cache.size},
-                      {"num_sharing", cache.num_sharing}});
+    caches.push_back(
+        {{"type", cache.type}, {"level", cache.level}, {"size", cache.size}, {"num_sharing", cache.num_sharing}});
   }
   context["load_avg"] = cpu.load_avg;
 
@@ -106,8 +102,8 @@ Json machine_context(const Experiment& experiment, const std::string& configurat
   const std::string governor = first_line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
   context["governor"] = governor.empty() ? "unknown" : governor;
   context["load"] = first_line("/proc/loadavg");
-  context["memory_bytes"] = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
-                            static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
+  context["memory_bytes"] =
+      static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
   utsname system{};
   if (::uname(&system) == 0)
     context["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);

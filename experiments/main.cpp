@@ -1,5 +1,3 @@
 #include "experiments/command_line.h"
 
-int main(int argc, char** argv) {
-  return arboretum::command_line(argc, argv);
-}
+int main(int argc, char** argv) { return arboretum::command_line(argc, argv); }

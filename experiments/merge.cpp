@@ -38,26 +38,36 @@ std::string first_difference(const ResultFolder& a, const ResultFolder& b) {
 
 void refuse_different_configurations(const ResultFolder& first, const ResultFolder& part) {
   if (part.configuration_hash == first.configuration_hash) return;
-  const auto hash = [](const ResultFolder& f) { return f.configuration_hash.empty() ? "unknown" : f.configuration_hash; };
-  throw UserError(fmt::format("{} and {} are of different configurations (hashes {} and {}){}; merge parts of one configuration, or `compare` the two",
-                              first.path.string(), part.path.string(), hash(first), hash(part), first_difference(first, part)));
+  const auto hash = [](const ResultFolder& f) {
+    return f.configuration_hash.empty() ? "unknown" : f.configuration_hash;
+  };
+  throw UserError(
+      fmt::format("{} and {} are of different configurations (hashes {} and {}){}; merge parts of one configuration, "
+                  "or `compare` the two",
+                  first.path.string(), part.path.string(), hash(first), hash(part), first_difference(first, part)));
 }
 
 std::string revision(const ResultFolder& part) {
-  return part.context_text("git_revision").substr(0, 12) + (part.context.value("git_dirty", false) ? " with changes" : "");
+  return part.context_text("git_revision").substr(0, 12) +
+         (part.context.value("git_dirty", false) ? " with changes" : "");
 }
 
 /// What machine and build of the part differ by from the first part's, told and refused or allowed.
-void check_machine(const ResultFolder& first, const ResultFolder& part, const MergeOptions& options, std::vector<std::string>& warnings) {
+void check_machine(const ResultFolder& first, const ResultFolder& part, const MergeOptions& options,
+                   std::vector<std::string>& warnings) {
   const std::vector<std::string> machine = machine_differences(first.context, part.context);
   if (!machine.empty()) {
-    const std::string what = fmt::format("{} and {} were measured on different machines or builds ({})", first.path.string(), part.path.string(), fmt::join(machine, "; "));
-    if (!options.allow_different_machines) throw UserError(what + "; their times do not compare; --allow-different-machines merges them all the same");
+    const std::string what = fmt::format("{} and {} were measured on different machines or builds ({})",
+                                         first.path.string(), part.path.string(), fmt::join(machine, "; "));
+    if (!options.allow_different_machines)
+      throw UserError(what + "; their times do not compare; --allow-different-machines merges them all the same");
     warnings.push_back(what + "; compare times only within the same `part`");
   }
   if (revision(first) != revision(part)) {
-    const std::string what = fmt::format("{} is of revision {} and {} of {}", first.path.string(), revision(first), part.path.string(), revision(part));
-    if (!options.allow_different_revisions) throw UserError(what + "; --allow-different-revisions merges them all the same");
+    const std::string what = fmt::format("{} is of revision {} and {} of {}", first.path.string(), revision(first),
+                                         part.path.string(), revision(part));
+    if (!options.allow_different_revisions)
+      throw UserError(what + "; --allow-different-revisions merges them all the same");
     warnings.push_back(what);
   }
 }
@@ -70,11 +80,13 @@ void refuse_doubled_cells(const std::vector<ResultFolder>& parts) {
     for (const CellResult& cell : part.cells) {
       const auto [owner, fresh] = owners.try_emplace(cell.cell.name(), &part);
       if (fresh) continue;
-      if (doubled++ == 0) first = fmt::format("{} is in both {} and {}", owner->first, owner->second->path.string(), part.path.string());
+      if (doubled++ == 0)
+        first = fmt::format("{} is in both {} and {}", owner->first, owner->second->path.string(), part.path.string());
     }
   }
   if (doubled > 0)
-    throw UserError(fmt::format("{}{}; each cell may be in one part alone: leave one of the folders out", first, doubled > 1 ? fmt::format(", as are {} more", doubled - 1) : ""));
+    throw UserError(fmt::format("{}{}; each cell may be in one part alone: leave one of the folders out", first,
+                                doubled > 1 ? fmt::format(", as are {} more", doubled - 1) : ""));
 }
 
 /// The command without what made it a part of the whole.
@@ -99,13 +111,15 @@ Json merged_context(const std::vector<ResultFolder>& parts, const std::string& c
   Json from = Json::array();
   for (const ResultFolder& part : parts) {
     commands.insert(whole_command(part.context_text("command")));
-    Json& entry = from.emplace_back(Json{{"part", from.size() + 1}, {"folder", part.path.string()}, {"cells", part.cells.size()}});
+    Json& entry = from.emplace_back(
+        Json{{"part", from.size() + 1}, {"folder", part.path.string()}, {"cells", part.cells.size()}});
     for (const char* key : {"shard", "date", "host_name", "cpu", "git_revision", "command"})
       if (part.context.contains(key)) entry[key] = part.context[key];
   }
   context["command"] = commands.size() == 1 ? *commands.begin() : command;
   // What differs is named with all its values, so that it equals no single machine's.
-  for (const char* key : {"host_name", "cpu", "cores", "governor", "isa", "compiler", "compiler_flags", "build_type", "version", "git_revision", "git_dirty"}) {
+  for (const char* key : {"host_name", "cpu", "cores", "governor", "isa", "compiler", "compiler_flags", "build_type",
+                          "version", "git_revision", "git_dirty"}) {
     std::vector<std::string> values;
     for (const ResultFolder& part : parts)
       if (std::ranges::find(values, part.context_text(key)) == values.end()) values.push_back(part.context_text(key));
@@ -140,7 +154,8 @@ class WholePlan {
   void place_skipped() {
     for (const PlanRecord::Entry& entry : merged_.record.skipped) {
       const auto found = reasons_.find(entry.name);
-      if (found != reasons_.end() || !planned_.contains(entry.name)) skip(entry.name, found != reasons_.end() ? found->second : entry.reason);
+      if (found != reasons_.end() || !planned_.contains(entry.name))
+        skip(entry.name, found != reasons_.end() ? found->second : entry.reason);
     }
     for (const ResultFolder& part : parts_)
       for (const SkippedCell& cell : part.skipped)
@@ -194,7 +209,9 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
   bool one_machine = true;
   for (const ResultFolder& part : parts) {
     if (part.lines.size() != part.cells.size())
-      throw UserError(fmt::format("{}: has no cells.jsonl, which holds what merge joins; give the folder that `run` wrote", part.path.string()));
+      throw UserError(
+          fmt::format("{}: has no cells.jsonl, which holds what merge joins; give the folder that `run` wrote",
+                      part.path.string()));
     if (&part == &parts.front()) continue;
     refuse_different_configurations(parts.front(), part);
     check_machine(parts.front(), part, options, merged.outcome.warnings);
@@ -214,10 +231,12 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
       merged.outcome.results[i].facts["part"] = part, merged.lines[i]["part"] = part;
     }
   }
-  Plan measured{.cells = {}, .skipped = merged.plan.skipped, .excluded = 0, .filtered = 0, .in_other_shards = 0, .elsewhere = {}};
+  Plan measured{
+      .cells = {}, .skipped = merged.plan.skipped, .excluded = 0, .filtered = 0, .in_other_shards = 0, .elsewhere = {}};
   for (const CellResult& result : merged.outcome.results) measured.cells.push_back(result.cell);
   const Json cores = parts.front().context.value("cores", Json());
-  const std::vector<std::string> usual = machine_warnings(merged.outcome, measured, cores.is_number() ? cores.get<unsigned>() : ~0u);
+  const std::vector<std::string> usual =
+      machine_warnings(merged.outcome, measured, cores.is_number() ? cores.get<unsigned>() : ~0u);
   merged.outcome.warnings.insert(merged.outcome.warnings.end(), usual.begin(), usual.end());
   return merged;
 }
@@ -227,9 +246,11 @@ std::string missing_line(const Merged& merged) {
   std::map<unsigned, std::size_t> counts;
   for (const PlanRecord::Entry& entry : merged.missing) ++counts[entry.shard];
   std::vector<std::string> shards;
-  for (const auto& [index, count] : counts) shards.push_back(fmt::format("{} of shard {}/{}", count, index, merged.shards));
+  for (const auto& [index, count] : counts)
+    shards.push_back(fmt::format("{} of shard {}/{}", count, index, merged.shards));
   const std::string where = merged.shards > 1 ? fmt::format(": {}", fmt::join(shards, ", ")) : "";
-  return fmt::format("{} of {} cells of the plan are in none of the parts{}", merged.missing.size(), merged.record.cells.size(), where);
+  return fmt::format("{} of {} cells of the plan are in none of the parts{}", merged.missing.size(),
+                     merged.record.cells.size(), where);
 }
 
 }  // namespace arboretum

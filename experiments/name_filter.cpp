@@ -11,9 +11,8 @@ std::regex compile(const std::string& expression, std::string_view option) {
   try {
     return std::regex(expression);
   } catch (const std::regex_error&) {
-    throw UserError(
-        fmt::format("{} '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes",
-                    option, expression));
+    throw UserError(fmt::format("{} '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes",
+                                option, expression));
   }
 }
 

@@ -46,14 +46,25 @@ const std::vector<Field>& fields() {
       {.name = "bins", .low = 4, .high = 64, .integer = &BuilderParameters::bins},
       {.name = "traversal_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::traversal_cost},
       {.name = "intersection_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::intersection_cost},
-      {.name = "max_leaf_blocks", .low = 1, .high = bvh::kMaxLeafBlocks, .integer = &BuilderParameters::max_leaf_blocks},
-      {.name = "morton_bits", .low = 30, .high = 63, .integer = &BuilderParameters::morton_bits, .choices = kMortonBits},
+      {.name = "max_leaf_blocks",
+       .low = 1,
+       .high = bvh::kMaxLeafBlocks,
+       .integer = &BuilderParameters::max_leaf_blocks},
+      {.name = "morton_bits",
+       .low = 30,
+       .high = 63,
+       .integer = &BuilderParameters::morton_bits,
+       .choices = kMortonBits},
       {.name = "ploc_radius", .low = 1, .high = 128, .integer = &BuilderParameters::ploc_radius},
       {.name = "duplication_budget", .low = 0, .high = 4, .real = &BuilderParameters::duplication_budget},
       {.name = "spatial_overlap", .low = 0, .high = 1, .real = &BuilderParameters::spatial_overlap},
       {.name = "spatial_gain", .low = 0.01, .high = 1, .real = &BuilderParameters::spatial_gain},
       {.name = "reinsertion_rounds", .low = 1, .high = 64, .integer = &BuilderParameters::reinsertion_rounds},
-      {.name = "reinsertion_top", .low = 0, .high = 65536, .integer = &BuilderParameters::reinsertion_top, .has_own = true},
+      {.name = "reinsertion_top",
+       .low = 0,
+       .high = 65536,
+       .integer = &BuilderParameters::reinsertion_top,
+       .has_own = true},
       {.name = "empty_bonus", .low = 0, .high = 0.95, .real = &BuilderParameters::empty_bonus},
       {.name = "max_depth", .low = 0, .high = 63, .integer = &BuilderParameters::max_depth},
       {.name = "grid_density", .low = 0.01, .high = 64, .real = &BuilderParameters::grid_density},
@@ -80,8 +91,7 @@ template <class T>
 bool parse_within(const std::string& text, double low, double high, T& out) {
   T value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high))
-    return false;
+  if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high)) return false;
   out = value;
   return true;
 }
@@ -127,7 +137,8 @@ std::string set_parameter(Parameters& all, std::string_view name, const std::str
 bool is_of_traversal(std::string_view name) { return field(name).setting != nullptr; }
 
 bool concerns(std::string_view name, std::string_view traversal) {
-  return name == "hybrid_threshold" ? traversal.starts_with("hybrid") : name == "rays_in_flight" && traversal == "queued";
+  return name == "hybrid_threshold" ? traversal.starts_with("hybrid")
+                                    : name == "rays_in_flight" && traversal == "queued";
 }
 
 void reset_parameter(BuilderParameters& parameters, std::string_view name) {
@@ -153,7 +164,8 @@ std::vector<ParameterPoint> parameter_points(const ParameterSweep& sweep) {
       for (const std::string& value : values) {
         next.push_back(point);
         (void)set_parameter(next.back().parameters, name, value);
-        if (values.size() > 1) (is_of_traversal(name) ? next.back().traversal_label : next.back().label) += ":" + name + "=" + value;
+        if (values.size() > 1)
+          (is_of_traversal(name) ? next.back().traversal_label : next.back().label) += ":" + name + "=" + value;
       }
     }
     points = std::move(next);

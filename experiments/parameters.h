@@ -1,5 +1,5 @@
-// Parameters by name, of builders and of ways of traversal: what the YAML's `parameters:` may hold, one table for reading,
-// defaults and cell names.
+// Parameters by name, of builders and of ways of traversal: what the YAML's `parameters:` may hold, one table for
+// reading, defaults and cell names.
 #pragma once
 
 #include <map>

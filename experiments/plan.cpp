@@ -15,8 +15,8 @@
 namespace arboretum {
 
 std::string Cell::name() const {
-  return fmt::format("{}/{}/{}/{}/{}/{}/{}/{}/{}/{}/threads:{}", to_string(metric), scene, structure,
-                     builder_name(), leaf, intersector, box, traversal_name(), to_string(isa), workload_name(), threads);
+  return fmt::format("{}/{}/{}/{}/{}/{}/{}/{}/{}/{}/threads:{}", to_string(metric), scene, structure, builder_name(),
+                     leaf, intersector, box, traversal_name(), to_string(isa), workload_name(), threads);
 }
 
 namespace {
@@ -27,8 +27,7 @@ bool contains(const std::vector<std::string>& list, std::string_view value) {
 
 class Planner {
  public:
-  Planner(const Experiment& experiment, const Registry& registry)
-      : experiment_(experiment), registry_(registry) {
+  Planner(const Experiment& experiment, const Registry& registry) : experiment_(experiment), registry_(registry) {
     points_ = parameter_points(experiment.parameters);
   }
 
@@ -71,14 +70,16 @@ class Planner {
                           cell.parameters = point.parameters.builder, cell.parameter_label = point.label;
                           cell.settings = point.parameters.traversal, cell.setting_label = point.traversal_label;
                           cell.start = {start, experiment_.rays.epsilon};
-                          if (starts_of(workload).size() > 1) cell.start_label = fmt::format(":self_intersection={}", to_string(start));
+                          if (starts_of(workload).size() > 1)
+                            cell.start_label = fmt::format(":self_intersection={}", to_string(start));
                           add(std::move(cell), out);
                         }
   }
 
   /// The ways of leaving a surface that make cells of the workload; the usual one for rays that start elsewhere.
   std::vector<SelfIntersection> starts_of(const std::string& workload) const {
-    return starts_on_surfaces(workload) ? experiment_.rays.self_intersection : std::vector{SelfIntersection::error_bound};
+    return starts_on_surfaces(workload) ? experiment_.rays.self_intersection
+                                        : std::vector{SelfIntersection::error_bound};
   }
 
   /// `all` is each builder of the structure; one that is named beside it does not come twice.
@@ -100,7 +101,8 @@ class Planner {
     keep_settings(cell);
     cell.box = std::string(resolve_box(cell.box, cell.intersector));
     // What stands above another structure takes that one's defaults.
-    const StructureEntry* below = entry && entry->info.takes_below ? registry_.structure(cell.parameters.below) : nullptr;
+    const StructureEntry* below =
+        entry && entry->info.takes_below ? registry_.structure(cell.parameters.below) : nullptr;
     if (cell.builder == kAuto) {
       const StructureEntry* of = below ? below : entry;
       cell.builder = of && !of->info.builders.empty() ? of->info.builders.front() : kNone;
@@ -123,7 +125,8 @@ class Planner {
     }
   }
 
-  bool reads(const std::string& parameter, const std::string& structure, const std::string& builder, const std::string& below) {
+  bool reads(const std::string& parameter, const std::string& structure, const std::string& builder,
+             const std::string& below) {
     const auto [known, is_new] = reads_.try_emplace({parameter, structure, builder, below}, false);
     if (is_new) known->second = registry_.reads(parameter, structure, builder, below);
     return known->second;
@@ -148,7 +151,8 @@ class Planner {
   }
 
   static bool names_scene(const CellChoice& choice, const SceneChoice& scene) {
-    return choice.scenes.empty() || std::ranges::any_of(choice.scenes, [&](const std::string& word) { return scene.is_called(word); });
+    return choice.scenes.empty() ||
+           std::ranges::any_of(choice.scenes, [&](const std::string& word) { return scene.is_called(word); });
   }
 
   bool matches(const CellChoice& choice, const Cell& cell) const {
@@ -188,14 +192,17 @@ class Planner {
     ++added_;
     traversals_.insert(cell.traversal);
     for (const auto& [parameter, where] : experiment_.parameter_places)
-      if (!is_of_traversal(parameter) && reads(parameter, cell.structure, cell.builder, cell.parameters.below)) parameters_read_.insert(parameter);
-    const std::string never = why_impossible(cell, experiment_.scenes[cell.scene_index].moves, registry_), here = lacking(cell);
+      if (!is_of_traversal(parameter) && reads(parameter, cell.structure, cell.builder, cell.parameters.below))
+        parameters_read_.insert(parameter);
+    const std::string never = why_impossible(cell, experiment_.scenes[cell.scene_index].moves, registry_),
+                      here = lacking(cell);
     cell.metric = Cell::Metric::trace;
     if (never.empty() && here.empty()) {
       out.push_back(std::move(cell));
       return;
     }
-    const bool missing = !experiment_.scenes[cell.scene_index].missing.empty();  // said first, whatever else is the matter
+    // Said first, whatever else is the matter
+    const bool missing = !experiment_.scenes[cell.scene_index].missing.empty();
     plan_.skipped.push_back({std::move(name), never.empty() || missing ? here : never});
     if (never.empty()) elsewhere_.push_back(std::move(cell));
   }
@@ -271,12 +278,14 @@ class Planner {
     for (const auto& [name, where] : experiment_.parameter_places) {
       if (!is_of_traversal(name)) {
         if (parameters_read_.contains(name)) continue;
-        throw UserError(fmt::format("{}: {} has no effect: no cell's builder reads it, only {}; add one to the axes, or take it out", where, name,
-                                    registry_.readers_of(name)));
+        throw UserError(fmt::format(
+            "{}: {} has no effect: no cell's builder reads it, only {}; add one to the axes, or take it out", where,
+            name, registry_.readers_of(name)));
       }
       if (std::ranges::any_of(traversals_, [&key = name](const std::string& t) { return concerns(key, t); })) continue;
-      throw UserError(fmt::format("{}: {} has no effect: no cell's traversal is {}; add one to the axis, or take it out", where, name,
-                                  name == "rays_in_flight" ? "queued" : "a hybrid"));
+      throw UserError(
+          fmt::format("{}: {} has no effect: no cell's traversal is {}; add one to the axis, or take it out", where,
+                      name, name == "rays_in_flight" ? "queued" : "a hybrid"));
     }
   }
 
@@ -293,9 +302,7 @@ class Planner {
 
 }  // namespace
 
-Plan make_plan(const Experiment& experiment, const Registry& registry) {
-  return Planner(experiment, registry).run();
-}
+Plan make_plan(const Experiment& experiment, const Registry& registry) { return Planner(experiment, registry).run(); }
 
 void apply_filter(Plan& plan, const std::string& filter, const std::string& skip) {
   const std::size_t before = plan.cells.size();

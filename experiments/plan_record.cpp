@@ -52,9 +52,11 @@ void keep_measured(Plan& plan, PlanRecord& record, const Plan& whole, const std:
       const bool now = wanted.contains(name), before = !now && done.contains(name);
       if (before) kept.insert(name);
       if (now || before) cells.push_back(cell);
-      if (before || recorded.contains(name)) entries.push_back({name, before ? record.shard.index : recorded.at(name), ""});
+      if (before || recorded.contains(name))
+        entries.push_back({name, before ? record.shard.index : recorded.at(name), ""});
       if (before && !recorded.contains(name) && list == &whole.cells && plan.filtered > 0) --plan.filtered;
-      if (before && recorded.contains(name) && recorded.at(name) != record.shard.index && plan.in_other_shards > 0) --plan.in_other_shards;
+      if (before && recorded.contains(name) && recorded.at(name) != record.shard.index && plan.in_other_shards > 0)
+        --plan.in_other_shards;
     }
   }
   std::erase_if(plan.skipped, [&](const SkippedCell& cell) { return kept.contains(cell.name); });
@@ -87,7 +89,8 @@ std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) 
     record.cells = entries_of(json.at("cells")), record.skipped = entries_of(json.at("skipped"));
     return record;
   } catch (const nlohmann::json::exception& e) {
-    throw UserError(fmt::format("{}: not the JSON that `run` writes ({}); copy the folder anew, or measure again", (folder / kPlanFile).string(), e.what()));
+    throw UserError(fmt::format("{}: not the JSON that `run` writes ({}); copy the folder anew, or measure again",
+                                (folder / kPlanFile).string(), e.what()));
   }
 }
 

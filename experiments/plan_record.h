@@ -1,5 +1,6 @@
-// plan.json: what a run set out to do, written before it measures: the cells of the plan with the shard that each is in, the
-// skipped ones with their reasons, and the machine. `merge` tells by it what is missing, `compare` where a run that was cut off ran.
+// plan.json: what a run set out to do, written before it measures: the cells of the plan with the shard that each is
+// in, the skipped ones with their reasons, and the machine. `merge` tells by it what is missing, `compare` where a run
+// that was cut off ran.
 #pragma once
 
 #include <filesystem>
@@ -20,7 +21,7 @@ struct PlanRecord {
     unsigned shard = 1;
     std::string reason;  ///< of a skipped cell
   };
-  Shard shard;  ///< the one that was run
+  Shard shard;               ///< the one that was run
   std::string filter, skip;  ///< --filter and --skip
   std::size_t excluded = 0, filtered = 0;
   std::vector<Entry> cells, skipped;  ///< of all shards, in the plan's order
@@ -33,8 +34,9 @@ inline constexpr const char* kPlanFile = "plan.json";
 /// `plan` is whole: not yet one shard alone.
 [[nodiscard]] PlanRecord record_of(const Plan& plan, const std::map<std::string, unsigned>& shards, const Shard& shard);
 
-/// Takes up what a run that is gone on with has measured already and this one, by its filter or on its machine, would not: cells of
-/// `whole`, the plan before the filter, among them those of `elsewhere`. They keep their places in the plan's order.
+/// Takes up what a run that is gone on with has measured already and this one, by its filter or on its machine, would
+/// not: cells of `whole`, the plan before the filter, among them those of `elsewhere`. They keep their places in the
+/// plan's order.
 void keep_measured(Plan& plan, PlanRecord& record, const Plan& whole, const std::map<std::string, CellResult>& done);
 
 [[nodiscard]] std::string to_text(const PlanRecord& record);

@@ -42,7 +42,10 @@ std::string chosen_python() {
 }
 
 std::string python_problem() {
-  return fmt::format("ARBORETUM_PYTHON is '{}', which cannot be started or has no matplotlib and numpy; name an interpreter that has them, or unset it", chosen_python());
+  return fmt::format(
+      "ARBORETUM_PYTHON is '{}', which cannot be started or has no matplotlib and numpy; name an interpreter that has "
+      "them, or unset it",
+      chosen_python());
 }
 
 /// Runs a script of plots/ with its arguments. One line that says why not, or empty.
@@ -51,7 +54,8 @@ std::string run_script(const char* name, const std::vector<std::string>& argumen
   if (!std::filesystem::exists(script)) return fmt::format("no plots: {} is missing; install again", script.string());
   const std::optional<std::string> python = find_plot_python();
   if (!python && !chosen_python().empty()) return python_problem();
-  if (!python) return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the results";
+  if (!python)
+    return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the results";
   std::vector<std::string> words{*python, script.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   const int status = run_program(words, quiet, false);
@@ -75,8 +79,7 @@ void require_chosen_python() {
   if (!chosen_python().empty() && !find_plot_python()) throw UserError(python_problem());
 }
 
-std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures,
-                       bool quiet) {
+std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures, bool quiet) {
   std::vector<std::string> words{results.string()};
   if (!figures.empty()) words.insert(words.end(), {"--only", fmt::format("{}", fmt::join(figures, ","))});
   return run_script("plot.py", words, quiet);

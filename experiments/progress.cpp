@@ -28,21 +28,15 @@ std::string format_duration(double seconds) {
 }
 
 Progress::Progress(std::size_t cells, std::size_t units)
-    : terminal_(::isatty(STDERR_FILENO) == 1),
-      cells_(cells),
-      units_(std::max<std::size_t>(units, 1)),
-      begin_(wall_seconds()),
-      said_(begin_) {}
+    : terminal_(::isatty(STDERR_FILENO) == 1), cells_(cells), units_(std::max<std::size_t>(units, 1)),
+      begin_(wall_seconds()), said_(begin_) {}
 
-Progress::~Progress() {
-  wipe();
-}
+Progress::~Progress() { wipe(); }
 
 std::string Progress::time_left() const {
   if (units_done_ == 0) return "";
   const double elapsed = wall_seconds() - begin_;
-  return format_duration(elapsed / static_cast<double>(units_done_) *
-                         static_cast<double>(units_ - units_done_)) +
+  return format_duration(elapsed / static_cast<double>(units_done_) * static_cast<double>(units_ - units_done_)) +
          " left";
 }
 
@@ -53,7 +47,8 @@ void Progress::wipe() {
 /// A plain line where none has been written for long: preparing many structures takes minutes.
 void Progress::say_where() {
   constexpr double kSilence = 30.0;
-  if (wall_seconds() - said_ > kSilence) note(fmt::format("[{}/{}] {} is under way  {}", cells_done_, cells_, cell_, time_left()));
+  if (wall_seconds() - said_ > kSilence)
+    note(fmt::format("[{}/{}] {} is under way  {}", cells_done_, cells_, cell_, time_left()));
 }
 
 void Progress::draw() {

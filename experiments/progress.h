@@ -1,5 +1,5 @@
-// Progress: on a terminal a bar with the cell's name and the time left, else plain lines, one a cell and one in half a minute at least while
-// cells are under way. Goes to stderr.
+// Progress: on a terminal a bar with the cell's name and the time left, else plain lines, one a cell and one in half a
+// minute at least while cells are under way. Goes to stderr.
 #pragma once
 
 #include <cstddef>

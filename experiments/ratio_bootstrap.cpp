@@ -15,7 +15,8 @@ std::uint64_t seed_of(const std::string& name) {
   return hash;
 }
 
-double resampled_median(const std::vector<double>& values, std::uint64_t seed, std::size_t i, std::vector<double>& picked) {
+double resampled_median(const std::vector<double>& values, std::uint64_t seed, std::size_t i,
+                        std::vector<double>& picked) {
   picked.resize(values.size());
   for (std::size_t j = 0; j < values.size(); ++j)
     picked[j] = values[static_cast<std::size_t>(random_double(seed, i, j) * static_cast<double>(values.size()))];

@@ -12,8 +12,10 @@ namespace arboretum {
 inline constexpr std::size_t kResamples = 2000;
 using Replicates = std::vector<double>;  ///< logarithms of ratios, kResamples of them
 
-/// Logarithms of the ratio of the medians, b's to a's, of samples drawn anew from both. The same for a name and its values whatever else is compared.
-[[nodiscard]] Replicates log_ratios(const std::string& name, const std::vector<double>& a, const std::vector<double>& b);
+/// Logarithms of the ratio of the medians, b's to a's, of samples drawn anew from both. The same for a name and its
+/// values whatever else is compared.
+[[nodiscard]] Replicates log_ratios(const std::string& name, const std::vector<double>& a,
+                                    const std::vector<double>& b);
 
 /// The ratio, and the 2.5 and 97.5 percentiles of its replicates.
 [[nodiscard]] Interval ratio_interval(double log_centre, Replicates logs);

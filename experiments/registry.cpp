@@ -10,26 +10,23 @@
 namespace arboretum {
 
 const StructureEntry* Registry::structure(std::string_view name) const {
-  const auto found =
-      std::ranges::find_if(structures, [&](const StructureEntry& e) { return e.info.name == name; });
+  const auto found = std::ranges::find_if(structures, [&](const StructureEntry& e) { return e.info.name == name; });
   return found == structures.end() ? nullptr : &*found;
 }
 
-const KernelRow* Registry::kernel(std::string_view structure, std::string_view leaf,
-                                  std::string_view intersector, std::string_view box,
-                                  std::string_view traversal, Isa isa) const {
+const KernelRow* Registry::kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
+                                  std::string_view box, std::string_view traversal, Isa isa) const {
   const auto found = std::ranges::find_if(kernels, [&](const KernelRow& row) {
-    return row.structure == structure && row.leaf == leaf && row.intersector == intersector &&
-           row.box == box && row.traversal == traversal && row.isa == isa;
+    return row.structure == structure && row.leaf == leaf && row.intersector == intersector && row.box == box &&
+           row.traversal == traversal && row.isa == isa;
   });
   return found == kernels.end() ? nullptr : &*found;
 }
 
-bool Registry::has(Isa isa) const {
-  return std::ranges::find(isas, isa) != isas.end();
-}
+bool Registry::has(Isa isa) const { return std::ranges::find(isas, isa) != isas.end(); }
 
-bool Registry::reads(std::string_view parameter, std::string_view name, std::string_view builder, std::string_view below) const {
+bool Registry::reads(std::string_view parameter, std::string_view name, std::string_view builder,
+                     std::string_view below) const {
   const StructureEntry* entry = structure(name);
   if (!entry || !entry->info.uses_parameters) return false;
   const auto read = parameters_read ? parameters_read(name, builder, below) : std::nullopt;
@@ -45,7 +42,8 @@ std::string Registry::readers_of(std::string_view parameter) const {
     for (std::string_view builder : entry.info.builders)
       if (reads(parameter, entry.info.name, builder, "")) builders.push_back(builder);
     if (builders.empty()) continue;
-    const std::string key = builders.size() == entry.info.builders.size() ? "" : fmt::format("{}", fmt::join(builders, ", "));
+    const std::string key =
+        builders.size() == entry.info.builders.size() ? "" : fmt::format("{}", fmt::join(builders, ", "));
     const auto group = std::ranges::find(groups, key, &std::pair<std::string, std::string>::first);
     if (group == groups.end())
       groups.emplace_back(key, entry.info.name);

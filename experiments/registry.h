@@ -27,18 +27,20 @@ struct Registry {
   std::function<std::unique_ptr<Accel>(std::string_view structure, const TriangleMesh&, const BuildSettings&,
                                        BuildReport&)>
       build;
-  /// Names of what a structure's builder reads of BuilderParameters (structures/parameters_read.h); nullopt: it does not say. Left empty: none says.
-  std::function<std::optional<std::vector<std::string_view>>(std::string_view structure, std::string_view builder, std::string_view below)>
+  /// Names of what a structure's builder reads of BuilderParameters (structures/parameters_read.h); nullopt: it does
+  /// not say. Left empty: none says.
+  std::function<std::optional<std::vector<std::string_view>>(std::string_view structure, std::string_view builder,
+                                                             std::string_view below)>
       parameters_read;
 
   /// nullptr where there is none.
   [[nodiscard]] const StructureEntry* structure(std::string_view name) const;
-  [[nodiscard]] const KernelRow* kernel(std::string_view structure, std::string_view leaf,
-                                        std::string_view intersector, std::string_view box,
-                                        std::string_view traversal, Isa isa) const;
+  [[nodiscard]] const KernelRow* kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
+                                        std::string_view box, std::string_view traversal, Isa isa) const;
   [[nodiscard]] bool has(Isa isa) const;
   /// Whether a structure that is there reads the builder parameter; one that does not say does.
-  [[nodiscard]] bool reads(std::string_view parameter, std::string_view structure, std::string_view builder, std::string_view below) const;
+  [[nodiscard]] bool reads(std::string_view parameter, std::string_view structure, std::string_view builder,
+                           std::string_view below) const;
   /// Who reads the builder parameter: "ploc (bvh2, bvh4); kdtree, octree", the latter with any builder.
   [[nodiscard]] std::string readers_of(std::string_view parameter) const;
 };

@@ -1,5 +1,5 @@
-// RenderJob: one cell of a renderer's workload made ready to be timed: its answers to the recorded rays are checked and its work on
-// them counted, and the number of pictures that fill a repetition is set.
+// RenderJob: one cell of a renderer's workload made ready to be timed: its answers to the recorded rays are checked and
+// its work on them counted, and the number of pictures that fill a repetition is set.
 #pragma once
 
 #include "experiments/rendered_rays.h"

@@ -13,7 +13,8 @@ constexpr std::array<std::string_view, 2> kNames{"whitted", "path"};
 /// The oracle in a structure's place. Keeps the rays that it is asked and its answers, in order; one thread at a time.
 class RecordingOracle : public Accel {
  public:
-  RecordingOracle(const Oracle& oracle, Workload& closest, Workload& any, std::vector<ExactHit>& closest_truth, std::vector<std::uint8_t>& any_truth)
+  RecordingOracle(const Oracle& oracle, Workload& closest, Workload& any, std::vector<ExactHit>& closest_truth,
+                  std::vector<std::uint8_t>& any_truth)
       : oracle_(oracle), closest_(closest), any_(any), closest_truth_(closest_truth), any_truth_(any_truth) {}
 
   [[nodiscard]] static KernelRow row() {
@@ -62,7 +63,8 @@ Scene for_whole_mesh(const Scene& scene, Vec3d light) {
   Scene ready = scene;
   for (Material& m : ready.materials)
     if (is_invisible(m)) m = Material{.name = m.name, .opacity = 0.0f};
-  if (!is_lit(called_for(effects_of(ready)))) ready.lights = {Light{.position = to_float(light), .intensity = {1, 1, 1}}};
+  if (!is_lit(called_for(effects_of(ready))))
+    ready.lights = {Light{.position = to_float(light), .intensity = {1, 1, 1}}};
   return ready;
 }
 
@@ -72,17 +74,23 @@ std::span<const std::string_view> rendered_workload_names() { return kNames; }
 
 bool is_rendered(std::string_view workload) noexcept { return std::ranges::find(kNames, workload) != kNames.end(); }
 
-RenderedRays::RenderedRays(std::string_view workload, const Scene& scene, const View& view, Vec3d light, const Oracle& oracle) {
+RenderedRays::RenderedRays(std::string_view workload, const Scene& scene, const View& view, Vec3d light,
+                           const Oracle& oracle) {
   const Scene ready = for_whole_mesh(scene, light);
   scene_ = std::make_unique<const RenderScene>(ready, called_for(effects_of(ready)));
-  settings_ = {.integrator = parse_integrator(std::string(workload)), .width = view.width, .height = view.height, .samples = 1, .seed = view.seed};
+  settings_ = {.integrator = parse_integrator(std::string(workload)),
+               .width = view.width,
+               .height = view.height,
+               .samples = 1,
+               .seed = view.seed};
   closest_.name = any_.name = workload, any_.query = Query::any_hit;
   const RecordingOracle recorder(oracle, closest_, any_, closest_truth_, any_truth_);
   RenderStatistics statistics;
   picture_ = render(recorder, RecordingOracle::row(), {}, 1, statistics);
 }
 
-Picture RenderedRays::render(const Accel& accel, const KernelRow& kernel, TraversalSettings settings, unsigned threads, RenderStatistics& statistics) const {
+Picture RenderedRays::render(const Accel& accel, const KernelRow& kernel, TraversalSettings settings, unsigned threads,
+                             RenderStatistics& statistics) const {
   RenderSettings own = settings_;
   own.threads = threads;
   return arboretum::render(BatchTracer(*scene_, accel, kernel, settings), own, statistics);

@@ -1,7 +1,8 @@
-// RenderedRays: the workloads `whitted` and `path`: a renderer's whole picture, one sample a pixel, shading included, by any kernel.
+// RenderedRays: the workloads `whitted` and `path`: a renderer's whole picture, one sample a pixel, shading included,
+// by any kernel.
 //
-// What is timed is the renderer as the cell's own answers lead it. What is checked are rays that are recorded once: those that the renderer
-// sends out when the exact answers lead it, so that every cell has to answer the same.
+// What is timed is the renderer as the cell's own answers lead it. What is checked are rays that are recorded once:
+// those that the renderer sends out when the exact answers lead it, so that every cell has to answer the same.
 #pragma once
 
 #include <memory>
@@ -20,11 +21,13 @@ namespace arboretum {
 
 class RenderedRays {
  public:
-  /// With the effects that the scene calls for. `light`: where a scene without any gets a point light, as `shadow` has it.
+  /// With the effects that the scene calls for. `light`: where a scene without any gets a point light, as `shadow` has
+  /// it.
   RenderedRays(std::string_view workload, const Scene& scene, const View& view, Vec3d light, const Oracle& oracle);
 
   /// The picture by a kernel whose structure is built from the scene's whole mesh; what it took is added.
-  Picture render(const Accel& accel, const KernelRow& kernel, TraversalSettings settings, unsigned threads, RenderStatistics& statistics) const;
+  Picture render(const Accel& accel, const KernelRow& kernel, TraversalSettings settings, unsigned threads,
+                 RenderStatistics& statistics) const;
 
   /// Recorded rays of a kind of query, those of a tile together, and their exact answers.
   [[nodiscard]] const Workload& closest() const noexcept { return closest_; }

@@ -12,13 +12,9 @@ namespace arboretum {
 namespace {
 
 /// What one iteration works through: rays of a trace, triangles of a build.
-double items(const CellResult& result) {
-  return result.fact(result.is_trace() ? "rays" : "triangles");
-}
+double items(const CellResult& result) { return result.fact(result.is_trace() ? "rays" : "triangles"); }
 
-double per_second(double amount, double seconds) {
-  return seconds > 0.0 ? amount / seconds : 0.0;
-}
+double per_second(double amount, double seconds) { return seconds > 0.0 ? amount / seconds : 0.0; }
 
 /// The rates and times that change with the repetition.
 void add_measured(Json& entry, const CellResult& result, double wall, double cpu) {
@@ -61,8 +57,7 @@ Repetition parse_measured_fields(const Json& json) {
   repetition.wall_seconds = json.at("wall_seconds").get<double>();
   repetition.cpu_seconds = json.at("cpu_seconds").get<double>();
   if (const auto phases = json.find("phase_seconds"); phases != json.end()) {
-    for (const auto& [name, seconds] : phases->items())
-      repetition.phases.emplace_back(name, seconds.get<double>());
+    for (const auto& [name, seconds] : phases->items()) repetition.phases.emplace_back(name, seconds.get<double>());
   }
   return repetition;
 }
@@ -104,15 +99,18 @@ void add_facts(Json& facts, const Counters& c) {
   facts["boxes_per_ray"] = static_cast<double>(c.boxes) / rays;
   facts["leaves_per_ray"] = static_cast<double>(c.leaves) / rays;
   facts["triangles_per_ray"] = static_cast<double>(c.triangles) / rays;
-  if (c.lanes > 0)
-    facts["simd_utilization"] = static_cast<double>(c.lanes_active) / static_cast<double>(c.lanes);
-  const auto share = [](std::uint64_t part, std::uint64_t whole) { return static_cast<double>(part) / static_cast<double>(whole); };
-  if (std::ranges::any_of(c.children_hit, [](std::uint64_t visits) { return visits > 0; })) {  // not every structure's nodes have children that a ray meets: a grid's cells
+  if (c.lanes > 0) facts["simd_utilization"] = static_cast<double>(c.lanes_active) / static_cast<double>(c.lanes);
+  const auto share = [](std::uint64_t part, std::uint64_t whole) {
+    return static_cast<double>(part) / static_cast<double>(whole);
+  };
+  // Not every structure's nodes have children that a ray meets: a grid's cells
+  if (std::ranges::any_of(c.children_hit, [](std::uint64_t visits) { return visits > 0; })) {
     Json& children = facts["children_hit"] = Json::array();
     for (std::uint64_t visits : c.children_hit) children.push_back(share(visits, c.nodes));
   }
   if (!c.depths.empty()) {
-    Json &visits = facts["visits_by_depth"] = Json::array(), &lanes = facts["lane_utilization_by_depth"] = Json::array();
+    Json &visits = facts["visits_by_depth"] = Json::array(),
+         &lanes = facts["lane_utilization_by_depth"] = Json::array();
     for (const Counters::Depth& d : c.depths) {
       visits.push_back(static_cast<double>(d.visits) / rays);
       lanes.push_back(d.lanes > 0 ? Json(share(d.lanes_active, d.lanes)) : Json(nullptr));
@@ -142,7 +140,9 @@ void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit) {
 void add_facts(Json& facts, const StartCheck& check, bool closest_hit) {
   const double million = 1e6 / static_cast<double>(std::max<std::uint64_t>(check.rays, 1));
   facts["self_hits"] = check.self_hits, facts["self_hits_per_million"] = static_cast<double>(check.self_hits) * million;
-  if (closest_hit) facts["near_hits"] = check.near_hits, facts["near_hits_per_million"] = static_cast<double>(check.near_hits) * million;
+  if (closest_hit)
+    facts["near_hits"] = check.near_hits,
+    facts["near_hits_per_million"] = static_cast<double>(check.near_hits) * million;
   facts["leaks"] = check.leaks, facts["leaks_per_million"] = static_cast<double>(check.leaks) * million;
 }
 
@@ -151,14 +151,13 @@ Json picture_points(std::span<const std::array<float, 2>> points, std::size_t mo
   const std::size_t step = std::max<std::size_t>(1, (points.size() + most - 1) / most);
   for (std::size_t i = 0; i < points.size(); i += step) {
     const auto [x, y] = points[i];
-    if (std::isfinite(x) && std::isfinite(y)) list.push_back({std::round(x * 10.0) / 10.0, std::round(y * 10.0) / 10.0});
+    if (std::isfinite(x) && std::isfinite(y))
+      list.push_back({std::round(x * 10.0) / 10.0, std::round(y * 10.0) / 10.0});
   }
   return list;
 }
 
-std::string seen_points_file(const std::string& scene) {
-  return fmt::format("camera_edges-{}.json", scene);
-}
+std::string seen_points_file(const std::string& scene) { return fmt::format("camera_edges-{}.json", scene); }
 
 void add_axes(Json& json, const Cell& cell) {
   json["metric"] = to_string(cell.metric), json["scene"] = cell.scene, json["structure"] = cell.structure;
@@ -189,9 +188,7 @@ std::vector<Json> aggregate_entries(const CellResult& result) {
     wall.push_back(r.wall_seconds / static_cast<double>(r.iterations));
     cpu.push_back(r.cpu_seconds / static_cast<double>(r.iterations));
   }
-  const auto cv = [](std::span<const double> v) {
-    return mean(v) > 0.0 ? standard_deviation(v) / mean(v) : 0.0;
-  };
+  const auto cv = [](std::span<const double> v) { return mean(v) > 0.0 ? standard_deviation(v) / mean(v) : 0.0; };
   std::vector<Json> entries;
   for (const char* what : {"mean", "median", "stddev", "cv"}) {
     const std::string_view name = what;
@@ -202,8 +199,7 @@ std::vector<Json> aggregate_entries(const CellResult& result) {
     if (name == "mean") add_measured(entry, result, mean(wall), mean(cpu));
     if (name == "median") {
       add_measured(entry, result, median(wall), median(cpu));
-      const Interval rate = bootstrap_median(result.rates(false)),
-                     cpu_rate = bootstrap_median(result.rates(true));
+      const Interval rate = bootstrap_median(result.rates(false)), cpu_rate = bootstrap_median(result.rates(true));
       const char* key = result.is_trace() ? "rays_per_second" : "triangles_per_second";
       entry[key] = rate.median;
       entry[std::string(key) + "_low"] = rate.low, entry[std::string(key) + "_high"] = rate.high;
@@ -242,14 +238,11 @@ Json cell_line(const CellResult& result, const std::string& configuration_hash) 
   return line;
 }
 
-std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell,
-                                          const std::string& configuration_hash) {
+std::optional<CellResult> parse_cell_line(const Json& line, const Cell& cell, const std::string& configuration_hash) {
   try {
-    if (line.at("name") != cell.name() || line.at("configuration_hash") != configuration_hash)
-      return std::nullopt;
+    if (line.at("name") != cell.name() || line.at("configuration_hash") != configuration_hash) return std::nullopt;
     CellResult result{.cell = cell, .repetitions = {}, .facts = line};
-    for (const Json& entry : line.at("repetitions"))
-      result.repetitions.push_back(parse_measured_fields(entry));
+    for (const Json& entry : line.at("repetitions")) result.repetitions.push_back(parse_measured_fields(entry));
     Json axes = Json::object();
     add_axes(axes, cell);
     for (const auto& [key, value] : axes.items()) result.facts.erase(key);

@@ -47,7 +47,8 @@ void add_facts(Json& facts, const StructureStatistics& statistics);
 void add_facts(Json& facts, const Counters& counters);
 void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit);
 void add_facts(Json& facts, const StartCheck& check, bool closest_hit);
-/// Points of a picture, in tenths of a pixel, at most so many of them, evenly taken; those beside the picture are left out.
+/// Points of a picture, in tenths of a pixel, at most so many of them, evenly taken; those beside the picture are left
+/// out.
 [[nodiscard]] Json picture_points(std::span<const std::array<float, 2>> points, std::size_t most);
 /// The fact that only a cell's first repetition repeats, and the file of a scene that it belongs to.
 inline constexpr const char* kLeakPoints = "leak_points";

@@ -35,7 +35,9 @@ std::vector<std::string> folders_in(const fs::path& path) {
 [[noreturn]] void refuse(const fs::path& path) {
   std::error_code ignored;
   const bool is_folder = fs::is_directory(path, ignored), is_there = fs::exists(path, ignored);
-  std::string what = is_folder ? "no result folder: neither cells.jsonl nor results.json in it" : is_there ? "a file; give the folder that `run` wrote" : "no such folder";
+  std::string what = is_folder  ? "no result folder: neither cells.jsonl nor results.json in it"
+                     : is_there ? "a file; give the folder that `run` wrote"
+                                : "no such folder";
   const std::string text = path.lexically_normal().string();
   // Within or around what was named a folder may be called anything; beside it only what is spelt alike is meant.
   std::vector<std::string> near;
@@ -56,7 +58,8 @@ Json read_json(const fs::path& path) {
     if (document.is_object() && document.value("context", Json::object()).is_object()) return document;
   } catch (const nlohmann::json::exception&) {
   }
-  throw UserError(fmt::format("{}: not the JSON that `run` writes; copy the folder anew, or measure again", path.string()));
+  throw UserError(
+      fmt::format("{}: not the JSON that `run` writes; copy the folder anew, or measure again", path.string()));
 }
 
 Repetition repetition_of(const Json& entry) {
@@ -95,8 +98,9 @@ void read_lines_of_cells(const fs::path& file, ResultFolder& folder) {
     } catch (const nlohmann::json::exception&) {
     }
     if (!result) {
-      throw UserError(fmt::format("{}:{}: not a cell as `run` writes it; take the line out (its cell is then missing), or copy the folder anew",
-                                  file.string(), number));
+      throw UserError(fmt::format(
+          "{}:{}: not a cell as `run` writes it; take the line out (its cell is then missing), or copy the folder anew",
+          file.string(), number));
     }
     const auto [place, fresh] = places.try_emplace(result->cell.name(), folder.cells.size());
     if (fresh) {
@@ -107,13 +111,15 @@ void read_lines_of_cells(const fs::path& file, ResultFolder& folder) {
   }
 }
 
-/// Cells as the plan has them, not as they ended; without a plan as results.json has them. Others stay behind, in their order.
+/// Cells as the plan has them, not as they ended; without a plan as results.json has them. Others stay behind, in their
+/// order.
 void sort_as_planned(ResultFolder& folder, const Json& document) {
   std::map<std::string, std::size_t> places;
   if (folder.plan) {
     for (const PlanRecord::Entry& entry : folder.plan->cells) places.try_emplace(entry.name, places.size());
   } else {
-    for (const Json& entry : document.value("benchmarks", Json::array())) places.try_emplace(entry.at("run_name").get<std::string>(), places.size());
+    for (const Json& entry : document.value("benchmarks", Json::array()))
+      places.try_emplace(entry.at("run_name").get<std::string>(), places.size());
   }
   std::vector<std::pair<std::size_t, std::size_t>> order;
   for (std::size_t i = 0; i < folder.cells.size(); ++i) {
@@ -157,9 +163,7 @@ void part(const std::string& text, std::string& key, std::string& label) {
 
 }  // namespace
 
-std::string ResultFolder::context_text(const char* key) const {
-  return text_of(context, key);
-}
+std::string ResultFolder::context_text(const char* key) const { return text_of(context, key); }
 
 Cell cell_of(const Json& entry) {
   const auto text = [&](const char* key) { return entry.at(key).get<std::string>(); };
@@ -198,7 +202,8 @@ ResultFolder read_result_folder(const fs::path& path) {
     for (const Json& cell : document.value("skipped", Json::array()))
       folder.skipped.push_back({cell.at("name").get<std::string>(), cell.at("reason").get<std::string>()});
   } catch (const nlohmann::json::exception&) {
-    throw UserError(fmt::format("{}: not the results that `run` writes; copy the folder anew, or measure again", (path / "results.json").string()));
+    throw UserError(fmt::format("{}: not the results that `run` writes; copy the folder anew, or measure again",
+                                (path / "results.json").string()));
   }
   if (!folder.complete && folder.plan) {
     for (const PlanRecord::Entry& cell : folder.plan->skipped)

@@ -1,5 +1,5 @@
-// A result folder as it is read back: the cells that it holds, the machine that they were measured on, what was skipped. Also of a
-// run that was cut off, of a merged one, and of one of which results.json alone is left.
+// A result folder as it is read back: the cells that it holds, the machine that they were measured on, what was
+// skipped. Also of a run that was cut off, of a merged one, and of one of which results.json alone is left.
 #pragma once
 
 #include <filesystem>
@@ -32,8 +32,8 @@ struct ResultFolder {
 /// Throws nlohmann::json::exception where a field is missing.
 [[nodiscard]] Cell cell_of(const Json& entry);
 
-/// "CPU: AMD EPYC against Intel Xeon" for each thing of machine and build by which two contexts differ, and which makes their times
-/// incomparable: CPU, cores, governor, instruction sets, compiler and its flags.
+/// "CPU: AMD EPYC against Intel Xeon" for each thing of machine and build by which two contexts differ, and which makes
+/// their times incomparable: CPU, cores, governor, instruction sets, compiler and its flags.
 [[nodiscard]] std::vector<std::string> machine_differences(const Json& a, const Json& b);
 
 }  // namespace arboretum

@@ -39,9 +39,7 @@ std::vector<Json> entries_of(const CellResult& result, const ResultForm& form, b
 
 }  // namespace
 
-std::string plain_text(const Json& value) {
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
+std::string plain_text(const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
 
 std::string csv_field(const Json& value) {
   std::string text = plain_text(value);

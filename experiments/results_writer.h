@@ -16,7 +16,8 @@ struct ResultForm {
 
 /// `context`, `benchmarks` (every cell's repetitions, then its aggregates) `skipped` (name and reason)
 /// and, of a merge that lacks some, `missing`.
-[[nodiscard]] std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context, const ResultForm& form = {});
+[[nodiscard]] std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context,
+                                       const ResultForm& form = {});
 /// One row a repetition (or aggregate, where `form` says so); empty where a figure does not apply.
 [[nodiscard]] std::string results_csv(const RunOutcome& outcome, const ResultForm& form = {});
 

@@ -31,19 +31,13 @@ class Runner {
  public:
   Runner(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal,
          const RunOptions& options, LoadedScene loaded)
-      : experiment_(experiment),
-        plan_(plan),
-        registry_(registry),
-        journal_(journal),
-        options_(options),
-        loaded_(std::move(loaded)),
-        progress_(pending_cells(), pending_units()),
+      : experiment_(experiment), plan_(plan), registry_(registry), journal_(journal), options_(options),
+        loaded_(std::move(loaded)), progress_(pending_cells(), pending_units()),
         cache_(experiment.measure.structure_cache, [this](const std::string& line) { progress_.note(line); }) {}
 
   RunOutcome run() {
     try {
-      for (std::size_t scene = 0; scene < experiment_.scenes.size() && !outcome_.stopped; ++scene)
-        run_scene(scene);
+      for (std::size_t scene = 0; scene < experiment_.scenes.size() && !outcome_.stopped; ++scene) run_scene(scene);
     } catch (const UserError& e) {
       outcome_.error = e.what();
     } catch (const std::bad_alloc&) {
@@ -71,8 +65,7 @@ class Runner {
   bool pending(const Cell& cell) const { return !journal_.done().contains(cell.name()); }
 
   std::size_t pending_cells() const {
-    return static_cast<std::size_t>(
-        std::ranges::count_if(plan_.cells, [&](const Cell& c) { return pending(c); }));
+    return static_cast<std::size_t>(std::ranges::count_if(plan_.cells, [&](const Cell& c) { return pending(c); }));
   }
 
   std::size_t pending_units() const {
@@ -116,9 +109,8 @@ class Runner {
         const auto& cells = by_structure[order[next++]];
         if (try_for(cells, [&] { (void)pool.get(*cells.front()); }))
           batch.insert(batch.end(), cells.begin(), cells.end());
-      } while (next < order.size() &&
-               pool.held_bytes() + pool.expected_bytes(*by_structure[order[next]].front()) <=
-                   experiment_.measure.memory);
+      } while (next < order.size() && pool.held_bytes() + pool.expected_bytes(*by_structure[order[next]].front()) <=
+                                          experiment_.measure.memory);
       run_batch(batch, data, pool);
     }
   }
@@ -134,8 +126,7 @@ class Runner {
     }
     for (const std::string& name : workloads) {
       std::vector<const Cell*> cells;
-      std::ranges::copy_if(batch, std::back_inserter(cells),
-                           [&](const Cell* c) { return c->workload_name() == name; });
+      std::ranges::copy_if(batch, std::back_inserter(cells), [&](const Cell* c) { return c->workload_name() == name; });
       if (!outcome_.stopped) trace_workload(cells, data, pool);
       for (const Cell* cell : cells)
         if (--users[pool.key(*cell)] == 0) pool.release(pool.key(*cell));
@@ -182,7 +173,10 @@ class Runner {
   /// What the picture of leaks is drawn on.
   void keep_seen_points(SceneData& data, const Workload& workload) const {
     const MeasureSettings& m = experiment_.measure;
-    const Json file{{"scene", data.name()}, {"width", m.width}, {"height", m.height}, {"points", picture_points(data.seen_pixels(workload), kMostSeenPoints)}};
+    const Json file{{"scene", data.name()},
+                    {"width", m.width},
+                    {"height", m.height},
+                    {"points", picture_points(data.seen_pixels(workload), kMostSeenPoints)}};
     write_whole(journal_.folder() / seen_points_file(data.name()), file.dump() + "\n");
   }
 
@@ -219,8 +213,7 @@ class Runner {
                        .measure = std::move(measure),
                        .ended = {}};
     for (unsigned i = 0; i < running.wanted; ++i)
-      if (std::ranges::find(running.result.repetitions, i, &Repetition::index) ==
-          running.result.repetitions.end())
+      if (std::ranges::find(running.result.repetitions, i, &Repetition::index) == running.result.repetitions.end())
         job.indices.push_back(i);
     job.ended = [this, &running, name = job.name](const Repetition& repetition) {
       journal_.add(name, repetition);
@@ -255,8 +248,7 @@ class Runner {
     } catch (const std::bad_alloc&) {
       for (const Cell* cell : cells) fail(*cell, "not enough memory to build the structure");
     }
-    if (options_.fail_fast)
-      throw UserError(outcome_.failed.back().name + ": " + outcome_.failed.back().reason);
+    if (options_.fail_fast) throw UserError(outcome_.failed.back().name + ": " + outcome_.failed.back().reason);
     return false;
   }
 
@@ -281,8 +273,8 @@ class Runner {
 
 }  // namespace
 
-RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry,
-                    Journal& journal, const RunOptions& options, LoadedScene loaded) {
+RunOutcome run_plan(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal,
+                    const RunOptions& options, LoadedScene loaded) {
   unsigned threads = std::max(1u, std::thread::hardware_concurrency());
   for (const Cell& cell : plan.cells) threads = std::max(threads, cell.threads);
   const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, threads);

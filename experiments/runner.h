@@ -17,8 +17,8 @@ struct RunOptions {
 };
 
 struct RunOutcome {
-  std::vector<CellResult> results;  ///< in the plan's order; those that were measured
-  std::vector<SkippedCell> failed;  ///< cells that turned out impossible while running, each with its reason
+  std::vector<CellResult> results;        ///< in the plan's order; those that were measured
+  std::vector<SkippedCell> failed;        ///< cells that turned out impossible while running, each with its reason
   std::vector<std::string> missing = {};  ///< of a merge: cells of the plan that none of the parts holds
   std::vector<std::string> warnings;
   std::string error;     ///< what ended the run early; empty when it went through

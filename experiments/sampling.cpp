@@ -38,8 +38,7 @@ Interval bootstrap_median(std::span<const double> values) {
   std::vector<double> medians(kResamples), picked(values.size());
   for (std::size_t i = 0; i < kResamples; ++i) {
     for (std::size_t j = 0; j < picked.size(); ++j) {
-      picked[j] =
-          values[static_cast<std::size_t>(random_double(1, i, j) * static_cast<double>(values.size()))];
+      picked[j] = values[static_cast<std::size_t>(random_double(1, i, j) * static_cast<double>(values.size()))];
     }
     medians[i] = median(picked);
   }

@@ -30,8 +30,7 @@ double median_aspect(const TriangleMesh& mesh) {
 }  // namespace
 
 SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, NoteFunction note)
-    : name_(choice.name),
-      view_{.width = measure.width, .height = measure.height, .seed = measure.seed},
+    : name_(choice.name), view_{.width = measure.width, .height = measure.height, .seed = measure.seed},
       note_(std::move(note)) {
   if (!note_) note_ = [this](const std::string& line) { waiting_.push_back(line); };
   const double begin = wall_seconds();
@@ -40,8 +39,8 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
   note_(fmt::format("{}: {} triangles, loaded in {:.2f} s", name_, mesh().size(), wall_seconds() - begin));
   const LoadReport& report = scene_.report;
   if (report.non_finite + report.out_of_range + report.degenerate > 0) {
-    note_(fmt::format("{}: dropped {} triangles with NaN or infinity, {} out of range, {} of zero area",
-                      name_, report.non_finite, report.out_of_range, report.degenerate));
+    note_(fmt::format("{}: dropped {} triangles with NaN or infinity, {} out of range, {} of zero area", name_,
+                      report.non_finite, report.out_of_range, report.degenerate));
   }
   for (const std::string& warning : report.warnings) note_(fmt::format("{}: {}", name_, warning));
 }
@@ -56,7 +55,8 @@ void SceneData::place(const Placing& placing) {
   const double by[3] = {placing.offset, -0.75 * placing.offset, 0.5 * placing.offset};
   const auto move = [&](std::vector<Vec3f>& vertices) {
     for (Vec3f& v : vertices)
-      for (std::size_t axis = 0; axis < 3; ++axis) v[axis] = float(double(v[axis]) * (axis == 1 ? placing.stretch : 1.0) * placing.size + by[axis]);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        v[axis] = float(double(v[axis]) * (axis == 1 ? placing.stretch : 1.0) * placing.size + by[axis]);
   };
   move(scene_.mesh.vertices);
   for (auto& frame : scene_.mesh.later_frames) move(frame);
@@ -105,8 +105,8 @@ const RenderedRays& SceneData::rendered(const std::string& name) {
   const Oracle& exact = oracle();
   const double begin = wall_seconds();
   const RenderedRays& rays = rendered_.try_emplace(name, name, scene_, view_, light, exact).first->second;
-  note_(fmt::format("{}/{}: {} rays of the renderer and their exact answers in {:.2f} s", name_, name, rays.closest().rays.size() + rays.any().rays.size(),
-                    wall_seconds() - begin));
+  note_(fmt::format("{}/{}: {} rays of the renderer and their exact answers in {:.2f} s", name_, name,
+                    rays.closest().rays.size() + rays.any().rays.size(), wall_seconds() - begin));
   return rays;
 }
 
@@ -115,7 +115,8 @@ const Answers& SceneData::truth(Answers& entry, const Workload& workload, std::s
   Oracle& exact = oracle();
   const double begin = wall_seconds();
   entry = compute(exact);
-  note_(fmt::format("{}/{}: exact answers of {} rays{} in {:.2f} s", name_, workload.name, workload.rays.size(), of, wall_seconds() - begin));
+  note_(fmt::format("{}/{}: exact answers of {} rays{} in {:.2f} s", name_, workload.name, workload.rays.size(), of,
+                    wall_seconds() - begin));
   return entry;
 }
 
@@ -123,7 +124,8 @@ const std::vector<ExactHit>& SceneData::closest_truth(const Workload& workload) 
   auto [entry, fresh] = closest_truth_.try_emplace(&workload);
   if (!fresh) return entry->second;
   return truth(entry->second, workload, "", [&](const Oracle& exact) {
-    return workload.excludes_sources ? closest_hit_excluding(exact, workload.batch(), workload.sources) : exact.closest_hit(workload.batch());
+    return workload.excludes_sources ? closest_hit_excluding(exact, workload.batch(), workload.sources)
+                                     : exact.closest_hit(workload.batch());
   });
 }
 
@@ -133,7 +135,8 @@ const std::vector<std::uint8_t>& SceneData::any_truth(const Workload& workload) 
   return truth(entry->second, workload, "", [&](const Oracle& exact) {
     if (!workload.excludes_sources) return exact.any_hit(workload.batch());
     std::vector<std::uint8_t> occluded;
-    for (const ExactHit& h : closest_hit_excluding(exact, workload.batch(), workload.sources)) occluded.push_back(h.hit.is_hit());
+    for (const ExactHit& h : closest_hit_excluding(exact, workload.batch(), workload.sources))
+      occluded.push_back(h.hit.is_hit());
     return occluded;
   });
 }
@@ -141,8 +144,9 @@ const std::vector<std::uint8_t>& SceneData::any_truth(const Workload& workload) 
 const std::vector<ExactHit>& SceneData::start_truth(const Workload& workload) {
   auto [entry, fresh] = start_truth_.try_emplace(workload.name);
   if (!fresh) return entry->second;
-  return truth(entry->second, workload, " from their hit points",
-               [&](const Oracle& exact) { return exact.closest_hit_from(workload.starts, {workload.references, workload.times}, workload.sources); });
+  return truth(entry->second, workload, " from their hit points", [&](const Oracle& exact) {
+    return exact.closest_hit_from(workload.starts, {workload.references, workload.times}, workload.sources);
+  });
 }
 
 std::vector<std::array<float, 2>> SceneData::seen_pixels(const Workload& workload) {
@@ -158,7 +162,8 @@ std::vector<std::array<float, 2>> SceneData::leak_pixels(const Workload& workloa
   const auto& truth = closest_truth(workload);
   std::vector<std::array<float, 2>> leaks;
   for (std::size_t i = 0; i < workload.pixels.size(); ++i) {
-    if (oracle().judge(workload.rays[i], workload.batch().time(i), truth[i], answers[i]).crack) leaks.push_back(workload.pixels[i]);
+    if (oracle().judge(workload.rays[i], workload.batch().time(i), truth[i], answers[i]).crack)
+      leaks.push_back(workload.pixels[i]);
   }
   return leaks;
 }

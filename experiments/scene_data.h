@@ -85,7 +85,7 @@ class SceneData {
 
 /// A scene that was loaded before its turn.
 struct LoadedScene {
-  std::size_t index = 0;                  ///< of the experiment's scenes
+  std::size_t index = 0;                 ///< of the experiment's scenes
   std::unique_ptr<SceneData> data = {};  ///< null: none was
 };
 

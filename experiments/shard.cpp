@@ -19,7 +19,8 @@ constexpr unsigned kMostShards = 100'000;
 /// A cut moves by so much of a shard where that keeps a structure's cells together.
 constexpr double kSlack = 0.125;
 
-/// `scene/structure/builder/leaf` of a cell's name: what of a structure is built once, instruction sets and threads apart.
+/// `scene/structure/builder/leaf` of a cell's name: what of a structure is built once, instruction sets and threads
+/// apart.
 std::string structure_of(const std::string& name) {
   std::size_t begin = name.find('/') + 1, end = begin;
   for (int parts = 0; parts < 4 && end != std::string::npos; ++parts) end = name.find('/', parts ? end + 1 : end);
@@ -44,28 +45,32 @@ std::vector<Place> line_of(const Experiment& experiment, const Plan& plan) {
   add(plan.cells), add(plan.elsewhere);
   for (const SkippedCell& cell : plan.skipped) line.push_back({structure_of(cell.name), cell.name, 0});
   // Of equal names the one that weighs comes first and stays.
-  std::ranges::sort(line, [](const Place& a, const Place& b) { return std::tie(a.structure, a.name, b.weight) < std::tie(b.structure, b.name, a.weight); });
-  line.erase(std::unique(line.begin(), line.end(), [](const Place& a, const Place& b) { return a.name == b.name; }), line.end());
+  std::ranges::sort(line, [](const Place& a, const Place& b) {
+    return std::tie(a.structure, a.name, b.weight) < std::tie(b.structure, b.name, a.weight);
+  });
+  line.erase(std::unique(line.begin(), line.end(), [](const Place& a, const Place& b) { return a.name == b.name; }),
+             line.end());
   return line;
 }
 
 }  // namespace
 
-std::string Shard::text() const {
-  return fmt::format("{}/{}", index, of);
-}
+std::string Shard::text() const { return fmt::format("{}/{}", index, of); }
 
 Shard parse_shard(const std::string& text) {
   Shard shard;
-  const char *end = text.data() + text.size();
+  const char* end = text.data() + text.size();
   const auto [slash, bad_index] = std::from_chars(text.data(), end, shard.index);
   bool good = bad_index == std::errc{} && slash != end && *slash == '/';
   if (good) {
     const auto [rest, bad_count] = std::from_chars(slash + 1, end, shard.of);
-    good = bad_count == std::errc{} && rest == end && shard.index >= 1 && shard.index <= shard.of && shard.of <= kMostShards;
+    good = bad_count == std::errc{} && rest == end && shard.index >= 1 && shard.index <= shard.of &&
+           shard.of <= kMostShards;
   }
   if (!good)
-    throw UserError(fmt::format("--shard '{}': must be I/N, the I-th of N parts with I from 1 to N (at most {}), as in --shard 2/8", text, kMostShards));
+    throw UserError(
+        fmt::format("--shard '{}': must be I/N, the I-th of N parts with I from 1 to N (at most {}), as in --shard 2/8",
+                    text, kMostShards));
   return shard;
 }
 
@@ -83,7 +88,8 @@ std::map<std::string, unsigned> split_plan(const Experiment& experiment, const P
     const double share = before.back() / of, at = share * k;
     std::size_t cut = static_cast<std::size_t>(std::ranges::lower_bound(before, at) - before.begin());
     if (cut > 0 && distance(cut - 1, at) <= distance(cut, at)) --cut;
-    const std::size_t border = *std::ranges::min_element(borders, {}, [&](std::size_t place) { return distance(place, at); });
+    const std::size_t border =
+        *std::ranges::min_element(borders, {}, [&](std::size_t place) { return distance(place, at); });
     if (distance(border, at) <= kSlack * share) cut = border;
     cuts.push_back(std::max(cut, cuts.empty() ? 0 : cuts.back()));
   }

@@ -1,8 +1,9 @@
 // Shards: a plan cut into N parts that run apart (another process, machine, day) and together are exactly the plan.
 //
-// The names of all cells, in the order of the structures that they use, are cut into N stretches of about equal estimated
-// time: so a shard needs few scenes, and a structure is built in one shard, or in two where it lies across a cut. Cells that this
-// machine skips for want of an instruction set or a scene weigh as on a machine that has it, and so the split is the same everywhere.
+// The names of all cells, in the order of the structures that they use, are cut into N stretches of about equal
+// estimated time: so a shard needs few scenes, and a structure is built in one shard, or in two where it lies across a
+// cut. Cells that this machine skips for want of an instruction set or a scene weigh as on a machine that has it, and
+// so the split is the same everywhere.
 #pragma once
 
 #include <map>

@@ -26,13 +26,15 @@ std::vector<std::size_t> doubled_ranks(std::span<const double> a, std::span<cons
 
 double exact_p(const std::vector<std::size_t>& ranks, std::size_t n) {
   const std::size_t total = std::accumulate(ranks.begin(), ranks.end(), std::size_t{0});
-  const std::size_t observed = std::accumulate(ranks.begin(), ranks.begin() + static_cast<std::ptrdiff_t>(n), std::size_t{0});
+  const std::size_t observed =
+      std::accumulate(ranks.begin(), ranks.begin() + static_cast<std::ptrdiff_t>(n), std::size_t{0});
   // ways[k * (total + 1) + s]: choices of k values whose doubled ranks sum to s.
   std::vector<double> ways((n + 1) * (total + 1), 0.0);
   ways[0] = 1.0;
   for (std::size_t rank : ranks)
     for (std::size_t k = n; k-- > 0;)
-      for (std::size_t s = total + 1 - rank; s-- > 0;) ways[(k + 1) * (total + 1) + s + rank] += ways[k * (total + 1) + s];
+      for (std::size_t s = total + 1 - rank; s-- > 0;)
+        ways[(k + 1) * (total + 1) + s + rank] += ways[k * (total + 1) + s];
   // Distances from the mean n * total / ranks.size(), times ranks.size() to stay whole.
   const auto distance = [&](std::size_t s) {
     const std::size_t at = s * ranks.size(), middle = n * total;
@@ -84,7 +86,9 @@ double welch_p(std::span<const double> a, std::span<const double> b) {
   const Sample x(a), y(b);
   const double variance = x.variance_of_mean + y.variance_of_mean, difference = std::abs(x.mean - y.mean);
   if (variance <= 0.0) return difference > 0.0 ? 0.0 : 1.0;
-  const double degrees = variance * variance / (x.variance_of_mean * x.variance_of_mean / x.degrees + y.variance_of_mean * y.variance_of_mean / y.degrees);
+  const double degrees =
+      variance * variance /
+      (x.variance_of_mean * x.variance_of_mean / x.degrees + y.variance_of_mean * y.variance_of_mean / y.degrees);
   const boost::math::students_t distribution(degrees);
   return std::min(1.0, 2.0 * boost::math::cdf(boost::math::complement(distribution, difference / std::sqrt(variance))));
 }

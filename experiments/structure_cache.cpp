@@ -9,11 +9,13 @@
 
 namespace arboretum {
 
-StructureCache::StructureCache(std::filesystem::path folder, NoteFunction note) : folder_(std::move(folder)), note_(std::move(note)) {
+StructureCache::StructureCache(std::filesystem::path folder, NoteFunction note)
+    : folder_(std::move(folder)), note_(std::move(note)) {
   if (!folder_.empty()) (void)program_digest();  // takes some tenths of a second once, which are no part of a load
 }
 
-std::unique_ptr<Accel> StructureCache::find(std::string_view structure, const TriangleMesh& mesh, const BuildSettings& settings) {
+std::unique_ptr<Accel> StructureCache::find(std::string_view structure, const TriangleMesh& mesh,
+                                            const BuildSettings& settings) {
   if (folder_.empty()) return nullptr;
   const std::filesystem::path file = folder_ / structure_file_name(structure, mesh, settings);
   std::error_code ignored;

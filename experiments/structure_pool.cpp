@@ -31,8 +31,7 @@ std::string StructurePool::key(const Cell& cell) const {
 std::size_t StructurePool::expected_bytes(const Cell& cell) const {
   constexpr std::size_t kBytesPerTriangle = 200;  // a wide BVH with precomputed edges takes 100 to 160
   const auto known = facts_.find(key(cell));
-  return known != facts_.end() ? known->second.at("bytes").get<std::size_t>()
-                               : kBytesPerTriangle * mesh_.size();
+  return known != facts_.end() ? known->second.at("bytes").get<std::size_t>() : kBytesPerTriangle * mesh_.size();
 }
 
 const Accel& StructurePool::get(const Cell& cell) {

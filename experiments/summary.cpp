@@ -16,9 +16,7 @@ namespace {
 using Row = TableRow;
 
 /// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
-double ratio_rate(const CellResult& r) {
-  return median(r.rates(r.cell.threads == 1));
-}
+double ratio_rate(const CellResult& r) { return median(r.rates(r.cell.threads == 1)); }
 
 /// The fastest embree cell of the same scene, workload, ISA and threads.
 const CellResult* embree_beside(const CellResult& r, const std::vector<CellResult>& all) {
@@ -37,9 +35,8 @@ const CellResult* embree_beside(const CellResult& r, const std::vector<CellResul
 std::optional<double> build_milliseconds(const CellResult& r, const std::vector<CellResult>& all) {
   for (const CellResult& other : all) {
     const Cell &a = r.cell, &b = other.cell;
-    if (other.is_trace() || a.scene != b.scene || a.structure != b.structure ||
-        a.builder_name() != b.builder_name() || a.leaf != b.leaf || a.isa != b.isa ||
-        a.threads != b.threads) {
+    if (other.is_trace() || a.scene != b.scene || a.structure != b.structure || a.builder_name() != b.builder_name() ||
+        a.leaf != b.leaf || a.isa != b.isa || a.threads != b.threads) {
       continue;
     }
     std::vector<double> seconds;
@@ -83,13 +80,14 @@ void add_starts(std::vector<Row>& rows, const std::vector<const CellResult*>& re
       {"self/1e6", "self_hits_per_million"}, {"near/1e6", "near_hits_per_million"}, {"leaks/1e6", "leaks_per_million"}};
   for (const auto& [head, fact] : kColumns) {
     rows[0].emplace_back(head);
-    for (std::size_t i = 0; i < results.size(); ++i) rows[i + 1].push_back(optional_figure(*results[i], fact, "{:.1f}"));
+    for (std::size_t i = 0; i < results.size(); ++i)
+      rows[i + 1].push_back(optional_figure(*results[i], fact, "{:.1f}"));
   }
 }
 
 std::string build_table(const std::vector<CellResult>& all) {
-  std::vector<Row> rows{{"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %",
-                         "Mtri/s", "bytes/tri", "SAH"}};
+  std::vector<Row> rows{
+      {"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %", "Mtri/s", "bytes/tri", "SAH"}};
   for (const CellResult& r : all) {
     if (r.is_trace()) continue;
     std::vector<double> ms;
@@ -101,8 +99,7 @@ std::string build_table(const std::vector<CellResult>& all) {
                     std::to_string(c.threads), fmt::format("{:.2f}", time.median),
                     fmt::format("[{:.2f}, {:.2f}]", time.low, time.high),
                     fmt::format("{:.2f}", median(r.rates(false)) * 1e-6),
-                    optional_figure(r, "bytes_per_triangle", "{:.0f}"),
-                    optional_figure(r, "sah_cost", "{:.1f}")});
+                    optional_figure(r, "bytes_per_triangle", "{:.0f}"), optional_figure(r, "sah_cost", "{:.1f}")});
   }
   return rows.size() == 1 ? "" : "\nbuilds\n" + format_table(rows, 6);
 }
@@ -113,8 +110,7 @@ double relative_spread(const CellResult& r) {
   if (rates.size() < 3 || centre <= 0.0) return 0.0;
   std::vector<double> deviations;
   for (double v : rates) deviations.push_back(std::abs(v - centre));
-  return 1.4826 * median(deviations) /
-         centre;  // comparable to a standard deviation, blind to single outliers
+  return 1.4826 * median(deviations) / centre;  // comparable to a standard deviation, blind to single outliers
 }
 
 }  // namespace
@@ -124,20 +120,19 @@ std::string result_tables(const RunOutcome& outcome) {
   for (const CellResult& r : outcome.results) {
     if (!r.is_trace()) continue;
     const std::string title = r.cell.scene + ", " + r.cell.workload_name();
-    auto group =
-        std::ranges::find(groups, title, &std::pair<std::string, std::vector<const CellResult*>>::first);
+    auto group = std::ranges::find(groups, title, &std::pair<std::string, std::vector<const CellResult*>>::first);
     if (group == groups.end()) group = groups.insert(groups.end(), {title, {}});
     group->second.push_back(&r);
   }
   std::string text;
   for (const auto& [title, results] : groups) {
-    std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa",
-                           "threads", "Mray/s", "95 %", "x embree", "wrong/1e6", "SAH", "build ms"}};
+    std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads",
+                           "Mray/s", "95 %", "x embree", "wrong/1e6", "SAH", "build ms"}};
     for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results));
     if (!results.front()->cell.start_label.empty()) add_starts(rows, results);
     const CellResult& first = *results.front();
-    text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"),
-                        first.fact("triangles"), format_table(rows, 8));
+    text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"), first.fact("triangles"),
+                        format_table(rows, 8));
   }
   if (!groups.empty()) {
     text +=
@@ -167,10 +162,10 @@ std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan&
     if (!worst || relative_spread(r) > relative_spread(*worst)) worst = &r;
   }
   if (worst) {
-    warnings.push_back(fmt::format(
-        "noisy machine: the repetitions of {} of {} cells spread by more than {:.0f} % (most: {:.0f} % in "
-        "{}); raise min_time or repetitions, or free the machine",
-        noisy, outcome.results.size(), kWide * 100, relative_spread(*worst) * 100, worst->cell.name()));
+    warnings.push_back(
+        fmt::format("noisy machine: the repetitions of {} of {} cells spread by more than {:.0f} % (most: {:.0f} % in "
+                    "{}); raise min_time or repetitions, or free the machine",
+                    noisy, outcome.results.size(), kWide * 100, relative_spread(*worst) * 100, worst->cell.name()));
   }
   for (const Cell& cell : plan.cells) {
     if (cell.threads <= cores) continue;
@@ -197,24 +192,20 @@ std::pair<ExitStatus, std::string> verdict(const RunOutcome& outcome) {
     if (r.fact("wrong_answers") == 0.0) continue;
     ++wrong;
     ++by_test[r.cell.intersector + "+" + r.cell.box];
-    if (!worst ||
-        r.fact("wrong_answers") / r.fact("rays") > worst->fact("wrong_answers") / worst->fact("rays"))
+    if (!worst || r.fact("wrong_answers") / r.fact("rays") > worst->fact("wrong_answers") / worst->fact("rays"))
       worst = &r;
   }
   if (wrong == 0) {
     if (checked == 0)
-      return {ExitStatus::kDone,
-              fmt::format("{} cells measured; answers were not checked", outcome.results.size())};
+      return {ExitStatus::kDone, fmt::format("{} cells measured; answers were not checked", outcome.results.size())};
     return {ExitStatus::kDone, fmt::format("{} cells measured, all answers right", outcome.results.size())};
   }
   std::vector<std::string> tests;
   for (const auto& [test, count] : by_test) tests.push_back(fmt::format("{} {}", count, test));
-  return {
-      ExitStatus::kWrongAnswers,
-      fmt::format(
-          "wrong answers in {} of {} checked cells ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1",
-          wrong, checked, fmt::join(tests, ", "), worst->fact("wrong_answers"), worst->fact("rays"),
-          worst->cell.name())};
+  return {ExitStatus::kWrongAnswers,
+          fmt::format("wrong answers in {} of {} checked cells ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1",
+                      wrong, checked, fmt::join(tests, ", "), worst->fact("wrong_answers"), worst->fact("rays"),
+                      worst->cell.name())};
 }
 
 }  // namespace arboretum

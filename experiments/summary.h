@@ -14,7 +14,8 @@ namespace arboretum {
 [[nodiscard]] std::string result_tables(const RunOutcome& outcome);
 /// "12 cells skipped:" with one line a reason; empty when there is none.
 [[nodiscard]] std::string skipped_lines(const Plan& plan, const RunOutcome& outcome);
-/// One line each: cells whose repetitions spread widely, more threads than the machine's cores, ISAs that are not there.
+/// One line each: cells whose repetitions spread widely, more threads than the machine's cores, ISAs that are not
+/// there.
 [[nodiscard]] std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan& plan, unsigned cores);
 /// kDone, kWrongAnswers or kNothingMeasured, and one line that says why.
 [[nodiscard]] std::pair<ExitStatus, std::string> verdict(const RunOutcome& outcome);

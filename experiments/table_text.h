@@ -8,7 +8,8 @@ namespace arboretum {
 
 using TableRow = std::vector<std::string>;
 
-/// Columns as wide as their widest cell; figures right-aligned from column `figures` on. All rows as long as the first, its titles.
+/// Columns as wide as their widest cell; figures right-aligned from column `figures` on. All rows as long as the first,
+/// its titles.
 [[nodiscard]] std::string format_table(const std::vector<TableRow>& rows, std::size_t figures);
 
 }  // namespace arboretum

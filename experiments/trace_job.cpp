@@ -13,18 +13,14 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kRaysPerTask = 4096;  // at least: 64 x 64 pixels of the Morton order
-constexpr std::size_t kTasksPerThread = 8;   // at least; `auto` finds out anew in each task how its rays go
+constexpr std::size_t kTasksPerThread = 8;  // at least; `auto` finds out anew in each task how its rays go
 constexpr std::uint64_t kMostPasses = 1'000'000;
 constexpr std::size_t kMostPoints = 4000;  // of a cell's leaks
 
 }  // namespace
 
 TraceJob::TraceJob(const Cell& cell, const Accel& accel, const Workload& workload, AnswerBuffers& buffers)
-    : cell_(cell),
-      accel_(accel),
-      workload_(workload),
-      buffers_(buffers),
-      arena_(static_cast<int>(cell.threads)) {
+    : cell_(cell), accel_(accel), workload_(workload), buffers_(buffers), arena_(static_cast<int>(cell.threads)) {
   if (workload.query == Query::closest_hit)
     buffers.hits.resize(std::max(buffers.hits.size(), workload.rays.size()));
   else
@@ -34,7 +30,8 @@ TraceJob::TraceJob(const Cell& cell, const Accel& accel, const Workload& workloa
 void TraceJob::closest(RayBatch rays, std::size_t first, Counters* counters) const {
   const auto hits = std::span(buffers_.hits).subspan(first, rays.size());
   if (workload_.excludes_sources)
-    closest_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), hits, counters);
+    closest_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), hits,
+                          counters);
   else
     cell_.kernel->closest_hit(accel_, rays, hits, counters);
 }
@@ -42,7 +39,8 @@ void TraceJob::closest(RayBatch rays, std::size_t first, Counters* counters) con
 void TraceJob::any(RayBatch rays, std::size_t first, Counters* counters) const {
   const auto occluded = std::span(buffers_.occluded).subspan(first, rays.size());
   if (workload_.excludes_sources)
-    any_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), occluded, counters);
+    any_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), occluded,
+                      counters);
   else
     cell_.kernel->any_hit(accel_, rays, occluded, counters);
 }
@@ -63,8 +61,9 @@ void TraceJob::trace(std::size_t rays) const {
   };
   if (cell_.threads == 1) return range(0, rays);
   arena_.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays, std::max(kRaysPerTask, rays / (kTasksPerThread * cell_.threads))),
-                      [&](const tbb::blocked_range<std::size_t>& r) { range(r.begin(), r.end()); });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, rays, std::max(kRaysPerTask, rays / (kTasksPerThread * cell_.threads))),
+        [&](const tbb::blocked_range<std::size_t>& r) { range(r.begin(), r.end()); });
   });
 }
 
@@ -107,8 +106,7 @@ void TraceJob::prepare(Json& facts, SceneData& data, const MeasureSettings& meas
   const double begin = wall_seconds();
   trace(rays);
   const double pass = std::max(wall_seconds() - begin, 1e-9);
-  passes_ =
-      static_cast<std::uint64_t>(std::clamp(std::ceil(measure.min_time / pass), 1.0, double(kMostPasses)));
+  passes_ = static_cast<std::uint64_t>(std::clamp(std::ceil(measure.min_time / pass), 1.0, double(kMostPasses)));
 }
 
 Repetition TraceJob::measure(TimedLoop& loop) const {

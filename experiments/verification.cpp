@@ -29,23 +29,28 @@ std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j,
     if (is_hit && answer.primitive != truth.hit.primitive) return "not the lowest primitive at the exact nearest t";
     if (is_hit && answer.t != truth.hit.t) return "t is not the exact t rounded";
     if (any != AnyAnswer::miss && any != AnyAnswer::hit) return "any hit leaves its answer unwritten";
-    if ((any == AnyAnswer::hit) != is_hit) return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
+    if ((any == AnyAnswer::hit) != is_hit)
+      return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
   }
   const bool aimed_at_edges = kind == HardKind::edge || kind == HardKind::border || kind == HardKind::interior;
   if (promise.coverage == Coverage::closed || (promise.coverage == Coverage::edges && aimed_at_edges)) {
     if (j.crack) return "lost through a closed surface";
     if (any_crack) return "any hit: lost through a closed surface";
   }
-  if (promise.t_ulp > 0 && j.t_error_ulp > promise.t_ulp && !j.wrong_primitive) return "t is off by more than is promised";
+  if (promise.t_ulp > 0 && j.t_error_ulp > promise.t_ulp && !j.wrong_primitive)
+    return "t is off by more than is promised";
   return {};
 }
 
 class Judge {
  public:
   Judge(const Cell& cell, const VerifyBatch& batch)
-      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box, batch.mesh.instancing != nullptr)), largest_(largest_coordinate(batch.mesh.bounds())) {}
+      : batch_(batch),
+        promise_(promise_of(cell.structure, cell.intersector, cell.box, batch.mesh.instancing != nullptr)),
+        largest_(largest_coordinate(batch.mesh.bounds())) {}
 
-  void operator()(std::size_t i, const Hit& answer, AnyAnswer any, const Hit* reference, std::vector<VerifyTally>& tallies) const {
+  void operator()(std::size_t i, const Hit& answer, AnyAnswer any, const Hit* reference,
+                  std::vector<VerifyTally>& tallies) const {
     const Ray& ray = batch_.rays.rays[i];
     const ExactHit& truth = batch_.truth[i];
     const float time = batch_.rays.times.empty() ? 0.0f : batch_.rays.times[i];
@@ -92,8 +97,8 @@ bool is_within(const Promise& promise, const Ray& ray, float largest) noexcept {
 
 const Accel& StructureShelf::get(const Cell& cell) {
   const StructureEntry* entry = registry_.structure(cell.structure);
-  BuildSettings settings{cell.builder, cell.leaf, entry->info.build_depends_on_isa ? cell.isa : registry_.isas.back(), threads_,
-                         cell.parameters};
+  BuildSettings settings{cell.builder, cell.leaf, entry->info.build_depends_on_isa ? cell.isa : registry_.isas.back(),
+                         threads_, cell.parameters};
   std::unique_ptr<Accel>& accel = built_[{cell.structure, cell.builder_name(), cell.leaf, settings.isa}];
   if (accel) return *accel;
   BuildReport report;
@@ -103,8 +108,8 @@ const Accel& StructureShelf::get(const Cell& cell) {
   return *(built_[{cell.structure, cell.builder_name(), cell.leaf, settings.isa}] = std::move(fresh));
 }
 
-std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const VerifyBatch& batch, std::vector<Hit>& hits,
-                                     std::span<const Hit> reference) {
+std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const VerifyBatch& batch,
+                                     std::vector<Hit>& hits, std::span<const Hit> reference) {
   const std::size_t count = batch.rays.rays.size();
   hits.assign(count, kUnwritten);
   const Judge judge(cell, batch);
@@ -135,7 +140,8 @@ void VerifiedCell::add(std::size_t variant, const std::vector<VerifyTally>& by_k
   for (std::size_t k = 0; k < by_kind.size(); ++k) tallies[variant][k] += by_kind[k];
 }
 
-void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf, const VerifyBatch& batch) {
+void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf,
+                const VerifyBatch& batch) {
   std::map<std::tuple<std::string, std::string, Isa>, std::vector<Hit>> references;
   std::vector<Hit> hits;
   for (VerifiedCell& verified : cells) {

@@ -1,4 +1,5 @@
-// Verification: cells' answers to hard rays, judged ray by ray against the exact ones and against what the cells promise.
+// Verification: cells' answers to hard rays, judged ray by ray against the exact ones and against what the cells
+// promise.
 #pragma once
 
 #include <map>
@@ -30,7 +31,8 @@ class StructureShelf {
   /// Both must outlive it. `threads` build.
   StructureShelf(const TriangleMesh& mesh, const Registry& registry, unsigned threads)
       : mesh_(mesh), registry_(registry), threads_(threads) {}
-  /// Throws UserError as build_structure() does. The reference holds until the next call: beyond kMostBytes all others are dropped.
+  /// Throws UserError as build_structure() does. The reference holds until the next call: beyond kMostBytes all others
+  /// are dropped.
   [[nodiscard]] const Accel& get(const Cell& cell);
 
   static constexpr std::size_t kMostBytes = std::size_t{6} << 30;
@@ -45,11 +47,13 @@ class StructureShelf {
   std::size_t bytes_ = 0;
 };
 
-/// Whether the cell's promise speaks of this ray: the numbers of ray and scene, whose largest coordinate this is, are within its range.
+/// Whether the cell's promise speaks of this ray: the numbers of ray and scene, whose largest coordinate this is, are
+/// within its range.
 [[nodiscard]] bool is_within(const Promise& promise, const Ray& ray, float largest) noexcept;
 
-/// Traces closest and any hit of the whole batch, in blocks on all TBB threads allowed to the caller, and counts, one tally for
-/// each kind of kHardKindNames. `hits` becomes the cell's answers; `reference`, where it is not empty, those of another cell.
+/// Traces closest and any hit of the whole batch, in blocks on all TBB threads allowed to the caller, and counts, one
+/// tally for each kind of kHardKindNames. `hits` becomes the cell's answers; `reference`, where it is not empty, those
+/// of another cell.
 [[nodiscard]] std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const VerifyBatch& batch,
                                                    std::vector<Hit>& hits, std::span<const Hit> reference);
 

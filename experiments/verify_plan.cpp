@@ -12,19 +12,22 @@ namespace {
 
 std::vector<std::string> all_values(Axis axis, const Registry& registry, bool without_brute_force) {
   std::vector<std::string> values = known_values(axis, registry);
-  std::erase_if(values, [&](const std::string& v) { return v == kAuto || v == kAll || v == "packet" || v == "hybrid"; });
+  std::erase_if(values,
+                [&](const std::string& v) { return v == kAuto || v == kAll || v == "packet" || v == "hybrid"; });
   if (axis == Axis::isa) {
     values.clear();
     for (Isa isa : registry.isas) values.emplace_back(to_string(isa));
   }
   if (axis == Axis::structure)
-    std::erase_if(values, [&](const std::string& v) { return v == "embree" || (v == "brute_force" && without_brute_force); });
+    std::erase_if(values,
+                  [&](const std::string& v) { return v == "embree" || (v == "brute_force" && without_brute_force); });
   return values;
 }
 
 }  // namespace
 
-Plan make_verify_plan(const VerifyCommand& command, const SceneChoice& scene, bool without_brute_force, const Registry& registry) {
+Plan make_verify_plan(const VerifyCommand& command, const SceneChoice& scene, bool without_brute_force,
+                      const Registry& registry) {
   Experiment experiment;
   experiment.name = "verify", experiment.scenes = {scene};
   experiment.metrics = {.trace = true, .build = false, .quality = false, .accuracy = true};
@@ -39,7 +42,8 @@ Plan make_verify_plan(const VerifyCommand& command, const SceneChoice& scene, bo
     }
     AxisWord read = read_axis_word(word, registry, {});
     if (read.key == "workload" || read.key == "threads")
-      throw UserError(fmt::format("command line: verify has rays of its own and no {} axis; see --kinds, --threads", read.key));
+      throw UserError(
+          fmt::format("command line: verify has rays of its own and no {} axis; see --kinds, --threads", read.key));
     experiment.axes[index_of(*parse_axis(read.key))] = std::move(read.values);
   }
   const auto fill = [&](Axis a, std::vector<std::string> values) {

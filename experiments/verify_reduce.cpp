@@ -46,7 +46,8 @@ class Reducer {
     for (std::size_t step = std::max<std::size_t>(ids.size() / 2, 1); step > 0; step /= 2) {
       for (std::size_t begin = 0; begin < ids.size();) {
         Ids fewer(ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(begin));
-        fewer.insert(fewer.end(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(begin + step, ids.size())), ids.end());
+        fewer.insert(fewer.end(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(begin + step, ids.size())),
+                     ids.end());
         if (is_broken(fewer))
           ids = std::move(fewer);
         else
@@ -72,13 +73,15 @@ Ids about(const TriangleMesh& mesh, const Breach& breach) {
   }
   Ids ids;
   for (std::uint32_t i = 0; i < mesh.size(); ++i)
-    if (std::ranges::any_of(mesh.corners(i), [&](Vec3f p) { return std::ranges::find(corners, p) != corners.end(); })) ids.push_back(i);
+    if (std::ranges::any_of(mesh.corners(i), [&](Vec3f p) { return std::ranges::find(corners, p) != corners.end(); }))
+      ids.push_back(i);
   return ids;
 }
 
 }  // namespace
 
-std::optional<TriangleMesh> reduce(const VerifiedCell& cell, const Registry& registry, const TriangleMesh& mesh, const Breach& breach) {
+std::optional<TriangleMesh> reduce(const VerifiedCell& cell, const Registry& registry, const TriangleMesh& mesh,
+                                   const Breach& breach) {
   if (mesh.moves()) return std::nullopt;
   const Reducer reducer(cell, registry, mesh, breach);
   Ids ids = about(mesh, breach);

@@ -10,9 +10,7 @@ constexpr int kLowest = -32, kHighest = 40, kPerOctave = 16;  // exponents of tw
 constexpr std::size_t kBins = std::size_t{kHighest - kLowest} * kPerOctave + 1;
 
 /// Bin b > 0 holds what is above 2^(kLowest + (b - 1) / kPerOctave) and not above the next; bin 0 all that is below.
-double upper_end(std::size_t bin) {
-  return std::exp2(double(kLowest) + double(bin) / kPerOctave);
-}
+double upper_end(std::size_t bin) { return std::exp2(double(kLowest) + double(bin) / kPerOctave); }
 
 }  // namespace
 
@@ -46,7 +44,8 @@ double ErrorHistogram::quantile(double p) const {
 
 VerifyTally& VerifyTally::operator+=(const VerifyTally& o) {
   rays += o.rays, exact_hits += o.exact_hits;
-  missed += o.missed, false_hits += o.false_hits, wrong_surface += o.wrong_surface, wrong_primitive += o.wrong_primitive;
+  missed += o.missed, false_hits += o.false_hits, wrong_surface += o.wrong_surface,
+      wrong_primitive += o.wrong_primitive;
   cracks += o.cracks, any_missed += o.any_missed, any_false += o.any_false;
   self_hits += o.self_hits, differs += o.differs, broken += o.broken;
   t_ulp += o.t_ulp, uv += o.uv;

@@ -41,7 +41,8 @@ struct Breach {
 
 struct VerifyTally {
   std::uint64_t rays = 0, exact_hits = 0;
-  std::uint64_t missed = 0, false_hits = 0, wrong_surface = 0, wrong_primitive = 0, cracks = 0;  ///< as AnswerCheck has them
+  /// as AnswerCheck has them
+  std::uint64_t missed = 0, false_hits = 0, wrong_surface = 0, wrong_primitive = 0, cracks = 0;
   std::uint64_t any_missed = 0, any_false = 0;
   std::uint64_t self_hits = 0;  ///< of the triangle that the ray starts on, where that is not the exact answer
   std::uint64_t differs = 0;    ///< t or primitive is not that of the first cell with the same intersector, box and ISA

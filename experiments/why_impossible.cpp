@@ -42,8 +42,10 @@ std::string impossible_below(const Cell& cell, const Registry& registry) {
 std::string why_impossible(Cell& cell, bool moves, const Registry& registry) {
   const StructureEntry* entry = registry.structure(cell.structure);
   if (!entry) return std::string(kEmbreeMissing);
-  if (moves && !entry->info.holds_motion) return fmt::format("{} holds one moment, and the scene moves", cell.structure);
-  if (!moves && entry->info.needs_motion) return fmt::format("{} is for moving scenes, and nothing moves", cell.structure);
+  if (moves && !entry->info.holds_motion)
+    return fmt::format("{} holds one moment, and the scene moves", cell.structure);
+  if (!moves && entry->info.needs_motion)
+    return fmt::format("{} is for moving scenes, and nothing moves", cell.structure);
   // First what is below: builder and leaf are its own.
   if (entry->info.takes_below && !moves) {
     if (std::string why = impossible_below(cell, registry); !why.empty()) return why;
@@ -51,7 +53,8 @@ std::string why_impossible(Cell& cell, bool moves, const Registry& registry) {
   if (const std::string why = lacks_builder(*entry, cell.builder); !why.empty()) return why;
   cell.kernel = registry.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
   if (!cell.kernel) {
-    const std::string why = registry.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
+    const std::string why =
+        registry.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
     return why.empty() ? "no such kernel in this build" : why;
   }
   return impossible_setting(cell);

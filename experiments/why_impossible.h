@@ -1,4 +1,5 @@
-// Why a combination of the axes cannot be measured anywhere: structures, builders, kernels and their settings that do not go together.
+// Why a combination of the axes cannot be measured anywhere: structures, builders, kernels and their settings that do
+// not go together.
 #pragma once
 
 #include <string>

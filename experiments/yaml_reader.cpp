@@ -21,8 +21,7 @@ std::string read_text(const std::filesystem::path& file) {
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
   if (!std::filesystem::exists(status)) {
-    throw UserError(
-        fmt::format("{}: no such file; name a configuration, as in configs/quick.yaml", file.string()));
+    throw UserError(fmt::format("{}: no such file; name a configuration, as in configs/quick.yaml", file.string()));
   }
   if (std::filesystem::is_directory(status)) {
     throw UserError(fmt::format("{}: is a folder; name the YAML file in it", file.string()));
@@ -44,8 +43,8 @@ void refuse_tabs(const std::string& text, const std::filesystem::path& file) {
     else if (c == '#' && (before == ' ' || before == '\n' || before == '\t'))
       comment = true;
     else if (c == '\t' && !comment) {
-      throw UserError(fmt::format("{}:{}: a tab; YAML is indented with spaces: put spaces in its place",
-                                  file.string(), line));
+      throw UserError(
+          fmt::format("{}:{}: a tab; YAML is indented with spaces: put spaces in its place", file.string(), line));
     }
     before = c;
   }
@@ -72,8 +71,8 @@ YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
   try {
     root_ = YAML::Load(text);
   } catch (const YAML::Exception& e) {
-    throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it",
-                                file_.string(), e.mark.line + 1, e.msg));
+    throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it", file_.string(),
+                                e.mark.line + 1, e.msg));
   }
   if (!root_ || root_.IsNull())
     throw UserError(fmt::format("{}: empty; a configuration has at least `scenes`", file_.string()));
@@ -88,8 +87,7 @@ void YamlReader::fail(const YAML::Node& node, const std::string& message) const 
   throw UserError(where(node) + ": " + message);
 }
 
-void YamlReader::check_map(const YAML::Node& node, std::string_view what,
-                           std::span<const std::string> keys) const {
+void YamlReader::check_map(const YAML::Node& node, std::string_view what, std::span<const std::string> keys) const {
   if (!node.IsMap())
     fail(node, fmt::format("{} must be a map of {}, not {}", what, fmt::join(keys, ", "), shown(node)));
   std::set<std::string> seen;
@@ -99,10 +97,8 @@ void YamlReader::check_map(const YAML::Node& node, std::string_view what,
     const std::string key = entry.first.Scalar();
     if (std::ranges::find(keys, key) == keys.end())
       fail(entry.first, unknown_name_message(fmt::format("key in {}", what), key, keys));
-    if (!seen.insert(key).second)
-      fail(entry.first, fmt::format("{}: '{}' is given twice; keep one", what, key));
-    if (entry.second.IsNull())
-      fail(entry.first, fmt::format("'{}' has no value; give one or take the line out", key));
+    if (!seen.insert(key).second) fail(entry.first, fmt::format("{}: '{}' is given twice; keep one", what, key));
+    if (entry.second.IsNull()) fail(entry.first, fmt::format("'{}' has no value; give one or take the line out", key));
   }
 }
 
@@ -142,8 +138,7 @@ std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, std::string_vie
   } else {
     fail(node, fmt::format("{} must be a list, not {}", what, shown(node)));
   }
-  if (values.empty())
-    fail(node, fmt::format("{} is empty; name at least one value or take the line out", what));
+  if (values.empty()) fail(node, fmt::format("{} is empty; name at least one value or take the line out", what));
   std::set<std::string> seen;
   for (const YAML::Node& value : values) {
     if (!value.IsScalar() || value.Scalar().empty())

@@ -1,10 +1,11 @@
-// Baldwin and Weber (JCGT 5(3) 2016): an affine map, computed with the tree, takes the triangle to (0,0,0), (1,0,0), (0,1,0). The ray is
-// where its third coordinate vanishes: t = -height(o) / height(d); the point there has the barycentrics as its first two.
-// One column of the map is a column of the identity; the paper leaves it out and branches over which one it is. Lanes cannot branch, so the
-// column stands in the block (wald_projection leaves it out and selects instead). 48 bytes a triangle.
+// Baldwin and Weber (JCGT 5(3) 2016): an affine map, computed with the tree, takes the triangle to (0,0,0), (1,0,0),
+// (0,1,0). The ray is where its third coordinate vanishes: t = -height(o) / height(d); the point there has the
+// barycentrics as its first two. One column of the map is a column of the identity; the paper leaves it out and
+// branches over which one it is. Lanes cannot branch, so the column stands in the block (wald_projection leaves it out
+// and selects instead). 48 bytes a triangle.
 //
-// Leaks along edges, and the map's offsets are as large as the triangle is far from the origin: t is off by no more than
-// 2^-21 (|o| + |v0| + |t d|) / |height(d)|, sums of absolute components meant. Precise near the origin alone.
+// Leaks along edges, and the map's offsets are as large as the triangle is far from the origin: t is off by no more
+// than 2^-21 (|o| + |v0| + |t d|) / |height(d)|, sums of absolute components meant. Precise near the origin alone.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -26,7 +27,9 @@ struct BaldwinWeber {
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
     constexpr int W = Block::kWidth;
     using F = vf<W>;
-    const auto row = [&block](int i) { return vf3<W>{F::load(block.number[i]), F::load(block.number[i + 1]), F::load(block.number[i + 2])}; };
+    const auto row = [&block](int i) {
+      return vf3<W>{F::load(block.number[i]), F::load(block.number[i + 1]), F::load(block.number[i + 2])};
+    };
     const vf3<W> o{F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)};
     const vf3<W> d{F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)};
     const vf3<W> height = row(8);

@@ -2,11 +2,13 @@
 //
 // triangleM  (EdgeBlock):   first vertex, e1 = v0 - v1, e2 = v2 - v0; the edges are rounded, once, to float.
 // triangleMv (VertexBlock): the three vertices as they are, what the crack-free intersectors need.
-// triangleMi (IndexBlock):  the indices of the three vertices in the mesh: 16 bytes a triangle instead of 40, one look-up more.
-// triangleMw (TransformBlock), triangleMh (PlaneBlock), triangleMp (ProjectionBlock): what baldwin_weber, havel_herout and wald_projection
+// triangleMi (IndexBlock):  the indices of the three vertices in the mesh: 16 bytes a triangle instead of 40, one
+// look-up more. triangleMw (TransformBlock), triangleMh (PlaneBlock), triangleMp (ProjectionBlock): what baldwin_weber,
+// havel_herout and wald_projection
 //   precompute (intersectors/precomputed.h), 48, 48 and 40 bytes a triangle beside the id.
-// A lane without a triangle, or with one of exactly zero area, holds NaN coordinates (every comparison false: never hit); without a triangle its
-// id is kNoPrimitive. Among indices an empty lane repeats the block's first triangle, id included, which changes no answer.
+// A lane without a triangle, or with one of exactly zero area, holds NaN coordinates (every comparison false: never
+// hit); without a triangle its id is kNoPrimitive. Among indices an empty lane repeats the block's first triangle, id
+// included, which changes no answer.
 #pragma once
 
 #include <array>
@@ -33,8 +35,10 @@ template <int M>
 struct alignas(8) EdgeBlock {
   static constexpr int kWidth = M;
   static constexpr TriangleForm kForm = TriangleForm::edges;
-  static constexpr std::string_view kName =
-      M == 1 ? "triangle1" : M == 4 ? "triangle4" : M == 8 ? "triangle8" : "triangle16";
+  static constexpr std::string_view kName = M == 1   ? "triangle1"
+                                            : M == 4 ? "triangle4"
+                                            : M == 8 ? "triangle8"
+                                                     : "triangle16";
   float v0[3][M];
   float e1[3][M];  ///< v0 - v1
   float e2[3][M];  ///< v2 - v0
@@ -54,8 +58,10 @@ template <int M>
 struct alignas(8) VertexBlock {
   static constexpr int kWidth = M;
   static constexpr TriangleForm kForm = TriangleForm::vertices;
-  static constexpr std::string_view kName =
-      M == 1 ? "triangle1v" : M == 4 ? "triangle4v" : M == 8 ? "triangle8v" : "triangle16v";
+  static constexpr std::string_view kName = M == 1   ? "triangle1v"
+                                            : M == 4 ? "triangle4v"
+                                            : M == 8 ? "triangle8v"
+                                                     : "triangle16v";
   float v0[3][M];
   float v1[3][M];
   float v2[3][M];
@@ -76,8 +82,10 @@ template <int M>
 struct alignas(8) IndexBlock {
   static constexpr int kWidth = M;
   static constexpr TriangleForm kForm = TriangleForm::indices;
-  static constexpr std::string_view kName =
-      M == 1 ? "triangle1i" : M == 4 ? "triangle4i" : M == 8 ? "triangle8i" : "triangle16i";
+  static constexpr std::string_view kName = M == 1   ? "triangle1i"
+                                            : M == 4 ? "triangle4i"
+                                            : M == 8 ? "triangle8i"
+                                                     : "triangle16i";
   std::uint32_t vertex[3][M];
   std::uint32_t id[M];
 };
@@ -111,8 +119,10 @@ template <int M>
 struct alignas(8) ProjectionBlock {
   static constexpr int kWidth = M;
   static constexpr TriangleForm kForm = TriangleForm::projection;
-  static constexpr std::string_view kName =
-      M == 1 ? "triangle1p" : M == 4 ? "triangle4p" : M == 8 ? "triangle8p" : "triangle16p";
+  static constexpr std::string_view kName = M == 1   ? "triangle1p"
+                                            : M == 4 ? "triangle4p"
+                                            : M == 8 ? "triangle8p"
+                                                     : "triangle16p";
   float number[9][M];
   std::int32_t axis[M];
   std::uint32_t id[M];
@@ -130,8 +140,8 @@ template <template <int> class Block>
 using EveryWidth = TypeList<Block<1>, Block<4>, Block<8>, Block<16>>;
 
 /// Every leaf block that there is.
-using AllBlocks = ConcatLists<EveryWidth<EdgeBlock>, EveryWidth<VertexBlock>, EveryWidth<IndexBlock>, EveryWidth<TransformBlock>,
-                              EveryWidth<PlaneBlock>, EveryWidth<ProjectionBlock>>;
+using AllBlocks = ConcatLists<EveryWidth<EdgeBlock>, EveryWidth<VertexBlock>, EveryWidth<IndexBlock>,
+                              EveryWidth<TransformBlock>, EveryWidth<PlaneBlock>, EveryWidth<ProjectionBlock>>;
 
 /// Bytes that hold any of them.
 template <class... Blocks>
@@ -208,7 +218,8 @@ template <class Block>
 /// The triangles of `blocks` consecutive blocks, appended to `out`.
 template <class Block>
 void append_primitives(const Block* block, unsigned blocks, std::vector<std::uint32_t>& out) {
-  for (const Block* end = block + blocks; block != end; ++block) out.insert(out.end(), block->id, block->id + triangles_in(*block));
+  for (const Block* end = block + blocks; block != end; ++block)
+    out.insert(out.end(), block->id, block->id + triangles_in(*block));
 }
 
 }  // namespace arboretum

@@ -9,8 +9,9 @@
 // It may have
 //   finish(RayData&, NearestHit&): the search is over, and this is its hit. Without it RayData never changes;
 //   accept(RayData&, const Block&, lane): that lane has become the nearest hit;
-//   ForManyRays<Block>(const Block&): a block with what is the same for all rays, which intersect() takes in the block's place, with the same answers;
-//   closest_hit_block(RayData&, const Block&, tnear, NearestHit&) and any_hit_block(RayData&, const Block&, tnear, tfar): instead of those below.
+//   ForManyRays<Block>(const Block&): a block with what is the same for all rays, which intersect() takes in the
+//   block's place, with the same answers; closest_hit_block(RayData&, const Block&, tnear, NearestHit&) and
+//   any_hit_block(RayData&, const Block&, tnear, tfar): instead of those below.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -64,7 +65,9 @@ ARBORETUM_INLINE VertexBlock<M> readable(const IndexBlock<M>& block, const Vec3f
 }
 
 template <class Intersector>
-inline constexpr bool kFinishes = requires { &Intersector::finish; };
+inline constexpr bool kFinishes = requires {
+  &Intersector::finish;
+};
 
 template <class Intersector, bool Changes = kFinishes<Intersector>>
 struct RayDataFor {
@@ -79,7 +82,8 @@ template <class Intersector>
 using RayDataOf = typename RayDataFor<Intersector>::Type;
 
 template <class Intersector, class Block>
-ARBORETUM_INLINE bool closest_hit_block(RayDataOf<Intersector>& ray, const Block& block, float tnear, NearestHit& best) {
+ARBORETUM_INLINE bool closest_hit_block(RayDataOf<Intersector>& ray, const Block& block, float tnear,
+                                        NearestHit& best) {
   if constexpr (requires { Intersector::closest_hit_block(ray, block, tnear, best); }) {
     return Intersector::closest_hit_block(ray, block, tnear, best);
   } else {
@@ -88,7 +92,8 @@ ARBORETUM_INLINE bool closest_hit_block(RayDataOf<Intersector>& ray, const Block
     vm<W> m = Intersector::intersect(ray, block, hits);
     if (none(m)) return false;
     const vi<W> id = vi<W>::load(block.id);
-    m = m & (hits.t >= vf<W>(tnear)) & ((hits.t < vf<W>(best.t)) | ((hits.t == vf<W>(best.t)) & (id < vi<W>(best.primitive))));
+    m = m & (hits.t >= vf<W>(tnear)) &
+        ((hits.t < vf<W>(best.t)) | ((hits.t == vf<W>(best.t)) & (id < vi<W>(best.primitive))));
     unsigned bits = m.bits();
     if (!bits) return false;
     if (bits & (bits - 1)) {
@@ -126,12 +131,16 @@ ARBORETUM_INLINE bool any_hit_block(RayDataOf<Intersector>& ray, const Block& bl
 
 /// The intersector has a form of blocks for many rays.
 template <class Intersector, class Block>
-inline constexpr bool kSharesBlocks = requires { typename Intersector::template ForManyRays<Block>; };
+inline constexpr bool kSharesBlocks = requires {
+  typename Intersector::template ForManyRays<Block>;
+};
 
-/// Tests the blocks of a leaf with `rays`, a bit each, a block after the other. `ray(i)` and `data(i)`: the i-th ray and what the intersector keeps for it. Of any hit `hit(i)` is
-/// called once, for one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
+/// Tests the blocks of a leaf with `rays`, a bit each, a block after the other. `ray(i)` and `data(i)`: the i-th ray
+/// and what the intersector keeps for it. Of any hit `hit(i)` is called once, for one that has met something; of the
+/// closest, when `best(i)`, its nearest hit so far, is a new one.
 template <bool AnyHit, class Intersector, class Block, class RayAt, class DataOf, class BestOf, class OnHit>
-ARBORETUM_INLINE void test_block_by_block(const Block* block, unsigned count, std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best, const OnHit& hit) {
+ARBORETUM_INLINE void test_block_by_block(const Block* block, unsigned count, std::uint64_t rays, const RayAt& ray,
+                                          const DataOf& data, const BestOf& best, const OnHit& hit) {
   for (const Block* const end = block + count; block != end && rays != 0; ++block) {
     const typename Intersector::template ForManyRays<Block> seen(*block);
     for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
@@ -152,7 +161,8 @@ template <class Intersector, class Block>
 struct BlockTests {
   using RayData = RayDataOf<Intersector>;
 
-  static ARBORETUM_INLINE bool closest_hit(RayData& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, NearestHit& best) {
+  static ARBORETUM_INLINE bool closest_hit(RayData& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices,
+                                           float tnear, NearestHit& best) {
     const auto* block = reinterpret_cast<const Block*>(blocks);
     const Block* const end = block + count;
     bool changed = false;
@@ -160,7 +170,8 @@ struct BlockTests {
     while (++block != end);
     return changed;
   }
-  static ARBORETUM_INLINE bool any_hit(RayData& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, float tfar) {
+  static ARBORETUM_INLINE bool any_hit(RayData& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices,
+                                       float tnear, float tfar) {
     const auto* block = reinterpret_cast<const Block*>(blocks);
     const Block* const end = block + count;
     do {

@@ -1,8 +1,9 @@
 // LeafTests: how one intersector tests the triangles of one kind of leaf block on one instruction set.
 //
-// A table beside the kernel table: an intersector is compiled once for each block and instruction set, and every structure and way of
-// traversal calls it, so that a new intersector works with all of them. Kernels in which the call itself would count have the
-// tests of their usual leaves compiled in instead (traversal/leaves.h); the answers are the same.
+// A table beside the kernel table: an intersector is compiled once for each block and instruction set, and every
+// structure and way of traversal calls it, so that a new intersector works with all of them. Kernels in which the call
+// itself would count have the tests of their usual leaves compiled in instead (traversal/leaves.h); the answers are the
+// same.
 #pragma once
 
 #include <cstddef>
@@ -39,9 +40,12 @@ struct LeafTests {
   Isa isa = Isa::scalar;
   const LeafForm* form = nullptr;
   void (*prepare)(const Ray& ray, PreparedRay& prepared) = nullptr;
-  /// Takes the nearest hit of the blocks within [tnear, best.t] into `best`, at equal t that of the lower id. Returns whether it is a new one.
-  bool (*closest_hit)(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, NearestHit& best) = nullptr;
-  bool (*any_hit)(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, float tfar) = nullptr;
+  /// Takes the nearest hit of the blocks within [tnear, best.t] into `best`, at equal t that of the lower id. Returns
+  /// whether it is a new one.
+  bool (*closest_hit)(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear,
+                      NearestHit& best) = nullptr;
+  bool (*any_hit)(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear,
+                  float tfar) = nullptr;
   /// nullptr, or what is to be done once with the nearest hit of all.
   void (*finish)(PreparedRay& ray, NearestHit& best) = nullptr;
   /// Boxes may be tight along the ray (traversal/box_test.h).

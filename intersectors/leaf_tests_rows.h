@@ -1,4 +1,5 @@
-// Entries of the table of leaf tests for one intersector on one instruction set. Units are generated (cmake/Intersectors.cmake).
+// Entries of the table of leaf tests for one intersector on one instruction set. Units are generated
+// (cmake/Intersectors.cmake).
 #pragma once
 
 #include "intersectors/leaf_block.h"
@@ -7,12 +8,16 @@ namespace arboretum {
 
 /// An intersector can read a block's form, or that which readable() makes of it.
 template <class Intersector, class Block>
-inline constexpr bool kCanRead = Intersector::reads(Block::kForm == TriangleForm::indices ? TriangleForm::vertices : Block::kForm);
+inline constexpr bool kCanRead = Intersector::reads(Block::kForm == TriangleForm::indices ? TriangleForm::vertices
+                                                                                          : Block::kForm);
 
-/// An intersector that says so: what it hits is as far away, along the axis where the direction is largest, as some point between the triangle's corners, and all that it
-/// misjudges is where the ray passes across that axis (traversal/box_test.h).
+/// An intersector that says so: what it hits is as far away, along the axis where the direction is largest, as some
+/// point between the triangle's corners, and all that it misjudges is where the ray passes across that axis
+/// (traversal/box_test.h).
 template <class Intersector>
-inline constexpr bool kDepthBetweenCorners = requires { requires Intersector::kDepthBetweenCorners; };
+inline constexpr bool kDepthBetweenCorners = requires {
+  requires Intersector::kDepthBetweenCorners;
+};
 
 namespace ARBORETUM_ISA_NAMESPACE {
 
@@ -23,10 +28,12 @@ struct CalledTests {
 
   static RayData& data(PreparedRay& ray) { return *reinterpret_cast<RayData*>(ray.bytes); }
   static void prepare(const Ray& ray, PreparedRay& prepared) { new (prepared.bytes) RayData(ray); }
-  static bool closest_hit(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, NearestHit& best) {
+  static bool closest_hit(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear,
+                          NearestHit& best) {
     return BlockTests<Intersector, Block>::closest_hit(data(ray), blocks, count, vertices, tnear, best);
   }
-  static bool any_hit(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear, float tfar) {
+  static bool any_hit(PreparedRay& ray, const std::byte* blocks, unsigned count, const Vec3f* vertices, float tnear,
+                      float tfar) {
     return BlockTests<Intersector, Block>::any_hit(data(ray), blocks, count, vertices, tnear, tfar);
   }
   static void finish(PreparedRay& ray, NearestHit& best) {
@@ -38,8 +45,9 @@ struct CalledTests {
 template <class Intersector>
 using BlocksOf = std::conditional_t<
     Intersector::kEveryLeaf,
-    ConcatLists<BlocksOfWidth<EdgeBlock, kRegisterWidth>, BlocksOfWidth<VertexBlock, kRegisterWidth>, BlocksOfWidth<IndexBlock, kRegisterWidth>,
-                BlocksOfWidth<TransformBlock, kRegisterWidth>, BlocksOfWidth<PlaneBlock, kRegisterWidth>, BlocksOfWidth<ProjectionBlock, kRegisterWidth>>,
+    ConcatLists<BlocksOfWidth<EdgeBlock, kRegisterWidth>, BlocksOfWidth<VertexBlock, kRegisterWidth>,
+                BlocksOfWidth<IndexBlock, kRegisterWidth>, BlocksOfWidth<TransformBlock, kRegisterWidth>,
+                BlocksOfWidth<PlaneBlock, kRegisterWidth>, BlocksOfWidth<ProjectionBlock, kRegisterWidth>>,
     std::conditional_t<(kRegisterWidth >= 8), TypeList<VertexBlock<1>, VertexBlock<4>, VertexBlock<8>, IndexBlock<4>>,
                        TypeList<VertexBlock<1>, VertexBlock<4>, IndexBlock<4>>>>;
 
@@ -48,7 +56,8 @@ void add_leaf_tests(std::vector<LeafTests>& list) {
   for_each_type(BlocksOf<Intersector>{}, [&]<class Block>(std::type_identity<Block>) {
     if constexpr (kCanRead<Intersector, Block>) {
       using T = CalledTests<Intersector, Block>;
-      list.push_back({Block::kName, Intersector::kName, kIsa, nullptr, &T::prepare, &T::closest_hit, &T::any_hit, kFinishes<Intersector> ? &T::finish : nullptr, kDepthBetweenCorners<Intersector>});
+      list.push_back({Block::kName, Intersector::kName, kIsa, nullptr, &T::prepare, &T::closest_hit, &T::any_hit,
+                      kFinishes<Intersector> ? &T::finish : nullptr, kDepthBetweenCorners<Intersector>});
     }
   });
 }

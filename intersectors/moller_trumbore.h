@@ -13,7 +13,10 @@ template <class F>
 struct MollerTrumboreTerms {
   vec3<F> n, c;
   F det, u, v;
-  ARBORETUM_INLINE MollerTrumboreTerms(vec3<F> v0, vec3<F> e1, vec3<F> e2, vec3<F> o, vec3<F> d) : MollerTrumboreTerms(cross(e2, e1), v0 - o) { meet(e1, e2, d); }
+  ARBORETUM_INLINE MollerTrumboreTerms(vec3<F> v0, vec3<F> e1, vec3<F> e2, vec3<F> o, vec3<F> d)
+      : MollerTrumboreTerms(cross(e2, e1), v0 - o) {
+    meet(e1, e2, d);
+  }
   /// Of a triangle and an origin; meet() does the rest.
   ARBORETUM_INLINE MollerTrumboreTerms(vec3<F> normal, vec3<F> from_origin) : n(normal), c(from_origin) {}
   ARBORETUM_INLINE void meet(vec3<F> e1, vec3<F> e2, vec3<F> d) {
@@ -24,7 +27,9 @@ struct MollerTrumboreTerms {
 
 struct MollerTrumbore {
   static constexpr std::string_view kName = "moller_trumbore";
-  static constexpr bool reads(TriangleForm form) { return form == TriangleForm::edges || form == TriangleForm::vertices; }
+  static constexpr bool reads(TriangleForm form) {
+    return form == TriangleForm::edges || form == TriangleForm::vertices;
+  }
   static constexpr bool kEveryLeaf = true;
 
   /// One ray's constants.
@@ -37,12 +42,15 @@ struct MollerTrumbore {
   template <class Block>
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
     using F = vf<Block::kWidth>;
-    return core<F>({F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)}, {F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)}, block,
-                   [](const float(&p)[Block::kWidth]) { return F::load(p); }, hits);
+    return core<F>(
+        {F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)},
+        {F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)}, block,
+        [](const float(&p)[Block::kWidth]) { return F::load(p); }, hits);
   }
 
-  /// A block as rays of one origin see it: what core() makes of origin and triangle alone, once for all of them. (With R.e2 written as d.(e2 x C), as is
-  /// usual for rays of one origin, less would be left for each ray, but it would round in another way than for rays that go alone.)
+  /// A block as rays of one origin see it: what core() makes of origin and triangle alone, once for all of them. (With
+  /// R.e2 written as d.(e2 x C), as is usual for rays of one origin, less would be left for each ray, but it would
+  /// round in another way than for rays that go alone.)
   template <int M>
   struct FromOrigin {
     static constexpr int kWidth = M;
@@ -52,7 +60,9 @@ struct MollerTrumbore {
     template <class Block>
     ARBORETUM_INLINE FromOrigin(const Block& block, Vec3f origin) {
       using F = vf<M>;
-      const auto store = [](vf3<M> from, float(&to)[3][M]) { from.x.store(to[0]), from.y.store(to[1]), from.z.store(to[2]); };
+      const auto store = [](vf3<M> from, float(&to)[3][M]) {
+        from.x.store(to[0]), from.y.store(to[1]), from.z.store(to[2]);
+      };
       const Corners<F> t = corners(block, [](const float(&p)[M]) { return F::load(p); });
       const MollerTrumboreTerms<F> terms(normal(block, t), t.v0 - vf3<M>{F(origin.x), F(origin.y), F(origin.z)});
       store(terms.c, c), store(terms.n, n), store(t.e1, e1), store(t.e2, e2), dot(terms.n, terms.c).store(n_dot_c);
@@ -85,14 +95,18 @@ struct MollerTrumbore {
     [[nodiscard]] ARBORETUM_INLINE RayData alone(const Ray& ray, int /*i*/) const { return RayData(ray); }
   };
 
-  /// Lanes are the W rays from k on, all against triangle `i` of the block: what intersect() computes, bit for bit. `again`: rays that must be
-  /// tested one by one instead; here none.
+  /// Lanes are the W rays from k on, all against triangle `i` of the block: what intersect() computes, bit for bit.
+  /// `again`: rays that must be tested one by one instead; here none.
   template <int W, class Block>
-  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData&, int /*group*/, int k, const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
+  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData&, int /*group*/, int k,
+                                               const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
     using F = vf<W>;
-    const auto load = [k](const float(&p)[3][PacketRays::kMost]) { return vf3<W>{F::load(p[0] + k), F::load(p[1] + k), F::load(p[2] + k)}; };
+    const auto load = [k](const float(&p)[3][PacketRays::kMost]) {
+      return vf3<W>{F::load(p[0] + k), F::load(p[1] + k), F::load(p[2] + k)};
+    };
     again = vm<W>(false);
-    return core<F>(load(rays.origin), load(rays.direction), block, [i](const float(&p)[Block::kWidth]) { return F(p[i]); }, hits);
+    return core<F>(
+        load(rays.origin), load(rays.direction), block, [i](const float(&p)[Block::kWidth]) { return F(p[i]); }, hits);
   }
 
  private:
@@ -135,13 +149,15 @@ struct MollerTrumbore {
     const Corners<F> t = corners(block, get);
     MollerTrumboreTerms<F> terms(normal(block, t), t.v0 - o);
     terms.meet(t.e1, t.e2, d);
-    return decide(terms, [&] { return dot(terms.n, terms.c); }, hits);
+    return decide(
+        terms, [&] { return dot(terms.n, terms.c); }, hits);
   }
   template <class F, int M, class Get, class Hits>
   static ARBORETUM_INLINE auto core(vec3<F> /*o*/, vec3<F> d, const FromOrigin<M>& block, const Get& get, Hits& hits) {
     MollerTrumboreTerms<F> terms(three(get, block.n), three(get, block.c));
     terms.meet(three(get, block.e1), three(get, block.e2), d);
-    return decide(terms, [&] { return get(block.n_dot_c); }, hits);
+    return decide(
+        terms, [&] { return get(block.n_dot_c); }, hits);
   }
 
   template <class F, class Distance, class Hits>

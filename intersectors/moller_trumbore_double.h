@@ -1,7 +1,8 @@
-// Moeller and Trumbore's test (intersectors/moller_trumbore.h) on float32 corners widened to double; t, u and v are rounded to float at the
-// end. t is right to half a unit in the last place, and a little, unless the ray grazes: its relative error is some 2^-50 times
-// |e1||e2||d| / |N.d|. Not watertight: the two sides of an edge still compute different sums, so a few in a million rays aimed at edges are
-// lost, and a few in a thousand of those aimed at vertices. 36 bytes a triangle (vertices) or 12 (indices).
+// Moeller and Trumbore's test (intersectors/moller_trumbore.h) on float32 corners widened to double; t, u and v are
+// rounded to float at the end. t is right to half a unit in the last place, and a little, unless the ray grazes: its
+// relative error is some 2^-50 times |e1||e2||d| / |N.d|. Not watertight: the two sides of an edge still compute
+// different sums, so a few in a million rays aimed at edges are lost, and a few in a thousand of those aimed at
+// vertices. 36 bytes a triangle (vertices) or 12 (indices).
 #pragma once
 
 #include "intersectors/double_block.h"

@@ -9,8 +9,8 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// What the test needs of three corners relative to the origin and a direction, in float or double: the edges that face corners 1 and 2, and
-/// the three edge functions.
+/// What the test needs of three corners relative to the origin and a direction, in float or double: the edges that face
+/// corners 1 and 2, and the three edge functions.
 template <class F>
 struct PlueckerTerms {
   vec3<F> edge_u, edge_v;

@@ -1,6 +1,7 @@
-// The Pluecker test (intersectors/pluecker.h) on float32 corners widened to double; t, u and v are rounded to float at the end. As there, no
-// ray slips through an edge, and one in ten thousand or so aimed at a vertex can; t is right to half a unit in the last place, and a little,
-// unless the ray grazes: its relative error is some 2^-50 times |e1||e2||d| / |N.d|. 36 bytes a triangle (vertices) or 12 (indices).
+// The Pluecker test (intersectors/pluecker.h) on float32 corners widened to double; t, u and v are rounded to float at
+// the end. As there, no ray slips through an edge, and one in ten thousand or so aimed at a vertex can; t is right to
+// half a unit in the last place, and a little, unless the ray grazes: its relative error is some 2^-50 times
+// |e1||e2||d| / |N.d|. 36 bytes a triangle (vertices) or 12 (indices).
 #pragma once
 
 #include "intersectors/double_block.h"
@@ -25,7 +26,8 @@ struct PlueckerDouble {
   static ARBORETUM_INLINE unsigned test(vec3<F> v0, vec3<F> v1, vec3<F> v2, vec3<F> o, vec3<F> d, F& t, F& u, F& v) {
     const vec3<F> p0 = v0 - o;
     const PlueckerTerms<F> terms(p0, v1 - o, v2 - o, d);
-    const F smallest = min_x86(min_x86(terms.u, terms.v), terms.w), largest = max_x86(max_x86(terms.u, terms.v), terms.w);
+    const F smallest = min_x86(min_x86(terms.u, terms.v), terms.w),
+            largest = max_x86(max_x86(terms.u, terms.v), terms.w);
     const F sum = terms.u + terms.v + terms.w;
     unsigned inside = ((smallest >= F(0.0)) | (F(0.0) >= largest)) & (sum != F(0.0));
     if (inside) {

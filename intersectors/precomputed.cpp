@@ -21,7 +21,8 @@ struct Frame {
   Vec3d v0, e1, e2, n;
   std::size_t axis;  ///< along which the normal is largest
   explicit Frame(const std::array<Vec3f, 3>& corner) noexcept
-      : v0(to_double(corner[0])), e1(difference(to_double(corner[1]), v0)), e2(difference(to_double(corner[2]), v0)), n(cross(e1, e2)) {
+      : v0(to_double(corner[0])), e1(difference(to_double(corner[1]), v0)), e2(difference(to_double(corner[2]), v0)),
+        n(cross(e1, e2)) {
     const Vec3d size{std::abs(n[0]), std::abs(n[1]), std::abs(n[2])};
     axis = std::size_t(std::max_element(size.begin(), size.end()) - size.begin());
   }
@@ -47,10 +48,9 @@ ProjectedTriangle projected_triangle(const std::array<Vec3f, 3>& corner) noexcep
   const std::size_t k = f.axis, a = (k + 1) % 3, b = (k + 2) % 3;
   const double r = 1.0 / f.n[k];
   // ((p - v0) x e2)_axis / n_axis is u, (e1 x (p - v0))_axis / n_axis is v.
-  const std::array<double, 9> number{
-      f.n[a] * r,  f.n[b] * r,   dot(f.n, f.v0) * r,                               //
-      f.e2[b] * r, -f.e2[a] * r, (f.v0[b] * f.e2[a] - f.v0[a] * f.e2[b]) * r,      //
-      -f.e1[b] * r, f.e1[a] * r, (f.v0[a] * f.e1[b] - f.v0[b] * f.e1[a]) * r};
+  const std::array<double, 9> number{f.n[a] * r,   f.n[b] * r,   dot(f.n, f.v0) * r,                           //
+                                     f.e2[b] * r,  -f.e2[a] * r, (f.v0[b] * f.e2[a] - f.v0[a] * f.e2[b]) * r,  //
+                                     -f.e1[b] * r, f.e1[a] * r,  (f.v0[a] * f.e1[b] - f.v0[b] * f.e1[a]) * r};
   return {rounded(number), std::int32_t(k)};
 }
 

@@ -12,12 +12,13 @@ enum class Coverage : unsigned char {
   none,
   edges,   ///< no ray is lost at an edge that two triangles share; at a vertex it may be
   closed,  ///< no ray is lost through a closed surface; past its silhouette it may be, by the rounding of the vertices
-  exact    ///< hit or miss, primitive (the lowest id at the nearest t) and t rounded to float are those of exact arithmetic
+  exact    ///< hit or miss, primitive (the lowest id at the nearest t) and t rounded to float are those of exact
+           ///< arithmetic
 };
 
 /// `coverage` stands on boxes that lose nothing. `t_ulp`: |t - exact t| at most, in units of the last place, where the
-/// primitive is right; 0: no bound. `exponent`: the promise holds where the largest |coordinate| of scene and ray origin and the
-/// largest |direction component| are within 2^-exponent .. 2^exponent; 0: for every finite float32.
+/// primitive is right; 0: no bound. `exponent`: the promise holds where the largest |coordinate| of scene and ray
+/// origin and the largest |direction component| are within 2^-exponent .. 2^exponent; 0: for every finite float32.
 struct IntersectorPromise {
   std::string_view intersector;
   Coverage coverage;
@@ -28,18 +29,22 @@ struct IntersectorPromise {
 
 inline constexpr IntersectorPromise kIntersectorPromises[] = {
     {"moller_trumbore", Coverage::none, 0, 40, "the two sides of an edge compute different sums"},
-    {"moller_trumbore_double", Coverage::none, 0, 40, "as moller_trumbore, with fewer rays lost and t nearly always to the last bit"},
+    {"moller_trumbore_double", Coverage::none, 0, 40,
+     "as moller_trumbore, with fewer rays lost and t nearly always to the last bit"},
     {"pluecker", Coverage::edges, 0, 40, "the two sides of an edge compute values of exactly opposite sign"},
     {"pluecker_double", Coverage::edges, 0, 40, "as pluecker, with t nearly always to the last bit"},
-    {"watertight", Coverage::closed, 0, 40, "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
-    {"watertight_refined", Coverage::closed, 0, 40, "as watertight, the nearest hit's t, u, v computed again in double"},
+    {"watertight", Coverage::closed, 0, 40,
+     "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
+    {"watertight_refined", Coverage::closed, 0, 40,
+     "as watertight, the nearest hit's t, u, v computed again in double"},
     {"baldwin_weber", Coverage::none, 0, 40, "stored transformation: accurate near the origin alone"},
     {"havel_herout", Coverage::none, 0, 40, "stored planes: accurate near the origin alone"},
     {"wald_projection", Coverage::none, 0, 40, "neighbours are projected along different axes"},
     {"exact", Coverage::exact, 0.5, 0, "filtered, and exact arithmetic where the filter cannot decide"},
 };
 
-/// `loses_nothing`: no box that the exact ray touches is missed, and none whose triangle is an ulp nearer than the best hit culled.
+/// `loses_nothing`: no box that the exact ray touches is missed, and none whose triangle is an ulp nearer than the best
+/// hit culled.
 struct BoxPromise {
   std::string_view box;
   bool loses_nothing;
@@ -48,7 +53,9 @@ struct BoxPromise {
 
 inline constexpr BoxPromise kBoxPromises[] = {
     {"fast", false, "rounding can lose a box that the ray touches at a face, edge or corner"},
-    {"ize", false, "meets boxes that the ray is in for 2^-22 of its distance or more; may miss one that it only touches, or as near as the best hit"},
+    {"ize", false,
+     "meets boxes that the ray is in for 2^-22 of its distance or more; may miss one that it only touches, or as near "
+     "as the best hit"},
     {"padded", true, "never misses a box that the exact ray touches"},
 };
 
@@ -60,9 +67,11 @@ struct Promise {
   [[nodiscard]] bool any() const noexcept { return coverage != Coverage::none || t_ulp > 0; }
 };
 
-/// Combinations that the tables do not name promise nothing; nor does Embree, whose kernels are not ours, nor `two_level` over `instances`: it decides in the object
-/// space of each, with a ray that is rounded once more, which triangle of the scene laid out flat is hit.
-[[nodiscard]] constexpr Promise promise_of(std::string_view structure, std::string_view intersector, std::string_view box, bool instances = false) noexcept {
+/// Combinations that the tables do not name promise nothing; nor does Embree, whose kernels are not ours, nor
+/// `two_level` over `instances`: it decides in the object space of each, with a ray that is rounded once more, which
+/// triangle of the scene laid out flat is hit.
+[[nodiscard]] constexpr Promise promise_of(std::string_view structure, std::string_view intersector,
+                                           std::string_view box, bool instances = false) noexcept {
   if (structure == "embree" || (instances && structure == "two_level")) return {};
   for (const IntersectorPromise& i : kIntersectorPromises) {
     if (i.intersector != intersector) continue;

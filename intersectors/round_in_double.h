@@ -1,5 +1,6 @@
-// Rounding the last hit of `exact`, one ray at a time with x, y and z in lanes: core/exact/hit_arithmetic.cpp has the formulas and their bounds,
-// with pairs of doubles for machines without AVX. The same operations in the same order here, so the same bits.
+// Rounding the last hit of `exact`, one ray at a time with x, y and z in lanes: core/exact/hit_arithmetic.cpp has the
+// formulas and their bounds, with pairs of doubles for machines without AVX. The same operations in the same order
+// here, so the same bits.
 #pragma once
 
 #include "core/exact/hit_arithmetic.h"
@@ -24,7 +25,8 @@ struct CornersInFours {
     for (int k = 0; k < 3; ++k) put(k, corners[std::size_t(k)].x, corners[std::size_t(k)].y, corners[std::size_t(k)].z);
   }
   [[nodiscard]] std::array<Vec3f, 3> corners() const {
-    return {Vec3f{at[0][0], at[0][1], at[0][2]}, Vec3f{at[1][0], at[1][1], at[1][2]}, Vec3f{at[2][0], at[2][1], at[2][2]}};
+    return {Vec3f{at[0][0], at[0][1], at[0][2]}, Vec3f{at[1][0], at[1][1], at[1][2]},
+            Vec3f{at[2][0], at[2][1], at[2][2]}};
   }
 
  private:
@@ -43,7 +45,9 @@ struct CornersInFours {
 /// Vectors x y z and a number that means nothing.
 namespace in_fours {
 ARBORETUM_INLINE __m256d yzx(__m256d p) { return _mm256_permute4x64_pd(p, 1 | 2 << 2 | 0 << 4 | 3 << 6); }
-ARBORETUM_INLINE __m256d cross(__m256d p, __m256d q) { return yzx(_mm256_sub_pd(_mm256_mul_pd(p, yzx(q)), _mm256_mul_pd(yzx(p), q))); }
+ARBORETUM_INLINE __m256d cross(__m256d p, __m256d q) {
+  return yzx(_mm256_sub_pd(_mm256_mul_pd(p, yzx(q)), _mm256_mul_pd(yzx(p), q)));
+}
 ARBORETUM_INLINE __m256d sizes(__m256d p) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), p); }
 /// The x of p q r s, their y, their z.
 struct Transposed {
@@ -63,7 +67,8 @@ ARBORETUM_INLINE bool round_in_double(Vec3f origin, Vec3f direction, const Corne
   using namespace in_fours;
   constexpr double kBound = 56 * 0x1p-53;
   const __m256d a = _mm256_cvtps_pd(_mm_load_ps(corners.at[0]));
-  const __m256d e1 = _mm256_sub_pd(_mm256_cvtps_pd(_mm_load_ps(corners.at[1])), a), e2 = _mm256_sub_pd(_mm256_cvtps_pd(_mm_load_ps(corners.at[2])), a);
+  const __m256d e1 = _mm256_sub_pd(_mm256_cvtps_pd(_mm_load_ps(corners.at[1])), a),
+                e2 = _mm256_sub_pd(_mm256_cvtps_pd(_mm_load_ps(corners.at[2])), a);
   const __m256d d = _mm256_cvtps_pd(_mm_setr_ps(direction.x, direction.y, direction.z, 0.0f));
   const __m256d s = _mm256_sub_pd(_mm256_cvtps_pd(_mm_setr_ps(origin.x, origin.y, origin.z, 0.0f)), a);
   const __m256d p = cross(d, e2), q = cross(s, e1);
@@ -75,7 +80,8 @@ ARBORETUM_INLINE bool round_in_double(Vec3f origin, Vec3f direction, const Corne
   const __m256d quotients = _mm256_div_pd(_mm256_blend_pd(dots, _mm256_set1_pd(kBound * (1 + 0x1p-8)), 1), det);
   const __m128d scale_t = _mm256_castpd256_pd128(quotients), uv = _mm256_extractf128_pd(quotients, 1);
   const __m128d size_e = _mm256_castpd256_pd128(largest), size_ds = _mm256_extractf128_pd(largest, 1);
-  const double t = high(scale_t), scale = __builtin_fabs(low(scale_t)), size_1 = low(size_e), size_2 = high(size_e), size_d = low(size_ds), size_s = high(size_ds);
+  const double t = high(scale_t), scale = __builtin_fabs(low(scale_t)), size_1 = low(size_e), size_2 = high(size_e),
+               size_d = low(size_ds), size_s = high(size_ds);
   const double det_error = scale * size_1 * size_2 * size_d;
   const double radius = scale * size_1 * size_2 * size_s + __builtin_fabs(t) * (det_error + 0x1p-50);
   const double weight_radius = scale * size_d * size_s * (size_1 > size_2 ? size_1 : size_2) + det_error + 0x1p-50;

@@ -1,5 +1,6 @@
-// The last hits of several rays of `exact`, rounded together with the rays in lanes: a third of the instructions of one after the other, and no ray
-// waits for its own. The operations of round_in_double.h on each ray, in the same order, so the same bits.
+// The last hits of several rays of `exact`, rounded together with the rays in lanes: a third of the instructions of one
+// after the other, and no ray waits for its own. The operations of round_in_double.h on each ray, in the same order, so
+// the same bits.
 #pragma once
 
 #include "intersectors/round_in_double.h"
@@ -62,7 +63,8 @@ class UnroundedHits {
     count_ = 0;
     const auto corner = [&](int k) { return gather([&](int i) { return corners_[k][i]; }); };
     const vd3<kLanes> a = corner(0), e1 = corner(1) - a, e2 = corner(2) - a;
-    const vd3<kLanes> d = gather([&](int i) { return &ray_[i]->direction.x; }), s = gather([&](int i) { return &ray_[i]->origin.x; }) - a;
+    const vd3<kLanes> d = gather([&](int i) { return &ray_[i]->direction.x; }),
+                      s = gather([&](int i) { return &ray_[i]->origin.x; }) - a;
     const vd3<kLanes> p = cross(d, e2), q = cross(s, e1);
     const D det = dot(e1, p);
     const D size_1 = size_of(e1), size_2 = size_of(e2), size_d = size_of(d), size_s = size_of(s);
@@ -72,7 +74,8 @@ class UnroundedHits {
     const D weight_radius = scale * size_d * size_s * max_x86(size_1, size_2) + det_error + D(0x1p-50);
     const auto weight = [](D w) { return min_x86(max_x86(D(0.0), w), D(1.0)); };
     float low[kLanes], high[kLanes], u[kLanes], v[kLanes];
-    (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) / det).store(u), weight(dot(d, q) / det).store(v);
+    (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) / det).store(u),
+        weight(dot(d, q) / det).store(v);
     // Comparisons that a NaN makes false.
     const unsigned bounded = (det_error < D(0x1p-9)) & (weight_radius < D(0x1p-30));
     for (int i = 0; i < kLanes; ++i) {

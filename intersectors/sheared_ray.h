@@ -1,6 +1,7 @@
-// What `watertight` and `exact` keep for a ray: its axes in an order in which the direction is largest along the last, and the constants that
-// shear triangles so that the ray is that axis (Woop, Benthin, Wald, JCGT 2(1) 2013). Found without a branch, since the axis of a
-// secondary ray cannot be foretold, and kept in memory, from where a lane's worth is loaded as cheaply as a register is copied.
+// What `watertight` and `exact` keep for a ray: its axes in an order in which the direction is largest along the last,
+// and the constants that shear triangles so that the ray is that axis (Woop, Benthin, Wald, JCGT 2(1) 2013). Found
+// without a branch, since the axis of a secondary ray cannot be foretold, and kept in memory, from where a lane's worth
+// is loaded as cheaply as a register is copied.
 #pragma once
 
 #include "simd/swizzle.h"
@@ -24,7 +25,8 @@ struct AxisOrder {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
     return vf<4>::map([&](int i) { return a.lane[bytes[4 * i] / 4]; });
 #else
-    return vf<4>(_mm_castsi128_ps(_mm_shuffle_epi8(_mm_castps_si128(a.v), _mm_load_si128(reinterpret_cast<const __m128i*>(bytes)))));
+    return vf<4>(_mm_castsi128_ps(
+        _mm_shuffle_epi8(_mm_castps_si128(a.v), _mm_load_si128(reinterpret_cast<const __m128i*>(bytes)))));
 #endif
   }
 };
@@ -40,8 +42,8 @@ ARBORETUM_INLINE const AxisOrder& largest_last(vf<4> direction) {
 }
 
 struct ShearedRay {
-  alignas(16) float from[4];       ///< the origin; tnear
-  alignas(16) float shear[4];      ///< dx/dz, dy/dz, -1/dz
+  alignas(16) float from[4];   ///< the origin; tnear
+  alignas(16) float shear[4];  ///< dx/dz, dy/dz, -1/dz
   alignas(16) float direction[4];
   const AxisOrder* order;
 
@@ -50,12 +52,13 @@ struct ShearedRay {
     (minus_one_for_z(d) / permute_in_fours<2, 2, 2, 2>(d)).store(shear);
   }
   /// With shear constants known.
-  ARBORETUM_INLINE ShearedRay(const Ray& ray, unsigned axis, float shear_x, float shear_y, float shear_z) : ShearedRay(ray, kAxisOrders[axis]) {
+  ARBORETUM_INLINE ShearedRay(const Ray& ray, unsigned axis, float shear_x, float shear_y, float shear_z)
+      : ShearedRay(ray, kAxisOrders[axis]) {
     shear[0] = shear_x, shear[1] = shear_y, shear[2] = shear_z;
   }
 
-  /// The same, but the compiler does not know: it would copy every number into a vector of its own on the stack, and load it from there. 32 registers
-  /// (AVX-512) hold them; SSE has no load that copies.
+  /// The same, but the compiler does not know: it would copy every number into a vector of its own on the stack, and
+  /// load it from there. 32 registers (AVX-512) hold them; SSE has no load that copies.
   [[nodiscard]] ARBORETUM_INLINE const ShearedRay& in_memory() const {
     const ShearedRay* p = this;
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
@@ -67,7 +70,8 @@ struct ShearedRay {
   /// Row of a block's coordinates along an axis, x, y or z of an AxisOrder.
   template <int W>
   [[nodiscard]] static ARBORETUM_INLINE const float* row(const float (&p)[3][W], std::uint32_t axis) {
-    return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(p) + (W < 4 ? std::size_t(axis) / (4 / W) : std::size_t(axis) * (W / 4)));
+    return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(p) +
+                                          (W < 4 ? std::size_t(axis) / (4 / W) : std::size_t(axis) * (W / 4)));
   }
 
  private:
@@ -85,9 +89,9 @@ struct ShearedRay {
   }
 };
 
-/// The three vertices of a block's triangles, sheared: x and y so that the ray is the z axis, z along it. All with their signs turned, as the
-/// origin is seen from them, since the origin is in a register and they are in memory; products of two of them are what they would be, and a
-/// product with -1/dz is a distance.
+/// The three vertices of a block's triangles, sheared: x and y so that the ray is the z axis, z along it. All with
+/// their signs turned, as the origin is seen from them, since the origin is in a register and they are in memory;
+/// products of two of them are what they would be, and a product with -1/dz is a distance.
 template <int W>
 struct ShearedVertices {
   using F = vf<W>;
@@ -99,7 +103,8 @@ struct ShearedVertices {
     const AxisOrder& axes = *ray.order;
     const auto shear = [&](const float(&p)[3][W]) {
       const F pz = oz - F::load(ShearedRay::row(p, axes.z));
-      return vf3<W>{nmadd(sx, pz, ox - F::load(ShearedRay::row(p, axes.x))), nmadd(sy, pz, oy - F::load(ShearedRay::row(p, axes.y))), pz};
+      return vf3<W>{nmadd(sx, pz, ox - F::load(ShearedRay::row(p, axes.x))),
+                    nmadd(sy, pz, oy - F::load(ShearedRay::row(p, axes.y))), pz};
     };
     a = shear(block.v0), b = shear(block.v1), c = shear(block.v2);
   }

@@ -1,6 +1,7 @@
-// Wald's projection test (thesis 2004, 7.1.1; after Badouel, Graphics Gems 1990): the triangle is projected along the axis on which its
-// normal is largest. Three numbers give its plane, solved for that axis, and so t; three each give u and v of the hit's other two coordinates.
-// The paper branches over the axis; here each lane selects its axes of the ray. 40 bytes a triangle, the least of the precomputed forms.
+// Wald's projection test (thesis 2004, 7.1.1; after Badouel, Graphics Gems 1990): the triangle is projected along the
+// axis on which its normal is largest. Three numbers give its plane, solved for that axis, and so t; three each give u
+// and v of the hit's other two coordinates. The paper branches over the axis; here each lane selects its axes of the
+// ray. 40 bytes a triangle, the least of the precomputed forms.
 //
 // Leaks along edges, most of all where neighbours project along different axes; t is off by no more than
 // 2^-21 (|o| + |v0| + |t d|) / (|N.d| / |N|max), sums of absolute components meant. Precise near the origin alone.
@@ -20,8 +21,11 @@ struct WaldProjection {
   struct RayData {
     float origin[5], direction[5];
     ARBORETUM_INLINE explicit RayData(const Ray& ray)
-        : origin{ray.origin.x, ray.origin.y, ray.origin.z, ray.origin.x, ray.origin.y},
-          direction{ray.direction.x, ray.direction.y, ray.direction.z, ray.direction.x, ray.direction.y} {}
+        : origin{ray.origin.x, ray.origin.y, ray.origin.z, ray.origin.x, ray.origin.y}, direction{ray.direction.x,
+                                                                                                  ray.direction.y,
+                                                                                                  ray.direction.z,
+                                                                                                  ray.direction.x,
+                                                                                                  ray.direction.y} {}
   };
 
   template <class Block>
@@ -34,7 +38,8 @@ struct WaldProjection {
     // A line in the plane, or in one parallel to it, makes t infinite or NaN, and the point with it: not inside.
     const F t = (number(2) - madd(nu, o.y, madd(nv, o.z, o.x))) / madd(nu, d.y, madd(nv, d.z, d.x));
     const F y = madd(t, d.y, o.y), z = madd(t, d.z, o.z);
-    const F u = madd(number(3), y, madd(number(4), z, number(5))), v = madd(number(6), y, madd(number(7), z, number(8)));
+    const F u = madd(number(3), y, madd(number(4), z, number(5))),
+            v = madd(number(6), y, madd(number(7), z, number(8)));
     hits = {t, u, v, F(1.0f)};
     return (u >= F(0.0f)) & (v >= F(0.0f)) & (u + v <= F(1.0f));
   }
@@ -49,7 +54,8 @@ struct WaldProjection {
       const vi<W> k = vi<W>::load(axis);
       const vm<W> first = k == vi<W>(0), second = k == vi<W>(1);
       const vf<W> x(p[0]), y(p[1]), z(p[2]);
-      return {select(first, x, select(second, y, z)), select(first, y, select(second, z, x)), select(first, z, select(second, x, y))};
+      return {select(first, x, select(second, y, z)), select(first, y, select(second, z, x)),
+              select(first, z, select(second, x, y))};
     }
   }
 };

@@ -1,23 +1,25 @@
-// Watertight ray/triangle intersection (Woop, Benthin, Wald, JCGT 2(1) 2013), with each edge decided by its two rounded products
-// alone: the sign of their difference, which gradual underflow keeps, so the same as comparing them.
+// Watertight ray/triangle intersection (Woop, Benthin, Wald, JCGT 2(1) 2013), with each edge decided by its two rounded
+// products alone: the sign of their difference, which gradual underflow keeps, so the same as comparing them.
 //
 // Every vertex is translated, permuted and sheared once per (ray, vertex), alike in all triangles that share it, so the
 // rounded 2-D mesh stays closed; rounding is monotone, so an exact Cx*By > Cy*Bx is never computed as <, and a tie is
-// inside on both sides. The products must not be fused with their difference (-ffp-contract=off); the shear may, being one expression
-// for every vertex. A tie may be rounding alone, and then a triangle far beside the ray would be taken for hit (small
-// triangles seen from a great distance): in lanes that pass with a tie, double products, exact for float inputs, decide,
-// as in the paper.
+// inside on both sides. The products must not be fused with their difference (-ffp-contract=off); the shear may, being
+// one expression for every vertex. A tie may be rounding alone, and then a triangle far beside the ray would be taken
+// for hit (small triangles seen from a great distance): in lanes that pass with a tie, double products, exact for float
+// inputs, decide, as in the paper.
 //
-// t is a mean of the vertices' depths, so its error grows with their distance, not with t: beside a large triangle a ray
-// that starts on it could meet it again. Let s be the largest less the smallest depth in units of t, R the sum of the squares of all nine sheared
-// coordinates, u = 2^-24. A sheared x or y is off by delta = u (2 L + 3 Z), or u (2 L + 4 Z) unfused (exact.h), so by less than 4.5 u sqrt(R); an
-// edge function of corners b, c then by sqrt(2) delta (|b| + |c|), and by 2 u |b||c| in its own roundings. Where the ray meets the triangle, t moves by
-// the sum of these times |depth - t| over |det|: s times those of two edges at most, 15.6 u R s + 1.5 u R s. Its other roundings are
-// under 9 u max |depth| <= 9 u (s + |t|), and |det| <= R. So |error of t| < 27 u R s / |det| + 9 u |t|: all but the last, which is t's own rounding, within
-// 2^-19 R s / |det|. Where that could turn t across tnear, and where t is closer to tnear than 2^-10 of s and so inaccurate
-// itself, t is computed again from the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle
-// that is met only because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the surface all
-// the same. What lies clearly before tnear, as the triangle that a ray has just left, is not.
+// t is a mean of the vertices' depths, so its error grows with their distance, not with t: beside a large triangle a
+// ray that starts on it could meet it again. Let s be the largest less the smallest depth in units of t, R the sum of
+// the squares of all nine sheared coordinates, u = 2^-24. A sheared x or y is off by delta = u (2 L + 3 Z), or u (2 L +
+// 4 Z) unfused (exact.h), so by less than 4.5 u sqrt(R); an edge function of corners b, c then by sqrt(2) delta (|b| +
+// |c|), and by 2 u |b||c| in its own roundings. Where the ray meets the triangle, t moves by the sum of these times
+// |depth - t| over |det|: s times those of two edges at most, 15.6 u R s + 1.5 u R s. Its other roundings are under 9 u
+// max |depth| <= 9 u (s + |t|), and |det| <= R. So |error of t| < 27 u R s / |det| + 9 u |t|: all but the last, which
+// is t's own rounding, within 2^-19 R s / |det|. Where that could turn t across tnear, and where t is closer to tnear
+// than 2^-10 of s and so inaccurate itself, t is computed again from the triangle's plane, in double, and kept between
+// the nearest and the farthest corner: a triangle that is met only because its corners are rounded, edge on, has its
+// plane anywhere along the ray, and must close the surface all the same. What lies clearly before tnear, as the
+// triangle that a ray has just left, is not.
 #pragma once
 
 #include "intersectors/sheared_ray.h"
@@ -37,14 +39,16 @@ struct Watertight {
   using RayData = ShearedRay;
 
   template <class Block>
-  static ARBORETUM_INLINE auto intersect(const ShearedRay& given, const Block& block, TriangleHits<Block::kWidth>& hits) {
+  static ARBORETUM_INLINE auto intersect(const ShearedRay& given, const Block& block,
+                                         TriangleHits<Block::kWidth>& hits) {
     constexpr int W = Block::kWidth;
     const ShearedRay& ray = given.in_memory();
     const Edges<W> e(ShearedVertices<W>(ray, block));
     vm<W> inside = e.inside();
     if (const unsigned met = inside.bits()) {
       const unsigned open = met & ~e.hits(vf<W>(ray.tnear()), vf<W>(ray.shear[2]), hits).bits();
-      // What the rare functions are handed is copied, or read from memory again: a reference to the vectors here would keep all of them in memory.
+      // What the rare functions are handed is copied, or read from memory again: a reference to the vectors here would
+      // keep all of them in memory.
       if (__builtin_expect(open != 0, 0)) {
         if (__builtin_expect(any(inside & e.ties()), 0)) {
           TriangleHits<W> decided = hits;
@@ -69,14 +73,16 @@ struct Watertight {
     template <int W>
     ARBORETUM_INLINE void prepare(const PacketRays& rays, int k) {
       using F = vf<W>;
-      const F x = F::load(rays.direction[0] + k), y = F::load(rays.direction[1] + k), z = F::load(rays.direction[2] + k);
+      const F x = F::load(rays.direction[0] + k), y = F::load(rays.direction[1] + k),
+              z = F::load(rays.direction[2] + k);
       const F ax = abs(x), ay = abs(y), az = abs(z);
       const vm<W> by_x = (ax > ay) & (ax > az), by_y = ~(ax > ay) & (ay > az);
       const F dz = select(by_x, x, select(by_y, y, z));
       (select(by_x, y, select(by_y, z, x)) / dz).store(sx + k);
       (select(by_x, z, select(by_y, x, y)) / dz).store(sy + k);
       (F(-1.0f) / dz).store(sz + k);
-      of_axis[0] |= std::uint64_t(by_x.bits()) << k, of_axis[1] |= std::uint64_t(by_y.bits()) << k, of_axis[2] |= std::uint64_t((~(by_x | by_y)).bits()) << k;
+      of_axis[0] |= std::uint64_t(by_x.bits()) << k, of_axis[1] |= std::uint64_t(by_y.bits()) << k,
+          of_axis[2] |= std::uint64_t((~(by_x | by_y)).bits()) << k;
     }
     [[nodiscard]] std::uint64_t group(int kz) const { return of_axis[kz]; }
     /// RayData of ray i.
@@ -85,15 +91,19 @@ struct Watertight {
     }
   };
 
-  /// Lanes are the W rays from k on, all against triangle `i` of the block: what intersect() computes, bit for bit. `again`: rays for which
-  /// doubles must decide, to be tested one by one.
+  /// Lanes are the W rays from k on, all against triangle `i` of the block: what intersect() computes, bit for bit.
+  /// `again`: rays for which doubles must decide, to be tested one by one.
   template <int W, class Block>
-  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData& shears, int kz, int k, const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
+  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData& shears, int kz, int k,
+                                               const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
     using F = vf<W>;
     const int kx = kz == 2 ? 0 : kz + 1, ky = kx == 2 ? 0 : kx + 1;
     const vf3<W> o{F::load(rays.origin[kx] + k), F::load(rays.origin[ky] + k), F::load(rays.origin[kz] + k)};
-    const auto seen = [&](const float(&p)[3][Block::kWidth]) { return o - vf3<W>{F(p[kx][i]), F(p[ky][i]), F(p[kz][i])}; };
-    const Edges<W> e(ShearedVertices<W>(F::load(shears.sx + k), F::load(shears.sy + k), seen(block.v0), seen(block.v1), seen(block.v2)));
+    const auto seen = [&](const float(&p)[3][Block::kWidth]) {
+      return o - vf3<W>{F(p[kx][i]), F(p[ky][i]), F(p[kz][i])};
+    };
+    const Edges<W> e(ShearedVertices<W>(F::load(shears.sx + k), F::load(shears.sy + k), seen(block.v0), seen(block.v1),
+                                        seen(block.v2)));
     const vm<W> inside = e.inside();
     again = vm<W>(false);
     if (any(inside)) again = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits);
@@ -112,7 +122,8 @@ struct Watertight {
       u = p.c.x * p.b.y - p.c.y * p.b.x, v = p.a.x * p.c.y - p.a.y * p.c.x, w = p.b.x * p.a.y - p.b.y * p.a.x;
       sides = min_x86(min_x86(u, v), w) * max_x86(max_x86(u, v), w);
     }
-    /// Also lanes in which the product has underflowed, on whichever side: ties(), which doubles decide. Of triangles below some 1e-11 those are most.
+    /// Also lanes in which the product has underflowed, on whichever side: ties(), which doubles decide. Of triangles
+    /// below some 1e-11 those are most.
     ARBORETUM_INLINE vm<W> inside() const { return sides >= F(0.0f); }
     /// Of lanes inside, those in which an edge is met, or may be.
     ARBORETUM_INLINE vm<W> ties() const { return sides == F(0.0f); }
@@ -134,9 +145,11 @@ struct Watertight {
     }
   };
 
-  /// The lanes of `inside` that are hit when ties are decided in double; sets their hits, and distances close to tnear, again.
+  /// The lanes of `inside` that are hit when ties are decided in double; sets their hits, and distances close to tnear,
+  /// again.
   template <class Block>
-  static __attribute__((noinline)) vm<Block::kWidth> decide_in_double(vm<Block::kWidth> inside, const ShearedRay& ray, const Block& block,
+  static __attribute__((noinline)) vm<Block::kWidth> decide_in_double(vm<Block::kWidth> inside, const ShearedRay& ray,
+                                                                      const Block& block,
                                                                       TriangleHits<Block::kWidth>& hits) {
     constexpr int W = Block::kWidth;
     using F = vf<W>;
@@ -146,7 +159,8 @@ struct Watertight {
     float p[9][W], out[4][W];
     const F in[9] = {e.p.a.x, e.p.a.y, e.p.a.z, e.p.b.x, e.p.b.y, e.p.b.z, e.p.c.x, e.p.c.y, e.p.c.z};
     for (int i = 0; i < 9; ++i) in[i].store(p[i]);
-    hits.t.store(out[0]), hits.u_numerator.store(out[1]), hits.v_numerator.store(out[2]), hits.denominator.store(out[3]);
+    hits.t.store(out[0]), hits.u_numerator.store(out[1]), hits.v_numerator.store(out[2]),
+        hits.denominator.store(out[3]);
     for (unsigned rest = ties; rest; rest &= rest - 1) {
       const int i = __builtin_ctz(rest);
       const double u = double(p[6][i]) * p[4][i] - double(p[7][i]) * p[3][i];
@@ -162,34 +176,40 @@ struct Watertight {
       out[1][i] = float(v / det), out[2][i] = float(w / det), out[3][i] = 1.0f;
     }
     const F sz(ray.shear[2]), t = F::load(out[0]);
-    const unsigned near = hit & ~e.clear(F(ray.tnear()), sz * e.p.a.z, sz * e.p.b.z, sz * e.p.c.z, e.u + e.v + e.w, t).bits();
+    const unsigned near =
+        hit & ~e.clear(F(ray.tnear()), sz * e.p.a.z, sz * e.p.b.z, sz * e.p.c.z, e.u + e.v + e.w, t).bits();
     hits = {plane_distances_in_double(near, ray, block, t), F::load(out[1]), F::load(out[2]), F::load(out[3])};
     return vm<W>::from_bits(hit);
   }
 
   /// `distances`, in the lanes that `lanes` names N.(a - o) / N.d, computed in double.
   template <class Block>
-  static __attribute__((noinline)) vf<Block::kWidth> plane_distances_in_double(unsigned lanes, const ShearedRay& ray, const Block& block,
+  static __attribute__((noinline)) vf<Block::kWidth> plane_distances_in_double(unsigned lanes, const ShearedRay& ray,
+                                                                               const Block& block,
                                                                                vf<Block::kWidth> distances) {
     constexpr int W = Block::kWidth, D = kDoubleLanes<W>;
     using F = vd<D>;
     const AxisOrder& axes = *ray.order;
-    const vd3<D> o{double(ray.from[0]), double(ray.from[1]), double(ray.from[2])}, d{double(ray.direction[0]), double(ray.direction[1]), double(ray.direction[2])};
+    const vd3<D> o{double(ray.from[0]), double(ray.from[1]), double(ray.from[2])},
+        d{double(ray.direction[0]), double(ray.direction[1]), double(ray.direction[2])};
     F t[W / D];
     for (int k = 0; k < W / D; ++k) {
       t[k] = 0.0;
       const unsigned asked = lanes >> k * D & ((1u << D) - 1u);
       if (asked == 0) continue;
       const auto corner = [&](const float(&p)[3][W]) {
-        return load3<D>(ShearedRay::row(p, axes.x) + k * D, ShearedRay::row(p, axes.y) + k * D, ShearedRay::row(p, axes.z) + k * D);
+        return load3<D>(ShearedRay::row(p, axes.x) + k * D, ShearedRay::row(p, axes.y) + k * D,
+                        ShearedRay::row(p, axes.z) + k * D);
       };
       const vd3<D> v0 = corner(block.v0), a = v0 - o, e1 = corner(block.v1) - v0, e2 = corner(block.v2) - v0;
-      // Not fused: most of these products are exact, and what is 0 then comes out as 0, as of a ray that starts in the plane.
+      // Not fused: most of these products are exact, and what is 0 then comes out as 0, as of a ray that starts in the
+      // plane.
       const auto dot_unfused = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
       const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
       const F along = dot_unfused(n, d);
       // Rounded division keeps the order: those of the nearest and the farthest corner are the least and the greatest.
-      const F b = a.z + e1.z, c = a.z + e2.z, low = min_x86(min_x86(a.z, b), c) / d.z, high = max_x86(max_x86(a.z, b), c) / d.z;
+      const F b = a.z + e1.z, c = a.z + e2.z, low = min_x86(min_x86(a.z, b), c) / d.z,
+              high = max_x86(max_x86(a.z, b), c) / d.z;
       t[k] = max_x86(min_x86(dot_unfused(n, a) / along, max_x86(low, high)), min_x86(low, high));
       lanes &= ~((asked & ~(along != F(0.0))) << k * D);
     }

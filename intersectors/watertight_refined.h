@@ -1,10 +1,12 @@
-// The watertight test (intersectors/watertight.h) for the search, and t, u and v of the hit that won computed again in double from its
-// corners: the coverage and very nearly the speed of the one, the distances of the other. Which triangle wins is still decided by the
-// float t: of two surfaces within its error of each other, the farther may be reported, with its own right distance.
+// The watertight test (intersectors/watertight.h) for the search, and t, u and v of the hit that won computed again in
+// double from its corners: the coverage and very nearly the speed of the one, the distances of the other. Which
+// triangle wins is still decided by the float t: of two surfaces within its error of each other, the farther may be
+// reported, with its own right distance.
 //
-// t is right to half a unit in the last place, and a little, unless the ray grazes (relative error some 2^-50 times |e1||e2||d| / |N.d|). Where
-// the exact ray passes outside the triangle, by less than the search rounds, the hit is the triangle's nearest point in barycentrics, since
-// the plane at the ray may be far off; t stays within [tnear, tfar]. 36 bytes a triangle (vertices) or 12 (indices).
+// t is right to half a unit in the last place, and a little, unless the ray grazes (relative error some 2^-50 times
+// |e1||e2||d| / |N.d|). Where the exact ray passes outside the triangle, by less than the search rounds, the hit is the
+// triangle's nearest point in barycentrics, since the plane at the ray may be far off; t stays within [tnear, tfar]. 36
+// bytes a triangle (vertices) or 12 (indices).
 #pragma once
 
 #include "intersectors/leaf_block.h"
@@ -24,8 +26,10 @@ struct WatertightRefined : Watertight {
     float origin[3], towards[3], tfar;
     float corner[3][3];
     ARBORETUM_INLINE explicit RayData(const Ray& ray)
-        : Watertight::RayData(ray), origin{ray.origin.x, ray.origin.y, ray.origin.z},
-          towards{ray.direction.x, ray.direction.y, ray.direction.z}, tfar(ray.tfar) {}
+        : Watertight::RayData(ray), origin{ray.origin.x, ray.origin.y, ray.origin.z}, towards{ray.direction.x,
+                                                                                              ray.direction.y,
+                                                                                              ray.direction.z},
+          tfar(ray.tfar) {}
   };
 
   template <class Block>
@@ -38,7 +42,7 @@ struct WatertightRefined : Watertight {
   }
 
   static void finish(RayData& ray, NearestHit& best) {
-    const auto widened = [](const float (&p)[3]) { return load3<1>(&p[0], &p[1], &p[2]); };
+    const auto widened = [](const float(&p)[3]) { return load3<1>(&p[0], &p[1], &p[2]); };
     const vd3<1> o = widened(ray.origin), d = widened(ray.towards);
     const vd3<1> v0 = widened(ray.corner[0]), e1 = v0 - widened(ray.corner[1]), e2 = widened(ray.corner[2]) - v0;
     const MollerTrumboreTerms<vd<1>> terms(v0, e1, e2, o, d);

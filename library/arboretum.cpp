@@ -15,7 +15,9 @@
 namespace arboretum {
 namespace {
 
-void check_name(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) { (void)index_of_name(kind, name, valid); }
+void check_name(std::string_view kind, std::string_view name, std::span<const std::string_view> valid) {
+  (void)index_of_name(kind, name, valid);
+}
 
 std::vector<std::string_view> isa_names(std::span<const Isa> isas) {
   std::vector<std::string_view> names;
@@ -49,12 +51,15 @@ std::vector<Isa> allowed_isas(const TracerSettings& s) {
 
 void check_sizes(const RayBatch& rays, std::size_t answers) {
   if (answers != rays.size())
-    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with room for " + std::to_string(answers) + " answers");
+    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with room for " + std::to_string(answers) +
+                    " answers");
   if (!rays.times.empty() && rays.times.size() != rays.size())
-    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with " + std::to_string(rays.times.size()) + " times");
+    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with " + std::to_string(rays.times.size()) +
+                    " times");
 }
 
-/// The row for batches. Fills in what is left to the others: of the settings that `auto` and the like may stand in, all but the builder.
+/// The row for batches. Fills in what is left to the others: of the settings that `auto` and the like may stand in, all
+/// but the builder.
 const KernelRow& resolve_kernel(TracerSettings& s) {
   const AxisValues& known = axis_values();
   s.intersector = std::string(resolve_intersector(s.intersector, s.structure, kernel_table()));
@@ -63,14 +68,16 @@ const KernelRow& resolve_kernel(TracerSettings& s) {
   check_name("intersector", s.intersector, known.intersectors);
   check_name("box", s.box, known.boxes);
   const std::vector<Isa> isas = allowed_isas(s);
-  if (const std::string way = resolve_traversal(s.traversal, isas.front()); way == s.traversal && way != kAuto) check_name("traversal", way, known.traversals);
+  if (const std::string way = resolve_traversal(s.traversal, isas.front()); way == s.traversal && way != kAuto)
+    check_name("traversal", way, known.traversals);
   for (Isa isa : isas) {
     if (const KernelRow* row = find(s, s.traversal, isa)) {
       s.isa = to_string(isa), s.leaf = row->leaf, s.traversal = row->traversal;
       return *row;
     }
   }
-  throw UserError(why_no_kernel(s.structure, leaf_of(s, isas.front()), s.intersector, s.box, resolve_traversal(s.traversal, isas.front()), isas.front()));
+  throw UserError(why_no_kernel(s.structure, leaf_of(s, isas.front()), s.intersector, s.box,
+                                resolve_traversal(s.traversal, isas.front()), isas.front()));
 }
 
 }  // namespace
@@ -78,13 +85,15 @@ const KernelRow& resolve_kernel(TracerSettings& s) {
 TriangleMesh make_mesh(std::span<const float> coordinates, std::span<const std::uint32_t> indices) {
   if (coordinates.size() % 3 != 0)
     throw UserError("make_mesh: " + std::to_string(coordinates.size()) + " coordinates; a vertex has three");
-  if (indices.size() % 3 != 0) throw UserError("make_mesh: " + std::to_string(indices.size()) + " indices; a triangle has three");
+  if (indices.size() % 3 != 0)
+    throw UserError("make_mesh: " + std::to_string(indices.size()) + " indices; a triangle has three");
   TriangleMesh mesh;
   mesh.vertices.reserve(coordinates.size() / 3);
   for (std::size_t i = 0; i < coordinates.size(); i += 3)
     mesh.vertices.push_back({coordinates[i], coordinates[i + 1], coordinates[i + 2]});
   mesh.triangles.reserve(indices.size() / 3);
-  for (std::size_t i = 0; i < indices.size(); i += 3) mesh.triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
+  for (std::size_t i = 0; i < indices.size(); i += 3)
+    mesh.triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
   return mesh;
 }
 
@@ -113,10 +122,12 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
     return row ? row : batch_;
   };
   one_ = row_or_batch("single");
-  for (std::size_t i = 0; i < kPacketSizes.size(); ++i) packet_[i] = row_or_batch("packet" + std::to_string(kPacketSizes[i]));
+  for (std::size_t i = 0; i < kPacketSizes.size(); ++i)
+    packet_[i] = row_or_batch("packet" + std::to_string(kPacketSizes[i]));
 
   BuildSettings build;
-  build.builder = settings_.builder, build.leaf = settings_.leaf, build.isa = batch_->isa, build.threads = settings_.threads;
+  build.builder = settings_.builder, build.leaf = settings_.leaf, build.isa = batch_->isa,
+  build.threads = settings_.threads;
   build.parameters = settings_.parameters;
   accel_ = build_structure(settings_.structure, *mesh_, build, report_);
 }

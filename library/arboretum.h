@@ -4,7 +4,8 @@
 //   arboretum::Tracer tracer(arboretum::make_mesh(coordinates, indices));
 //   arboretum::Hit hit = tracer.closest_hit({.origin = {0, 0, -3}, .direction = {0, 0, 1}});
 //
-// What a ray, a hit and a tie are: core/ray.h. Errors are UserError (core/error.h): one line that says what, and the mend.
+// What a ray, a hit and a tie are: core/ray.h. Errors are UserError (core/error.h): one line that says what, and the
+// mend.
 #pragma once
 
 #include <array>
@@ -28,33 +29,38 @@ namespace arboretum {
 [[nodiscard]] TriangleMesh make_mesh(std::span<const float> coordinates, std::span<const std::uint32_t> indices);
 [[nodiscard]] TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle> triangles);
 
-/// How a Tracer is built and how it traces, by the keys that `arboretum list` shows and `render` takes: `auto` (or nothing) where a value
-/// follows from the others, `packet` and `hybrid` for the instruction set's own width, `avx` for avx2 (traversal/kernel_keys.h). The defaults put
-/// correctness first: no hit is lost at an edge, nor between two boxes.
+/// How a Tracer is built and how it traces, by the keys that `arboretum list` shows and `render` takes: `auto` (or
+/// nothing) where a value follows from the others, `packet` and `hybrid` for the instruction set's own width, `avx` for
+/// avx2 (traversal/kernel_keys.h). The defaults put correctness first: no hit is lost at an edge, nor between two
+/// boxes.
 struct TracerSettings {
   std::string structure = "bvh8";
   std::string builder = {};  ///< `auto`: the structure's first
   std::string leaf = {};     ///< `auto`: the block that suits structure, intersector and instruction set
   std::string intersector = "watertight";
   std::string box = "padded";
-  std::string traversal = "single";  ///< of batches, `auto`: the structure's way called so, else single rays; one ray goes by `single`, a packet of N by `packetN`, where the structure has them
+  std::string traversal = "single";  ///< of batches, `auto`: the structure's way called so, else single rays; one ray
+                                     ///< goes by `single`, a packet of N by `packetN`, where the structure has them
   std::string isa = {};              ///< `auto`: the best of this machine for which there is such a kernel
   unsigned threads = 0;              ///< of the build; 0: one a core. The structure is the same for any number.
   BuilderParameters parameters = {};
 };
 
-/// A mesh with a structure over it, ready for rays. Moves, does not copy; a Tracer that was moved from can only be assigned to
-/// or destroyed. The const functions may be called from any number of threads at once; each works on the calling thread.
+/// A mesh with a structure over it, ready for rays. Moves, does not copy; a Tracer that was moved from can only be
+/// assigned to or destroyed. The const functions may be called from any number of threads at once; each works on the
+/// calling thread.
 class Tracer {
  public:
-  /// Builds. Throws UserError for a key that does not exist (naming the nearest), for keys that do not go together, for an
-  /// instruction set that the machine lacks, and for a mesh that is none: an index beyond the vertices, a vertex of a triangle that in some
-  /// key frame is not finite or beyond kMaxCoordinate (2^40), key frames of different lengths, instances that do not lay out their prototypes one
-  /// after the other. An empty mesh is none of these: every ray misses it.
+  /// Builds. Throws UserError for a key that does not exist (naming the nearest), for keys that do not go together, for
+  /// an instruction set that the machine lacks, and for a mesh that is none: an index beyond the vertices, a vertex of
+  /// a triangle that in some key frame is not finite or beyond kMaxCoordinate (2^40), key frames of different lengths,
+  /// instances that do not lay out their prototypes one after the other. An empty mesh is none of these: every ray
+  /// misses it.
   explicit Tracer(TriangleMesh mesh, TracerSettings settings = {});
 
-  /// The nearest hit within the closed interval [tnear, tfar], t in units of the direction's length. A miss has t = infinity. The caller
-  /// sees to 0 <= tnear, which nothing checks: behind a ray's origin some structures look and others do not. What else is no ray misses (core/ray.h).
+  /// The nearest hit within the closed interval [tnear, tfar], t in units of the direction's length. A miss has t =
+  /// infinity. The caller sees to 0 <= tnear, which nothing checks: behind a ray's origin some structures look and
+  /// others do not. What else is no ray misses (core/ray.h).
   [[nodiscard]] Hit closest_hit(const Ray& ray) const {
     Hit hit;
     one_->closest_hit(*accel_, RayBatch({&ray, 1}), {&hit, 1}, nullptr);

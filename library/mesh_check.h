@@ -5,9 +5,9 @@
 
 namespace arboretum {
 
-/// Throws UserError, which names triangle, vertex, key frame or instance, where an index is beyond what it points into, key frames have
-/// different numbers of vertices, a vertex of a triangle is not finite or beyond kMaxCoordinate (2^40), or instances do not lay
-/// the prototypes' triangles out one after the other as core/instances.h says.
+/// Throws UserError, which names triangle, vertex, key frame or instance, where an index is beyond what it points into,
+/// key frames have different numbers of vertices, a vertex of a triangle is not finite or beyond kMaxCoordinate (2^40),
+/// or instances do not lay the prototypes' triangles out one after the other as core/instances.h says.
 void check_mesh(const TriangleMesh& mesh);
 
 }  // namespace arboretum

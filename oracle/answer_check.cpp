@@ -38,7 +38,8 @@ bool is_at_nearest_t(const TriangleMesh& mesh, const Ray& ray, FrameTime at, con
   return predicate.meets(given, t) && predicate.compare_t(given, mesh.corners(truth.hit.primitive, at)) == 0;
 }
 
-/// Whether an answer farther away is not only the next triangle, taken for the nearest because both distances are rounded.
+/// Whether an answer farther away is not only the next triangle, taken for the nearest because both distances are
+/// rounded.
 bool is_behind(const TriangleMesh& mesh, const Ray& ray, FrameTime at, const ExactHit& truth, const Hit& answer) {
   if (answer.primitive >= mesh.size()) return true;
   const Sheared sheared(ray);
@@ -64,8 +65,8 @@ double quantile(std::vector<float>& values, double p) {
 
 }  // namespace
 
-Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth, const Hit& answer,
-                            const std::function<const SurfaceAdjacency&()>& adjacency) {
+Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth,
+                            const Hit& answer, const std::function<const SurfaceAdjacency&()>& adjacency) {
   Judgement j;
   if (!truth.hit.is_hit()) {
     j.false_hit = answer.is_hit();
@@ -89,8 +90,8 @@ Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time
   return j;
 }
 
-AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
-                               std::span<const ExactHit> truth, std::span<const Hit> answers,
+AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays, std::span<const ExactHit> truth,
+                               std::span<const Hit> answers,
                                const std::function<const SurfaceAdjacency&()>& adjacency) {
   expect_one_size(rays.size(), truth.size(), answers.size());
   tbb::enumerable_thread_specific<Tally> tallies;
@@ -124,8 +125,7 @@ AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
   return sum;
 }
 
-AnswerCheck check_any_hits(RayBatch rays, std::span<const std::uint8_t> truth,
-                           std::span<const std::uint8_t> answers) {
+AnswerCheck check_any_hits(RayBatch rays, std::span<const std::uint8_t> truth, std::span<const std::uint8_t> answers) {
   expect_one_size(rays.size(), truth.size(), answers.size());
   AnswerCheck sum;
   sum.rays = rays.size();

@@ -12,19 +12,19 @@
 
 namespace arboretum {
 
-/// Difference of t beyond which a hit is on the wrong surface: relative, and not less than the least denormal float, since rounding
-/// moves a t that is no normal number by up to half of that.
+/// Difference of t beyond which a hit is on the wrong surface: relative, and not less than the least denormal float,
+/// since rounding moves a t that is no normal number by up to half of that.
 [[nodiscard]] inline double surface_tolerance(double exact_t) noexcept {
   return std::max(0x1p-12 * std::fabs(exact_t), 0x1p-149);
 }
 
 /// One ray of a batch; `adjacency` as below.
-[[nodiscard]] Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth, const Hit& answer,
-                                          const std::function<const SurfaceAdjacency&()>& adjacency);
+[[nodiscard]] Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth,
+                                          const Hit& answer, const std::function<const SurfaceAdjacency&()>& adjacency);
 
 /// `adjacency` is called, from any thread, only when an answer could be a crack.
-[[nodiscard]] AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays,
-                                             std::span<const ExactHit> truth, std::span<const Hit> answers,
+[[nodiscard]] AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays, std::span<const ExactHit> truth,
+                                             std::span<const Hit> answers,
                                              const std::function<const SurfaceAdjacency&()>& adjacency);
 [[nodiscard]] AnswerCheck check_any_hits(RayBatch rays, std::span<const std::uint8_t> truth,
                                          std::span<const std::uint8_t> answers);

@@ -53,7 +53,9 @@ class HardRayMaker::Draw {
 
   std::uint64_t bits() { return random_bits(seed_, index_, next_++); }
   std::size_t below(std::size_t n) { return bits() % n; }
-  float uniform(float low = -1.0f, float high = 1.0f) { return low + (high - low) * random_float(seed_, index_, next_++); }
+  float uniform(float low = -1.0f, float high = 1.0f) {
+    return low + (high - low) * random_float(seed_, index_, next_++);
+  }
   Vec3f point() {  // of the cube [-1, 1]^3; one after the other, in this order with every compiler
     const float x = uniform(), y = uniform(), z = uniform();
     return {x, y, z};
@@ -70,7 +72,8 @@ class HardRayMaker::Draw {
 
   Vec3f vertex() { return corners(triangle())[below(3)]; }
   Vec3f on_edge(const std::vector<EdgeOf>& edges) {
-    const EdgeOf e = edges.empty() ? EdgeOf{std::uint32_t(triangle()), std::uint32_t(below(3))} : edges[below(edges.size())];
+    const EdgeOf e =
+        edges.empty() ? EdgeOf{std::uint32_t(triangle()), std::uint32_t(below(3))} : edges[below(edges.size())];
     const auto c = corners(e.triangle);
     return between(c[e.edge], c[(e.edge + 1) % 3], below(4) == 0 ? 0.5 : random_double(seed_, index_, next_++));
   }
@@ -130,7 +133,8 @@ class HardRayMaker::Draw {
     const Vec3f n = normalize(cross(e1, e2));
     const float size = std::max(length(along), maker_.radius_ * 0x1p-20f);
     const Vec3f o = p - along * uniform(0, 4) + (is_finite(n) ? n * (lift * size) : Vec3f{});
-    return below(2) == 0 ? aimed(o, below(2) == 0 ? c[below(3)] : p) : Ray{o, 0.0f, along == Vec3f{} ? unit() : along, kInf};
+    return below(2) == 0 ? aimed(o, below(2) == 0 ? c[below(3)] : p)
+                         : Ray{o, 0.0f, along == Vec3f{} ? unit() : along, kInf};
   }
   Ray along_axis() {
     const Vec3f p = target();
@@ -220,7 +224,8 @@ bool HardRayMaker::has(HardKind kind) const noexcept {
   return kind == HardKind::edge ? !shared_.empty() : kind != HardKind::border || !border_.empty();
 }
 
-HardRays HardRayMaker::make(std::uint64_t seed, std::uint64_t first, std::size_t count, std::span<const HardKind> kinds) const {
+HardRays HardRayMaker::make(std::uint64_t seed, std::uint64_t first, std::size_t count,
+                            std::span<const HardKind> kinds) const {
   HardRays made;
   made.rays.resize(count), made.kinds.resize(count);
   made.sources.assign(count, kNoPrimitive);

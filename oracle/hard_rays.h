@@ -1,5 +1,6 @@
-// Hard rays: rays of the kinds that intersectors and box tests get wrong, aimed at a given mesh. The kinds follow the groups of
-// tests/hard_cases.json: edges, vertices, grazing, axis-parallel, in box faces, far away, interval ends, no rays at all.
+// Hard rays: rays of the kinds that intersectors and box tests get wrong, aimed at a given mesh. The kinds follow the
+// groups of tests/hard_cases.json: edges, vertices, grazing, axis-parallel, in box faces, far away, interval ends, no
+// rays at all.
 //
 // Ray number i of a seed is the same whatever the batch that it is made in, and on every machine.
 #pragma once
@@ -30,10 +31,13 @@ enum class HardKind : unsigned char {
   invalid,   ///< no ray at all: NaN, infinity, zero direction, empty interval
   given      ///< not made here: of a cases file
 };
-inline constexpr std::array<std::string_view, 12> kHardKindNames{"vertex",  "edge", "border",   "interior", "grazing", "axis", "plane",
-                                                                 "surface", "far",  "interval", "invalid",  "given"};
+inline constexpr std::array<std::string_view, 12> kHardKindNames{"vertex",  "edge",     "border",  "interior",
+                                                                 "grazing", "axis",     "plane",   "surface",
+                                                                 "far",     "interval", "invalid", "given"};
 
-[[nodiscard]] constexpr std::string_view to_string(HardKind kind) noexcept { return kHardKindNames[static_cast<std::size_t>(kind)]; }
+[[nodiscard]] constexpr std::string_view to_string(HardKind kind) noexcept {
+  return kHardKindNames[static_cast<std::size_t>(kind)];
+}
 /// The kinds that rays can be made of, in their order.
 inline constexpr std::size_t kMadeKinds = kHardKindNames.size() - 1;
 
@@ -52,9 +56,10 @@ class HardRayMaker {
 
   /// Whether the mesh has what rays of the kind are aimed at (a mesh without border edges has no `border` rays).
   [[nodiscard]] bool has(HardKind kind) const noexcept;
-  /// Rays `first` .. `first + count` of the seed; ray i is of kinds[i % kinds.size()]. The mesh must have every kind named. Uses
-  /// all TBB threads allowed to the caller.
-  [[nodiscard]] HardRays make(std::uint64_t seed, std::uint64_t first, std::size_t count, std::span<const HardKind> kinds) const;
+  /// Rays `first` .. `first + count` of the seed; ray i is of kinds[i % kinds.size()]. The mesh must have every kind
+  /// named. Uses all TBB threads allowed to the caller.
+  [[nodiscard]] HardRays make(std::uint64_t seed, std::uint64_t first, std::size_t count,
+                              std::span<const HardKind> kinds) const;
 
  private:
   class Draw;
@@ -69,7 +74,8 @@ class HardRayMaker {
   float radius_;
 };
 
-/// Every vertex v becomes (v + offset * (1, -3/4, 1/2)) * 2^exponent, rounded after the addition. Instances are laid out.
+/// Every vertex v becomes (v + offset * (1, -3/4, 1/2)) * 2^exponent, rounded after the addition. Instances are laid
+/// out.
 [[nodiscard]] TriangleMesh moved_and_scaled(const TriangleMesh& mesh, double offset, int exponent);
 
 }  // namespace arboretum

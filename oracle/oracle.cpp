@@ -64,9 +64,7 @@ struct Query {
   std::uint32_t left_out;
 };
 
-Query usual(const Ray& ray) {
-  return {ray, {ray.origin.x, ray.origin.y, ray.origin.z}, kNoPrimitive};
-}
+Query usual(const Ray& ray) { return {ray, {ray.origin.x, ray.origin.y, ray.origin.z}, kNoPrimitive}; }
 
 ExactHit closest(const SearchTree& tree, const CornersAt& corners_at, const Query& query, DecisionCounts& counts) {
   ExactHit result;
@@ -110,7 +108,8 @@ std::vector<Result> trace_all(const TriangleMesh& mesh, RayBatch rays, DecisionC
   tbb::enumerable_thread_specific<DecisionCounts> local;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), kGrain), [&](const auto& range) {
     DecisionCounts& mine = local.local();
-    for (std::size_t i = range.begin(); i != range.end(); ++i) results[i] = trace(i, CornersAt(mesh, rays.time(i)), mine);
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      results[i] = trace(i, CornersAt(mesh, rays.time(i)), mine);
   });
   if (counts != nullptr) {
     for (const DecisionCounts& c : local) *counts += c;
@@ -140,24 +139,27 @@ Oracle::Oracle(Oracle&&) noexcept = default;
 Oracle& Oracle::operator=(Oracle&&) noexcept = default;
 
 std::vector<ExactHit> Oracle::closest_hit(RayBatch rays, DecisionCounts* counts) const {
-  return trace_all<ExactHit>(implementation_->mesh, rays, counts, [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
-    return closest(implementation_->tree, at, usual(rays[i]), c);
-  });
+  return trace_all<ExactHit>(implementation_->mesh, rays, counts,
+                             [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
+                               return closest(implementation_->tree, at, usual(rays[i]), c);
+                             });
 }
 
 std::vector<ExactHit> Oracle::closest_hit_from(std::span<const std::array<double, 3>> origins, RayBatch rays,
                                                std::span<const std::uint32_t> left_out, DecisionCounts* counts) const {
   if (origins.size() != rays.size() || left_out.size() != rays.size())
     throw std::invalid_argument("oracle: as many origins and primitives left out as rays are needed");
-  return trace_all<ExactHit>(implementation_->mesh, rays, counts, [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
-    return closest(implementation_->tree, at, {rays[i], origins[i], left_out[i]}, c);
-  });
+  return trace_all<ExactHit>(implementation_->mesh, rays, counts,
+                             [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
+                               return closest(implementation_->tree, at, {rays[i], origins[i], left_out[i]}, c);
+                             });
 }
 
 std::vector<std::uint8_t> Oracle::any_hit(RayBatch rays, DecisionCounts* counts) const {
-  return trace_all<std::uint8_t>(implementation_->mesh, rays, counts, [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
-    return static_cast<std::uint8_t>(any(implementation_->tree, at, usual(rays[i]), c));
-  });
+  return trace_all<std::uint8_t>(implementation_->mesh, rays, counts,
+                                 [&](std::size_t i, const CornersAt& at, DecisionCounts& c) {
+                                   return static_cast<std::uint8_t>(any(implementation_->tree, at, usual(rays[i]), c));
+                                 });
 }
 
 AnswerCheck Oracle::check_closest_hit(RayBatch rays, std::span<const ExactHit> truth,

@@ -5,8 +5,8 @@
 // search goes through the oracle's own tree, which shares no code with the structures under test and never
 // leaves out a triangle that the exact ray touches.
 //
-// Where the mesh moves, a ray has a time, and the triangles that it meets have their corners where core/motion.h puts them
-// at that time, as float32 numbers; from there on everything is exact as before.
+// Where the mesh moves, a ray has a time, and the triangles that it meets have their corners where core/motion.h puts
+// them at that time, as float32 numbers; from there on everything is exact as before.
 #pragma once
 
 #include <array>
@@ -45,9 +45,7 @@ struct AnswerCheck {
   /// |t - exact t| in units of the last place of the exact t's float32, over the rays with the right surface
   /// or primitive.
   double t_error_ulp_median = 0, t_error_ulp_p99 = 0, t_error_ulp_max = 0;
-  [[nodiscard]] std::uint64_t wrong_answers() const noexcept {
-    return missed_hits + false_hits + wrong_surface;
-  }
+  [[nodiscard]] std::uint64_t wrong_answers() const noexcept { return missed_hits + false_hits + wrong_surface; }
 };
 
 /// What is wrong with the answer to one closest-hit ray, in AnswerCheck's words.
@@ -70,9 +68,9 @@ class Oracle {
   [[nodiscard]] std::vector<ExactHit> closest_hit(RayBatch rays, DecisionCounts* counts = nullptr) const;
   /// 1 where anything lies within the closed interval, else 0.
   [[nodiscard]] std::vector<std::uint8_t> any_hit(RayBatch rays, DecisionCounts* counts = nullptr) const;
-  /// closest_hit of rays that begin at `origins` instead of their own: points with more digits than float32 has, such as hit
-  /// points, each coordinate a multiple of 2^-149 below 2^128. Each ray passes through the primitive `left_out` of it, which may
-  /// be kNoPrimitive. Throws std::invalid_argument where the sizes differ.
+  /// closest_hit of rays that begin at `origins` instead of their own: points with more digits than float32 has, such
+  /// as hit points, each coordinate a multiple of 2^-149 below 2^128. Each ray passes through the primitive `left_out`
+  /// of it, which may be kNoPrimitive. Throws std::invalid_argument where the sizes differ.
   [[nodiscard]] std::vector<ExactHit> closest_hit_from(std::span<const std::array<double, 3>> origins, RayBatch rays,
                                                        std::span<const std::uint32_t> left_out,
                                                        DecisionCounts* counts = nullptr) const;

@@ -18,7 +18,9 @@ class Dice {
   Dice(std::uint64_t seed, std::uint64_t index) : seed_(seed), index_(index) {}
   std::uint64_t bits() { return random_bits(seed_, index_, next_++); }
   std::uint32_t below(std::size_t n) { return static_cast<std::uint32_t>(bits() % n); }
-  float uniform(float low = -1.0f, float high = 1.0f) { return low + (high - low) * random_float(seed_, index_, next_++); }
+  float uniform(float low = -1.0f, float high = 1.0f) {
+    return low + (high - low) * random_float(seed_, index_, next_++);
+  }
   /// Signed, 2^low .. 2^high in size.
   float exponential(int low, int high) {
     const int exponent = low + static_cast<int>(below(static_cast<std::size_t>(high - low)));
@@ -120,7 +122,8 @@ void shells(TriangleMesh& mesh, Dice& dice) {
   const Vec3f middle = dice.below(2) ? dice.cube() : Vec3f{};
   for (std::size_t n = 1 + dice.below(8); n > 0; --n) {
     for (unsigned octant = 0; octant < 8; ++octant) {
-      const Vec3f x = middle + Vec3f{octant & 1 ? size : -size, 0, 0}, y = middle + Vec3f{0, octant & 2 ? size : -size, 0};
+      const Vec3f x = middle + Vec3f{octant & 1 ? size : -size, 0, 0},
+                  y = middle + Vec3f{0, octant & 2 ? size : -size, 0};
       add(mesh, x, y, middle + Vec3f{0, 0, octant & 4 ? size : -size});
     }
     size = dice.below(2) ? std::nextafter(size, kInf) : size * (1 + std::fabs(dice.exponential(-23, 1)));
@@ -149,11 +152,13 @@ RandomSubject random_subject(std::uint64_t seed, std::uint64_t index, std::size_
   return with_rays(moved_and_scaled(mesh, offset, exponent), seed, index, rays);
 }
 
-RandomSubject mutated_subject(const TriangleMesh& given, const Ray& given_ray, std::uint64_t seed, std::uint64_t index, std::size_t rays) {
+RandomSubject mutated_subject(const TriangleMesh& given, const Ray& given_ray, std::uint64_t seed, std::uint64_t index,
+                              std::size_t rays) {
   Dice dice(seed, index);
   TriangleMesh mesh = given;
   Ray ray = given_ray;
-  if (ray.tnear < 0) ray.tnear = 0;  // a case may have it below where nothing lies there; its mutations may have something
+  // a case may have it below where nothing lies there; its mutations may have something
+  if (ray.tnear < 0) ray.tnear = 0;
   const auto any_float = [&]() -> float& {
     if (dice.below(2)) return mesh.vertices[dice.below(mesh.vertices.size())][dice.below(3)];
     return (dice.below(2) ? ray.origin : ray.direction)[dice.below(3)];
@@ -185,7 +190,9 @@ RandomSubject mutated_subject(const TriangleMesh& given, const Ray& given_ray, s
       if (!(std::fabs(v[a]) <= kMaxCoordinate)) v[a] = std::copysign(1.0f, v[a]);
   if (dice.below(3) == 0) {
     const int exponent = static_cast<int>(dice.below(21)) - 10;
-    const auto scale = [&](Vec3f v) { return Vec3f{std::ldexp(v.x, exponent), std::ldexp(v.y, exponent), std::ldexp(v.z, exponent)}; };
+    const auto scale = [&](Vec3f v) {
+      return Vec3f{std::ldexp(v.x, exponent), std::ldexp(v.y, exponent), std::ldexp(v.z, exponent)};
+    };
     for (Vec3f& v : mesh.vertices) v = scale(v);
     ray.origin = scale(ray.origin), ray.direction = scale(ray.direction);
   }

@@ -1,5 +1,5 @@
-// Random small meshes with hard rays, for a search by properties: coordinates distributed exponentially, surfaces of every kind of
-// badness, and mutations of given cases. Subject number i of a seed is the same on every machine.
+// Random small meshes with hard rays, for a search by properties: coordinates distributed exponentially, surfaces of
+// every kind of badness, and mutations of given cases. Subject number i of a seed is the same on every machine.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,14 @@ struct RandomSubject {
   HardRays rays;
 };
 
-/// Up to a hundred triangles: a soup, a closed bipyramid, a height field, a strip of slivers, a tangle over few vertices, shells one
-/// in the other; moved and scaled by powers of two within 2^-30 .. 2^30, so that all stays within what intersectors promise.
+/// Up to a hundred triangles: a soup, a closed bipyramid, a height field, a strip of slivers, a tangle over few
+/// vertices, shells one in the other; moved and scaled by powers of two within 2^-30 .. 2^30, so that all stays within
+/// what intersectors promise.
 [[nodiscard]] RandomSubject random_subject(std::uint64_t seed, std::uint64_t index, std::size_t rays);
 
-/// A copy of a mesh and ray with some numbers moved by ulps, negated, made equal to others, or all scaled by a power of two, or with
-/// a vertex left out of its place; the ray itself is the first of the rays.
-[[nodiscard]] RandomSubject mutated_subject(const TriangleMesh& mesh, const Ray& ray, std::uint64_t seed, std::uint64_t index,
-                                            std::size_t rays);
+/// A copy of a mesh and ray with some numbers moved by ulps, negated, made equal to others, or all scaled by a power of
+/// two, or with a vertex left out of its place; the ray itself is the first of the rays.
+[[nodiscard]] RandomSubject mutated_subject(const TriangleMesh& mesh, const Ray& ray, std::uint64_t seed,
+                                            std::uint64_t index, std::size_t rays);
 
 }  // namespace arboretum

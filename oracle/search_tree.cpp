@@ -14,12 +14,11 @@ constexpr std::uint32_t kParallelRange = 8192;
 constexpr double kNodeCost = 0.5;  // of a pair of box tests, in units of one triangle test
 
 /// Centre of a box in doubles, where no float32 box overflows.
-double center(const Bounds3f& b, std::size_t axis) {
-  return 0.5 * (double(b.lower[axis]) + double(b.upper[axis]));
-}
+double center(const Bounds3f& b, std::size_t axis) { return 0.5 * (double(b.lower[axis]) + double(b.upper[axis])); }
 
-/// Holds the triangle at every time, rounded as core/motion.h rounds: between two frames a coordinate leaves the interval of
-/// the two by no more than four roundings of numbers of their size (weights summing to 1 + 2^-24, two products, a sum).
+/// Holds the triangle at every time, rounded as core/motion.h rounds: between two frames a coordinate leaves the
+/// interval of the two by no more than four roundings of numbers of their size (weights summing to 1 + 2^-24, two
+/// products, a sum).
 Bounds3f bounds_at_all_times(const TriangleMesh& mesh, std::size_t i) {
   Bounds3f box = mesh.bounds(i);
   if (!mesh.moves()) return box;
@@ -45,9 +44,7 @@ struct Bins {
   std::uint32_t count[kBins] = {};
 };
 
-int bin_of(double c, double low, double scale) {
-  return std::clamp(static_cast<int>((c - low) * scale), 0, kBins - 1);
-}
+int bin_of(double c, double low, double scale) { return std::clamp(static_cast<int>((c - low) * scale), 0, kBins - 1); }
 
 }  // namespace
 
@@ -60,7 +57,8 @@ struct SearchTree::BuildState {
 SearchTree::SearchTree(const TriangleMesh& mesh) {
   BuildState state;
   state.bounds.resize(mesh.size());
-  tbb::parallel_for(std::size_t{0}, mesh.size(), [&](std::size_t i) { state.bounds[i] = bounds_at_all_times(mesh, i); });
+  tbb::parallel_for(std::size_t{0}, mesh.size(),
+                    [&](std::size_t i) { state.bounds[i] = bounds_at_all_times(mesh, i); });
   state.order.reserve(mesh.size());
   BuildRange all{0, 0, {}};
   for (std::size_t i = 0; i < mesh.size(); ++i) {
@@ -82,8 +80,7 @@ SearchTree::SearchTree(const TriangleMesh& mesh) {
     const std::uint32_t middle = split(state, all, 0);
     for (int child = 0; child < 2; ++child) {
       BuildRange range{child == 0 ? 0 : middle, child == 0 ? middle : all.end, {}};
-      for (std::uint32_t i = range.begin; i < range.end; ++i)
-        range.bounds.extend(state.bounds[state.order[i]]);
+      for (std::uint32_t i = range.begin; i < range.end; ++i) range.bounds.extend(state.bounds[state.order[i]]);
       build_child(state, range, 1, 0, child);
     }
   }

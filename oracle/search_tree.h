@@ -23,8 +23,8 @@ class SearchTree {
 
   /// Calls `triangle(id, corners, limit)` for every triangle that the ray may meet at a t in [tnear, limit],
   /// roughly front to back. `limit` starts as tfar; the callee may lower it to anything that is not below the
-  /// nearest hit's t. The search ends when the callee returns true. The ray begins at `origin`, of which its own is the rounding or
-  /// something near.
+  /// nearest hit's t. The search ends when the callee returns true. The ray begins at `origin`, of which its own is the
+  /// rounding or something near.
   template <class Callee>
   void search(const Ray& ray, const std::array<double, 3>& origin, Callee&& triangle) const;
 
@@ -60,7 +60,8 @@ class SearchTree {
 
 /// Box test of one ray. For an axis with d != 0 the exact ray is between the planes l and h for t in
 /// [(l - o) / d, (h - o) / d] (or the other way round). Computed in doubles, (l - o) * (1 / d) has three
-/// roundings and no under- or overflow (operands on the grid of float32), so it is the exact number times 1 + e with |e| < 4
+/// roundings and no under- or overflow (operands on the grid of float32), so it is the exact number times 1 + e with
+/// |e| < 4
 /// * 2^-53; scaling keeps the order, so the largest entry of the axes is also within that of the exact one,
 /// and widening entry and exit by kWiden = 2^-50 of their size covers both and the rounding of the widening
 /// itself. An axis with d == 0 (either sign) is a plain comparison of exact numbers.
@@ -78,8 +79,7 @@ class ConservativeSlabs {
 
   /// Whether child `c` of the bounds may be met at a t in [tnear, limit]; `entry` is then at most the exact t
   /// of entry.
-  [[nodiscard]] bool touches(const float (&bounds)[3][2][2], int c, double limit,
-                             double& entry) const noexcept {
+  [[nodiscard]] bool touches(const float (&bounds)[3][2][2], int c, double limit, double& entry) const noexcept {
     constexpr double kWiden = 0x1p-50, kInfinity = std::numeric_limits<double>::infinity();
     double enter = -kInfinity, leave = kInfinity;
     for (std::size_t axis = 0; axis < 3; ++axis) {

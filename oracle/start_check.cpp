@@ -13,7 +13,8 @@ void expect_one_size(std::size_t truth, std::size_t answers) {
 
 }  // namespace
 
-StartCheck check_closest_starts(std::span<const ExactHit> truth, std::span<const Hit> answers, std::span<const std::uint32_t> sources) {
+StartCheck check_closest_starts(std::span<const ExactHit> truth, std::span<const Hit> answers,
+                                std::span<const std::uint32_t> sources) {
   expect_one_size(truth.size(), answers.size()), expect_one_size(truth.size(), sources.size());
   StartCheck check;
   check.rays = truth.size();

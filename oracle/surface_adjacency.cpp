@@ -12,16 +12,13 @@
 namespace arboretum {
 namespace {
 
-double size_of(const Triple<double>& a) {
-  return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])});
-}
+double size_of(const Triple<double>& a) { return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])}); }
 
 /// Side of `p` of the plane through the edge along the ray; 0 where doubles cannot tell.
 int side(const Ray& ray, Vec3f a, Vec3f b, Vec3f p) {
   const Triple<double> edge = difference_from(a, b), third = difference_from(a, p),
                        d{ray.direction.x, ray.direction.y, ray.direction.z};
-  const double value = determinant(edge, third, d),
-               bound = 0x1p-47 * size_of(edge) * size_of(third) * size_of(d);
+  const double value = determinant(edge, third, d), bound = 0x1p-47 * size_of(edge) * size_of(third) * size_of(d);
   return value > bound ? 1 : value < -bound ? -1 : 0;
 }
 
@@ -80,7 +77,8 @@ SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
   std::sort(edges_.begin(), edges_.end());
 }
 
-std::pair<const SurfaceAdjacency::Edge*, const SurfaceAdjacency::Edge*> SurfaceAdjacency::at_edge(std::uint32_t a, std::uint32_t b) const {
+std::pair<const SurfaceAdjacency::Edge*, const SurfaceAdjacency::Edge*> SurfaceAdjacency::at_edge(
+    std::uint32_t a, std::uint32_t b) const {
   const auto [first, last] = std::equal_range(edges_.begin(), edges_.end(), Edge{std::min(a, b), std::max(a, b), 0});
   return {edges_.data() + (first - edges_.begin()), edges_.data() + (last - edges_.begin())};
 }
@@ -110,15 +108,18 @@ SurfaceAdjacency::Corner3 SurfaceAdjacency::corners(std::uint32_t triangle) cons
   return c;
 }
 
-bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, std::uint32_t answer) const {
+bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle,
+                                      std::uint32_t answer) const {
   constexpr std::size_t kMostTriangles = 1u << 18;  // a larger patch is taken for one that the ray passes through
   std::unordered_set<Corner3, HashOfCorners> seen{corners(triangle)};
   std::vector<Corner3> waiting(seen.begin(), seen.end());
   const Sheared sheared(ray);
-  for (std::size_t turn = 0; turn < waiting.size(); ++turn) {  // in the order found: on all sides at once, so that the nearest border ends it
+  // In the order found: on all sides at once, so that the nearest border ends it
+  for (std::size_t turn = 0; turn < waiting.size(); ++turn) {
     const Corner3 c = waiting[turn];
     if (c[0] == c[1] || c[1] == c[2]) return false;
-    const Seen p[3] = {sheared(mesh_.position(c[0], at)), sheared(mesh_.position(c[1], at)), sheared(mesh_.position(c[2], at))};
+    const Seen p[3] = {sheared(mesh_.position(c[0], at)), sheared(mesh_.position(c[1], at)),
+                       sheared(mesh_.position(c[2], at))};
     const RoundedDistance t = rounded_distance(sheared, p[0], p[1], p[2]);
     if (t.lower < ray.tnear || t.upper > ray.tfar) return false;
     const double area = std::fabs((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x));

@@ -1,6 +1,6 @@
-// SurfaceAdjacency: which triangles share an edge or a vertex by position (in every key frame), to tell a crack in a closed
-// surface from a miss at its silhouette or border. Any mesh will do: holes, fins and degenerate triangles
-// only make it say "no crack".
+// SurfaceAdjacency: which triangles share an edge or a vertex by position (in every key frame), to tell a crack in a
+// closed surface from a miss at its silhouette or border. Any mesh will do: holes, fins and degenerate triangles only
+// make it say "no crack".
 #pragma once
 
 #include <array>
@@ -20,14 +20,16 @@ class SurfaceAdjacency {
   /// no part.
   explicit SurfaceAdjacency(const TriangleMesh& mesh);
 
-  /// Whether the ray of that time, which meets `triangle`, passes through the surface there, however the vertices are rounded: the triangles about the ray, connected by edges that come near it,
-  /// form a patch of one facing whose border is not near. An edge is near within kNear of a triangle's height over it, and
-  /// within kRounding of its vertices' distance; a near edge that not exactly two triangles share, one on either side as seen
-  /// along the ray, is a border or a silhouette. (Moving the patch's vertices by less than that moves its border not across
-  /// the ray, so the patch, covering the ray once, goes on covering it.) A patch that rounding may put outside the ray's
-  /// interval, in part, is none either.
-  /// False where `answer`, a triangle or kNoPrimitive, is one of the patch: the surface was met, if at another depth.
-  [[nodiscard]] bool passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle, std::uint32_t answer = kNoPrimitive) const;
+  /// Whether the ray of that time, which meets `triangle`, passes through the surface there, however the vertices are
+  /// rounded: the triangles about the ray, connected by edges that come near it, form a patch of one facing whose
+  /// border is not near. An edge is near within kNear of a triangle's height over it, and within kRounding of its
+  /// vertices' distance; a near edge that not exactly two triangles share, one on either side as seen along the ray, is
+  /// a border or a silhouette. (Moving the patch's vertices by less than that moves its border not across the ray, so
+  /// the patch, covering the ray once, goes on covering it.) A patch that rounding may put outside the ray's interval,
+  /// in part, is none either. False where `answer`, a triangle or kNoPrimitive, is one of the patch: the surface was
+  /// met, if at another depth.
+  [[nodiscard]] bool passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle,
+                                    std::uint32_t answer = kNoPrimitive) const;
 
   /// How many triangles share the edge between corners k and (k + 1) % 3; 0 where the triangle takes no part.
   [[nodiscard]] std::size_t triangles_at_edge(std::uint32_t triangle, std::size_t k) const;
@@ -47,11 +49,12 @@ class SurfaceAdjacency {
   /// The range of edges_ between two vertices.
   [[nodiscard]] std::pair<const Edge*, const Edge*> at_edge(std::uint32_t a, std::uint32_t b) const;
   /// The third vertex of the triangle across the edge a-b from `third`; nothing where the edge is no crossing.
-  [[nodiscard]] std::optional<std::uint32_t> across(const Ray& ray, FrameTime at, std::uint32_t a, std::uint32_t b, std::uint32_t third) const;
+  [[nodiscard]] std::optional<std::uint32_t> across(const Ray& ray, FrameTime at, std::uint32_t a, std::uint32_t b,
+                                                    std::uint32_t third) const;
 
   const TriangleMesh& mesh_;
-  std::vector<std::uint32_t> welded_;                 // of each vertex: the lowest vertex at its position in all frames
-  std::vector<Edge> edges_;                           // sorted, one a triangle and edge
+  std::vector<std::uint32_t> welded_;  // of each vertex: the lowest vertex at its position in all frames
+  std::vector<Edge> edges_;            // sorted, one a triangle and edge
 };
 
 }  // namespace arboretum

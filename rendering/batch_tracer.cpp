@@ -22,7 +22,8 @@ void BatchTracer::trace(const RayBatch& rays, std::span<Hit> hits, RayKind kind,
   statistics[kind].rays += rays.size();
 }
 
-void BatchTracer::closest_hit(const TracedRays& rays, std::size_t begin, std::span<Hit> hits, RayKind kind, RenderStatistics& statistics) const {
+void BatchTracer::closest_hit(const TracedRays& rays, std::size_t begin, std::span<Hit> hits, RayKind kind,
+                              RenderStatistics& statistics) const {
   if (hits.empty()) return;
   trace(batch_of(rays, begin, hits.size(), kind), hits, kind, statistics);
   if (scene_.effects().has(EffectKind::alpha_cutout)) pass_holes(rays, begin, hits, PassDimension::path, statistics);
@@ -49,11 +50,13 @@ void BatchTracer::any_hit(const TracedRays& rays, std::size_t begin, std::span<s
   std::vector<Hit> hits(places.size());
   if (hits.empty()) return;
   trace(batch_of(stopped, 0, hits.size(), kind), hits, RayKind::alpha_cutout, statistics);
-  pass_holes(stopped, 0, hits, kind == RayKind::env_light ? PassDimension::environment : PassDimension::light, statistics);
+  pass_holes(stopped, 0, hits, kind == RayKind::env_light ? PassDimension::environment : PassDimension::light,
+             statistics);
   for (std::size_t k = 0; k < hits.size(); ++k) occluded[places[k]] = hits[k].is_hit();
 }
 
-bool BatchTracer::lets_through(const Hit& hit, const RayOwner& owner, PassDimension dimension, std::uint64_t crossing) const {
+bool BatchTracer::lets_through(const Hit& hit, const RayOwner& owner, PassDimension dimension,
+                               std::uint64_t crossing) const {
   if (!hit.is_hit()) return false;
   const Surface& surface = scene_.surface(hit.primitive);
   if (!surface.has_holes()) return false;
@@ -74,7 +77,8 @@ void BatchTracer::pass_holes(const TracedRays& rays, std::size_t begin, std::spa
     next.rays.push_back(ray), next.owners.push_back(owner), next_places.push_back(place);
     if (!rays.times.empty()) next.times.push_back(time);
   };
-  for (std::size_t i = 0; i < hits.size(); ++i) add_passing(rays.rays[begin + i], rays.time(begin + i), rays.owners[begin + i], i, 0);
+  for (std::size_t i = 0; i < hits.size(); ++i)
+    add_passing(rays.rays[begin + i], rays.time(begin + i), rays.owners[begin + i], i, 0);
   for (std::uint64_t crossing = 1; next.size() > 0; ++crossing) {
     std::swap(going, next), next.clear();
     std::swap(places, next_places), next_places.clear();

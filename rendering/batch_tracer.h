@@ -1,7 +1,7 @@
 // BatchTracer: batches of a renderer's rays through one row of the kernel table, surfaces with holes passed through.
 //
-// Kernels know nothing of holes. A ray whose closest hit lets it through is traced again from beyond that hit; one that any hit
-// finds occluded, for its closest hits. Where no surface has holes nothing is asked.
+// Kernels know nothing of holes. A ray whose closest hit lets it through is traced again from beyond that hit; one that
+// any hit finds occluded, for its closest hits. Where no surface has holes nothing is asked.
 #pragma once
 
 #include <span>
@@ -43,14 +43,18 @@ class BatchTracer {
   [[nodiscard]] const KernelRow& kernel() const noexcept { return kernel_; }
 
   /// Of rays [begin, begin + hits.size()), which are of one kind.
-  void closest_hit(const TracedRays& rays, std::size_t begin, std::span<Hit> hits, RayKind kind, RenderStatistics& statistics) const;
-  void any_hit(const TracedRays& rays, std::size_t begin, std::span<std::uint8_t> occluded, RayKind kind, RenderStatistics& statistics) const;
+  void closest_hit(const TracedRays& rays, std::size_t begin, std::span<Hit> hits, RayKind kind,
+                   RenderStatistics& statistics) const;
+  void any_hit(const TracedRays& rays, std::size_t begin, std::span<std::uint8_t> occluded, RayKind kind,
+               RenderStatistics& statistics) const;
 
  private:
   [[nodiscard]] RayBatch batch_of(const TracedRays& rays, std::size_t begin, std::size_t count, RayKind kind) const;
   void trace(const RayBatch& rays, std::span<Hit> hits, RayKind kind, RenderStatistics& statistics) const;
-  void pass_holes(const TracedRays& rays, std::size_t begin, std::span<Hit> hits, PassDimension dimension, RenderStatistics& statistics) const;
-  [[nodiscard]] bool lets_through(const Hit& hit, const RayOwner& owner, PassDimension dimension, std::uint64_t crossing) const;
+  void pass_holes(const TracedRays& rays, std::size_t begin, std::span<Hit> hits, PassDimension dimension,
+                  RenderStatistics& statistics) const;
+  [[nodiscard]] bool lets_through(const Hit& hit, const RayOwner& owner, PassDimension dimension,
+                                  std::uint64_t crossing) const;
 
   const RenderScene& scene_;
   const Accel& accel_;

@@ -35,7 +35,9 @@ Bsdf::Bsdf(const Surface& surface, Vec3f diffuse, Vec3d out, bool front) noexcep
   if (out_.z < kLeast) out_ = normalize(Vec3d{out.x, out.y, kLeast});
 }
 
-Vec3f Bsdf::coat_lets_through(double cosine) const noexcept { return Vec3f{1, 1, 1} - schlick(surface_.specular, cosine); }
+Vec3f Bsdf::coat_lets_through(double cosine) const noexcept {
+  return Vec3f{1, 1, 1} - schlick(surface_.specular, cosine);
+}
 
 Bsdf::Value Bsdf::evaluate(Vec3d in) const noexcept {
   Value value;
@@ -47,7 +49,8 @@ Bsdf::Value Bsdf::evaluate(Vec3d in) const noexcept {
   if (glossy()) {
     const Vec3d half = normalize(out_ + in);
     const double shadowing = 1.0 / (1.0 + lambda(out_, surface_.alpha) + lambda(in, surface_.alpha));
-    value.glossy = schlick(surface_.specular, dot(out_, half)) * float(ggx(half, surface_.alpha) * shadowing / (4.0 * out_.z));
+    value.glossy =
+        schlick(surface_.specular, dot(out_, half)) * float(ggx(half, surface_.alpha) * shadowing / (4.0 * out_.z));
   }
   return value;
 }
@@ -95,7 +98,9 @@ Vec3d Bsdf::glossy_direction(double u, double v) const noexcept {
   return normalize(normal * (2.0 * dot(out_, normal)) - out_);
 }
 
-Scatter Bsdf::mirrored() const noexcept { return {{-out_.x, -out_.y, out_.z}, surface_.specular, 0.0, ScatterKind::mirror}; }
+Scatter Bsdf::mirrored() const noexcept {
+  return {{-out_.x, -out_.y, out_.z}, surface_.specular, 0.0, ScatterKind::mirror};
+}
 
 Bsdf::Glass Bsdf::glass() const noexcept {
   const double n = front_ ? surface_.ior : 1.0 / surface_.ior;  // beyond over here
@@ -121,7 +126,8 @@ std::optional<Scatter> Bsdf::scatter(Lobes lobes, double choice, double u, doubl
     const Vec3d in = cosine_direction(u, UnitCircle(v));
     if (glossy()) return smooth(in, lobes, ScatterKind::diffuse);
     if (!(in.z > 0.0)) return std::nullopt;
-    return Scatter{in, share == 1.0 ? diffuse_ : diffuse_ * float(1.0 / share), share * in.z / std::numbers::pi, ScatterKind::diffuse};
+    return Scatter{in, share == 1.0 ? diffuse_ : diffuse_ * float(1.0 / share), share * in.z / std::numbers::pi,
+                   ScatterKind::diffuse};
   }
   if (glossy()) return smooth(glossy_direction(u, v), lobes, ScatterKind::glossy);
   Scatter scatter = mirrored();
@@ -138,7 +144,8 @@ Bsdf::Branches Bsdf::branches() const noexcept {
   reflected.weight = reflected.weight * float(g.reflected), reflected.kind = ScatterKind::dielectric;
   if (g.reflected > 0.0) result.directions[result.count++] = reflected;
   if (g.reflected < 1.0)
-    result.directions[result.count++] = {g.refracted, surface_.transmission * float(1.0 - g.reflected), 0.0, ScatterKind::dielectric};
+    result.directions[result.count++] = {g.refracted, surface_.transmission * float(1.0 - g.reflected), 0.0,
+                                         ScatterKind::dielectric};
   return result;
 }
 

@@ -1,7 +1,8 @@
 // Bsdf: how a surface scatters light at one hit, in a frame whose z axis is the normal on the viewer's side.
 //
-// GGX (Walter et al. 2007) with height-correlated Smith shadowing (Heitz, JCGT 3(2), 2014), its visible normals sampled as
-// spherical caps (Dupuy and Benyoub, 2023). Beside a glossy lobe the diffuse one gets what neither way through the coat reflects.
+// GGX (Walter et al. 2007) with height-correlated Smith shadowing (Heitz, JCGT 3(2), 2014), its visible normals sampled
+// as spherical caps (Dupuy and Benyoub, 2023). Beside a glossy lobe the diffuse one gets what neither way through the
+// coat reflects.
 #pragma once
 
 #include <array>
@@ -20,16 +21,16 @@ struct Lobes {
 enum class ScatterKind : unsigned char { diffuse, glossy, mirror, dielectric };
 
 struct Scatter {
-  Vec3d direction;  ///< away from the surface, of unit length; z < 0: through it
-  Vec3f weight;     ///< value times cosine over density
-  double pdf = 0.0; ///< of the direction, by solid angle; 0 for perfect lobes
+  Vec3d direction;   ///< away from the surface, of unit length; z < 0: through it
+  Vec3f weight;      ///< value times cosine over density
+  double pdf = 0.0;  ///< of the direction, by solid angle; 0 for perfect lobes
   ScatterKind kind = ScatterKind::diffuse;
 };
 
 class Bsdf {
  public:
-  /// `diffuse`: the surface's at this point. `out`: towards the viewer, z >= 0. `front`: the viewer is on the side that sees
-  /// the corners counter-clockwise: outside of glass.
+  /// `diffuse`: the surface's at this point. `out`: towards the viewer, z >= 0. `front`: the viewer is on the side that
+  /// sees the corners counter-clockwise: outside of glass.
   Bsdf(const Surface& surface, Vec3f diffuse, Vec3d out, bool front) noexcept;
 
   /// Value times the cosine for light from `in`, of the lobes that are no perfect ones.
@@ -41,7 +42,8 @@ class Bsdf {
   [[nodiscard]] double pdf(Vec3d in, Lobes lobes) const noexcept;
   /// One direction from three numbers in [0, 1); nothing where all light is swallowed.
   [[nodiscard]] std::optional<Scatter> scatter(Lobes lobes, double choice, double u, double v) const noexcept;
-  /// The directions of the perfect lobe, each with its whole share: none, a mirror's, or glass's reflected and refracted one.
+  /// The directions of the perfect lobe, each with its whole share: none, a mirror's, or glass's reflected and
+  /// refracted one.
   struct Branches {
     std::array<Scatter, 2> directions;
     unsigned count = 0;

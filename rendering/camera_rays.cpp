@@ -11,7 +11,8 @@ void CameraRays::add(std::span<const PixelSample> samples, TracedRays& rays) con
   const double open = scene_.shutter().open, close = scene_.shutter().close;
   for (const PixelSample& s : samples) {
     const Sampler sampler(settings_.seed, s.y * settings_.width + s.x, s.sample);
-    const double x = s.x + sampler.camera(CameraDimension::picture_x), y = s.y + sampler.camera(CameraDimension::picture_y);
+    const double x = s.x + sampler.camera(CameraDimension::picture_x),
+                 y = s.y + sampler.camera(CameraDimension::picture_y);
     if (lens) {
       const double r = std::sqrt(sampler.camera(CameraDimension::lens_x));
       const UnitCircle circle(sampler.camera(CameraDimension::lens_y));
@@ -28,7 +29,9 @@ std::vector<PixelSample> CameraRays::samples(std::uint32_t x, std::uint32_t y, s
                                              std::uint32_t last) const {
   std::vector<PixelSample> all;
   for (std::uint32_t sample = first; sample < last; ++sample)
-    visit_morton(x, y, size, settings_.width, settings_.height, [&](unsigned px, unsigned py) { all.push_back({px, py, sample}); });
+    visit_morton(x, y, size, settings_.width, settings_.height, [&](unsigned px, unsigned py) {
+      all.push_back({px, py, sample});
+    });
   return all;
 }
 

@@ -1,4 +1,5 @@
-// Camera rays of a renderer: one for each sample of a pixel, anywhere within it, on the lens and while the shutter is open.
+// Camera rays of a renderer: one for each sample of a pixel, anywhere within it, on the lens and while the shutter is
+// open.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +24,10 @@ class CameraRays {
 
   /// Appends a ray for each sample.
   void add(std::span<const PixelSample> samples, TracedRays& rays) const;
-  /// The pixels of the square of side `size` (a power of two) at (x, y) that lie in the picture, in Morton order; all with the
-  /// samples [first, last), sample by sample.
-  [[nodiscard]] std::vector<PixelSample> samples(std::uint32_t x, std::uint32_t y, std::uint32_t size, std::uint32_t first, std::uint32_t last) const;
+  /// The pixels of the square of side `size` (a power of two) at (x, y) that lie in the picture, in Morton order; all
+  /// with the samples [first, last), sample by sample.
+  [[nodiscard]] std::vector<PixelSample> samples(std::uint32_t x, std::uint32_t y, std::uint32_t size,
+                                                 std::uint32_t first, std::uint32_t last) const;
 
  private:
   const RenderScene& scene_;

@@ -72,7 +72,8 @@ Environment::Sample Environment::sample(double u, double v) const noexcept {
   const auto row = unsigned(chosen / image_.width);
   // Within the pixel: what is left of u along the row, v by equal areas from above.
   const double turns = (column + (u - before) / share) / image_.width + 0.5;
-  const double top = UnitCircle(0.5 * row / image_.height).cosine, bottom = UnitCircle(0.5 * (row + 1.0) / image_.height).cosine;
+  const double top = UnitCircle(0.5 * row / image_.height).cosine,
+               bottom = UnitCircle(0.5 * (row + 1.0) / image_.height).cosine;
   const double up = top + (bottom - top) * v, across = std::sqrt(std::max(0.0, 1.0 - up * up));
   const UnitCircle angle(turns);
   const Vec3d direction{across * angle.sine, up, -across * angle.cosine};

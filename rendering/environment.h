@@ -1,8 +1,9 @@
-// Environment: radiance from afar by direction: constant, or a latitude-longitude image with y up, its middle column towards -z and
-// its columns going on towards +x.
+// Environment: radiance from afar by direction: constant, or a latitude-longitude image with y up, its middle column
+// towards -z and its columns going on towards +x.
 //
-// Directions towards an image are chosen by the luminance of its pixels (Pharr, Jakob, Humphreys, 3rd ed., 14.2.4), each pixel's being the most of
-// its neighbours', so that what bilinear look-up shows is always found. A constant one needs no choosing: lobes find it best themselves.
+// Directions towards an image are chosen by the luminance of its pixels (Pharr, Jakob, Humphreys, 3rd ed., 14.2.4),
+// each pixel's being the most of its neighbours', so that what bilinear look-up shows is always found. A constant one
+// needs no choosing: lobes find it best themselves.
 #pragma once
 
 #include <vector>

@@ -14,17 +14,19 @@ namespace arboretum {
 namespace {
 
 constexpr std::string_view kMixture = "hard", kCameraEdges = "camera_edges", kPrefix = "hard_";
-constexpr std::array<std::string_view, 12> kNames{kMixture,    "hard_vertex", "hard_edge",  "hard_border", "hard_interior", "hard_grazing",
-                                                  "hard_axis", "hard_plane",  "hard_surface", "hard_far",  "hard_interval", kCameraEdges};
+constexpr std::array<std::string_view, 12> kNames{kMixture,        "hard_vertex",  "hard_edge",     "hard_border",
+                                                  "hard_interior", "hard_grazing", "hard_axis",     "hard_plane",
+                                                  "hard_surface",  "hard_far",     "hard_interval", kCameraEdges};
 
-/// The kinds that a workload is made of, as far as the mesh has them. The mixture is without `far`: from 2^27 radii away every box is within
-/// rounding of the ray, and each such ray visits the whole structure.
+/// The kinds that a workload is made of, as far as the mesh has them. The mixture is without `far`: from 2^27 radii
+/// away every box is within rounding of the ray, and each such ray visits the whole structure.
 std::vector<HardKind> kinds_of(std::string_view name, const HardRayMaker& maker) {
   std::vector<HardKind> kinds;
   for (std::size_t k = 0; k < kMadeKinds; ++k) {
     const auto kind = static_cast<HardKind>(k);
     if (kind == HardKind::invalid || !maker.has(kind)) continue;
-    if (name == kMixture ? kind != HardKind::far : name.substr(kPrefix.size()) == to_string(kind)) kinds.push_back(kind);
+    if (name == kMixture ? kind != HardKind::far : name.substr(kPrefix.size()) == to_string(kind))
+      kinds.push_back(kind);
   }
   return kinds;
 }
@@ -36,7 +38,9 @@ Workload camera_edges(const Scene& scene, const View& view) {
   const std::size_t count = std::size_t{view.width} * view.height;
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto bits = [&](std::uint64_t dimension) { return random_bits(view.seed, i, dimension); };
-    const float time = scene.mesh.moves() ? scene.shutter.open + (scene.shutter.close - scene.shutter.open) * random_float(view.seed, i, 3) : 0.0f;
+    const float time = scene.mesh.moves() ? scene.shutter.open + (scene.shutter.close - scene.shutter.open) *
+                                                                     random_float(view.seed, i, 3)
+                                          : 0.0f;
     const auto corners = scene.mesh.corners(bits(0) % scene.mesh.size(), frame_at(time, scene.mesh.frames()));
     const std::size_t k = bits(1) % 3;
     const double s = i % 4 == 0 ? 0.0 : random_double(view.seed, i, 2);
@@ -51,13 +55,9 @@ Workload camera_edges(const Scene& scene, const View& view) {
 
 }  // namespace
 
-std::span<const std::string_view> hard_workload_names() {
-  return kNames;
-}
+std::span<const std::string_view> hard_workload_names() { return kNames; }
 
-bool is_hard(std::string_view workload) noexcept {
-  return std::ranges::find(kNames, workload) != kNames.end();
-}
+bool is_hard(std::string_view workload) noexcept { return std::ranges::find(kNames, workload) != kNames.end(); }
 
 Workload make_hard_workload(std::string_view name, const Scene& scene, const View& view) {
   if (!is_hard(name)) throw std::invalid_argument("make_hard_workload: no hard workload is called so");

@@ -1,5 +1,5 @@
-// Hard workloads: rays aimed at what tests and boxes get wrong (oracle/hard_rays.h), as many as the picture has pixels, measured and
-// checked as other workloads are.
+// Hard workloads: rays aimed at what tests and boxes get wrong (oracle/hard_rays.h), as many as the picture has pixels,
+// measured and checked as other workloads are.
 #pragma once
 
 #include <span>
@@ -13,8 +13,8 @@ namespace arboretum {
 [[nodiscard]] std::span<const std::string_view> hard_workload_names();
 [[nodiscard]] bool is_hard(std::string_view workload) noexcept;
 
-/// Closest hit. `camera_edges`: from the camera at points of edges and, every fourth, at vertices, with Workload::pixels. No ray at all
-/// where the mesh lacks what they are aimed at (`hard_border` of a closed one).
+/// Closest hit. `camera_edges`: from the camera at points of edges and, every fourth, at vertices, with
+/// Workload::pixels. No ray at all where the mesh lacks what they are aimed at (`hard_border` of a closed one).
 [[nodiscard]] Workload make_hard_workload(std::string_view name, const Scene& scene, const View& view);
 
 }  // namespace arboretum

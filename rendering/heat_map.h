@@ -1,7 +1,8 @@
 // Heat map: what one ray a pixel costs, as a picture: nodes visited or triangles tested, with a colour bar.
 //
-// Rays go one by one through the counting kernel, from the pixels' centres without a lens, in the middle of the shutter's time. The
-// colours' lightness (CIELAB) rises evenly with the count, so that equal differences look equal and grey prints keep the order.
+// Rays go one by one through the counting kernel, from the pixels' centres without a lens, in the middle of the
+// shutter's time. The colours' lightness (CIELAB) rises evenly with the count, so that equal differences look equal and
+// grey prints keep the order.
 #pragma once
 
 #include <array>
@@ -48,7 +49,8 @@ struct HeatTick {
   std::uint64_t count = 0;
   unsigned y = 0;
 };
-/// Of a bar from row `low` (a count of 0) up to row `high` (`top`, always the last of them): labels `letter` pixels high are apart.
+/// Of a bar from row `low` (a count of 0) up to row `high` (`top`, always the last of them): labels `letter` pixels
+/// high are apart.
 [[nodiscard]] std::vector<HeatTick> heat_ticks(std::uint64_t top, unsigned high, unsigned low, unsigned letter);
 
 }  // namespace arboretum

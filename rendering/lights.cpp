@@ -18,12 +18,13 @@ struct Placed {
   [[nodiscard]] double area() const { return 0.5 * length(normal); }
 };
 
-/// Over the key frames and the moments halfway between them: twice the area is the length of a quadratic function of time, which
-/// is 0 all along where it is 0 at three moments.
+/// Over the key frames and the moments halfway between them: twice the area is the length of a quadratic function of
+/// time, which is 0 all along where it is 0 at three moments.
 double largest_area(const TriangleMesh& mesh, std::uint32_t triangle) {
   const std::size_t steps = 2 * (mesh.frames() - 1);
   double area = 0.0;
-  for (std::size_t i = 0; i <= steps; ++i) area = std::max(area, Placed(mesh, triangle, steps == 0 ? 0.0f : float(i) / float(steps)).area());
+  for (std::size_t i = 0; i <= steps; ++i)
+    area = std::max(area, Placed(mesh, triangle, steps == 0 ? 0.0f : float(i) / float(steps)).area());
   return area;
 }
 
@@ -31,10 +32,12 @@ double cosine_of_cone(const Light& light) { return UnitCircle(0.5 * double(light
 
 }  // namespace
 
-LightTable::LightTable(const TriangleMesh& mesh, const std::vector<Surface>& surfaces, const std::vector<Light>& lights, EffectSet effects)
+LightTable::LightTable(const TriangleMesh& mesh, const std::vector<Surface>& surfaces, const std::vector<Light>& lights,
+                       EffectSet effects)
     : mesh_(&mesh) {
   const Bounds3f bounds = mesh.bounds();
-  if (effects.has(EffectKind::shadow_hard)) add_lights(lights, bounds.empty() ? 0.0 : 0.5 * length(Vec3d(bounds.upper) - Vec3d(bounds.lower)));
+  if (effects.has(EffectKind::shadow_hard))
+    add_lights(lights, bounds.empty() ? 0.0 : 0.5 * length(Vec3d(bounds.upper) - Vec3d(bounds.lower)));
   if (effects.has(EffectKind::shadow_soft)) add_triangles(surfaces);
   settle(!effects.has(EffectKind::multi_light));
 }
@@ -46,7 +49,10 @@ void LightTable::add_lights(const std::vector<Light>& lights, double radius) {
     if (light.type == Light::Type::directional) solid_angle = std::numbers::pi * radius * radius;
     const double power = luminance(light.intensity) * solid_angle;
     if (!is_bright(light.intensity)) continue;
-    emitters_.push_back({.light = light, .direction = normalize(Vec3d(light.direction)), .cone_cosine = cone_cosine, .power = std::max(power, 1e-300)});
+    emitters_.push_back({.light = light,
+                         .direction = normalize(Vec3d(light.direction)),
+                         .cone_cosine = cone_cosine,
+                         .power = std::max(power, 1e-300)});
   }
 }
 
@@ -61,12 +67,12 @@ void LightTable::add_triangles(const std::vector<Surface>& surfaces) {
 
 void LightTable::settle(bool strongest_alone) {
   if (emitters_.empty()) return;
-  if (strongest_alone)
-    emitters_ = {*std::ranges::max_element(emitters_, {}, &Emitter::power)};
+  if (strongest_alone) emitters_ = {*std::ranges::max_element(emitters_, {}, &Emitter::power)};
   delta_lights_ = std::size_t(std::ranges::count(emitters_, ~0u, &Emitter::triangle));
   // Apart from each other: where delta lights hold almost all power, what is left for areas is rounding alone.
   double delta_power = 0.0, area_power = 0.0;
-  for (std::size_t i = 0; i < emitters_.size(); ++i) (i < delta_lights_ ? delta_power : area_power) += emitters_[i].power;
+  for (std::size_t i = 0; i < emitters_.size(); ++i)
+    (i < delta_lights_ ? delta_power : area_power) += emitters_[i].power;
   double up_to = 0.0, up_to_area = 0.0;
   for (std::size_t i = 0; i < emitters_.size(); ++i) {
     Emitter& e = emitters_[i];
@@ -78,7 +84,8 @@ void LightTable::settle(bool strongest_alone) {
   if (!areas_up_to_.empty()) areas_up_to_.back() = 1.0;
 }
 
-std::optional<LightSample> LightTable::sample(Vec3d from, float time, double choice, double u, double v) const noexcept {
+std::optional<LightSample> LightTable::sample(Vec3d from, float time, double choice, double u,
+                                              double v) const noexcept {
   if (emitters_.empty()) return std::nullopt;
   const auto chosen = std::size_t(std::ranges::upper_bound(up_to_, choice) - up_to_.begin());
   const std::size_t i = std::min(chosen, emitters_.size() - 1);
@@ -88,9 +95,11 @@ std::optional<LightSample> LightTable::sample(Vec3d from, float time, double cho
   return light;
 }
 
-std::optional<LightSample> LightTable::sample_area(Vec3d from, float time, double choice, double u, double v) const noexcept {
+std::optional<LightSample> LightTable::sample_area(Vec3d from, float time, double choice, double u,
+                                                   double v) const noexcept {
   if (areas_up_to_.empty()) return std::nullopt;
-  const auto chosen = delta_lights_ + std::size_t(std::ranges::upper_bound(areas_up_to_, choice) - areas_up_to_.begin());
+  const auto chosen =
+      delta_lights_ + std::size_t(std::ranges::upper_bound(areas_up_to_, choice) - areas_up_to_.begin());
   const Emitter& emitter = emitters_[std::min(chosen, emitters_.size() - 1)];
   return from_triangle(emitter, emitter.probability_among_areas, from, time, u, v);
 }
@@ -108,8 +117,8 @@ std::optional<LightSample> LightTable::delta_light(std::size_t i, Vec3d from) co
   return LightSample{direction, distance, light.intensity * float(1.0 / distance2), 0.0, {}};
 }
 
-std::optional<LightSample> LightTable::from_triangle(const Emitter& emitter, double probability, Vec3d from, float time, double u,
-                                                     double v) const noexcept {
+std::optional<LightSample> LightTable::from_triangle(const Emitter& emitter, double probability, Vec3d from, float time,
+                                                     double u, double v) const noexcept {
   const Placed triangle(*mesh_, emitter.triangle, time);
   const double root = std::sqrt(u), b = root * (1.0 - v), c = root * v;
   const Vec3d to_light = triangle.a + triangle.ab * b + triangle.ac * c - from;
@@ -134,7 +143,8 @@ double LightTable::pdf(std::uint32_t triangle, Vec3d from, Vec3d point, float ti
   const Vec3d to_light = point - from;
   const double distance2 = dot(to_light, to_light);
   const double facing = std::abs(dot(Placed(*mesh_, triangle, time).normal, to_light));
-  return facing > 0.0 ? emitter->probability * distance2 * std::sqrt(distance2) * 2.0 / facing : std::numeric_limits<double>::infinity();
+  return facing > 0.0 ? emitter->probability * distance2 * std::sqrt(distance2) * 2.0 / facing
+                      : std::numeric_limits<double>::infinity();
 }
 
 Vec3f LightTable::emission(std::uint32_t triangle) const noexcept {

@@ -10,16 +10,18 @@
 namespace arboretum {
 namespace {
 
-/// The power heuristic's weight of a way that finds a direction by density `own`, where another one finds it by `other`.
+/// The power heuristic's weight of a way that finds a direction by density `own`, where another one finds it by
+/// `other`.
 float power_weight(double own, double other) {
   const double ratio = other / own;
   return float(1.0 / (1.0 + ratio * ratio));
 }
 
-constexpr std::uint32_t kFirstRoulette = 3;       // hits that are never the last one by chance
+constexpr std::uint32_t kFirstRoulette = 3;  // hits that are never the last one by chance
 constexpr double kMostSurvival = 0.95;
-constexpr float kLeastBranch = 0x1p-10f;          // branches of whitted with less of the pixel's light than that end
-constexpr double kShortOfLight = 1.0 - 0x1p-20;   // a shadow ray ends that much before an area light, by its own rounding
+constexpr float kLeastBranch = 0x1p-10f;  // branches of whitted with less of the pixel's light than that end
+// a shadow ray ends that much before an area light, by its own rounding
+constexpr double kShortOfLight = 1.0 - 0x1p-20;
 
 RayKind kind_of(ScatterKind kind) {
   switch (kind) {
@@ -46,15 +48,17 @@ struct PathWave::Shading {
   Bsdf bsdf;
 
   Shading(const RenderScene& scene, const Ray& r, float t, const RayOwner& o, const Path& p, const Hit& h)
-      : ray(r), time(t), owner(o), path(p), hit(h), surface(scene.surface(h.primitive)), point(scene.mesh(), r, t, h), frame(point.normal()),
-        node(o.node == Sampler::kCamera ? 0 : o.node),
+      : ray(r), time(t), owner(o), path(p), hit(h), surface(scene.surface(h.primitive)), point(scene.mesh(), r, t, h),
+        frame(point.normal()), node(o.node == Sampler::kCamera ? 0 : o.node),
         bsdf(surface, scene.diffuse(surface, h), to_local(normalize(Vec3d(r.direction)) * -1.0), point.is_front()) {}
   /// Where rays start that leave on the viewer's side.
   [[nodiscard]] Vec3f origin() const noexcept {
     if (!known_origin_) known_origin_ = point.origin(point.normal(), SelfIntersection::error_bound);
     return *known_origin_;
   }
-  [[nodiscard]] Vec3d to_local(Vec3d v) const noexcept { return {dot(v, frame.tangent), dot(v, frame.bitangent), dot(v, frame.normal)}; }
+  [[nodiscard]] Vec3d to_local(Vec3d v) const noexcept {
+    return {dot(v, frame.tangent), dot(v, frame.bitangent), dot(v, frame.normal)};
+  }
   [[nodiscard]] double random(HitDimension d) const noexcept { return owner.sampler.hit(node, d); }
 
  private:
@@ -62,7 +66,8 @@ struct PathWave::Shading {
 };
 
 PathWave::PathWave(const BatchTracer& tracer, const RenderSettings& settings)
-    : tracer_(tracer), scene_(tracer.scene()), branching_(settings.integrator == Integrator::whitted), depth_(settings.depth), clamp_(settings.clamp) {
+    : tracer_(tracer), scene_(tracer.scene()), branching_(settings.integrator == Integrator::whitted),
+      depth_(settings.depth), clamp_(settings.clamp) {
   bounced_ = branching_ ? Lobes{false, false, true} : Lobes{scene_.effects().has(EffectKind::diffuse_gi), true, true};
 }
 
@@ -181,27 +186,31 @@ Vec3f PathWave::weighed(const Bsdf::Value& value, float weight) const noexcept {
 void PathWave::add_escaped(const Path& path, Vec3d direction) {
   const Environment& environment = scene_.environment();
   Vec3f radiance = environment.radiance(direction);
-  if (!environment.is_constant() && path.pdf > 0.0) radiance = radiance * power_weight(path.pdf, environment.pdf(direction));
+  if (!environment.is_constant() && path.pdf > 0.0)
+    radiance = radiance * power_weight(path.pdf, environment.pdf(direction));
   add(path.slot, path.bounce, path.throughput * radiance);
 }
 
 void PathWave::add_environment(const Shading& at) {
   const Environment& environment = scene_.environment();
   if (environment.is_constant()) return add_constant_environment(at);
-  const Environment::Sample sample = environment.sample(at.random(HitDimension::environment_u), at.random(HitDimension::environment_v));
+  const Environment::Sample sample =
+      environment.sample(at.random(HitDimension::environment_u), at.random(HitDimension::environment_v));
   const Vec3d in = at.to_local(sample.direction);
   if (!(sample.pdf > 1e-30) || !(in.z > 0.0)) return;
   const Vec3f f = weighed(at.bsdf.evaluate(in), power_weight(sample.pdf, at.bsdf.pdf(in, bounced_)));
   const Vec3f arriving = at.path.throughput * f * sample.radiance * float(1.0 / sample.pdf);
-  if (is_bright(arriving)) push_shadow(RayKind::env_light, at, {.origin = at.origin(), .direction = leaving(sample.direction, at.point.normal())}, arriving);
+  if (is_bright(arriving))
+    push_shadow(RayKind::env_light, at,
+                {.origin = at.origin(), .direction = leaving(sample.direction, at.point.normal())}, arriving);
 }
 
 /// The environment's light by the lobes that no path goes on by; the others meet it where they leave the scene.
 void PathWave::add_constant_environment(const Shading& at) {
   const Lobes lobes{!bounced_.diffuse, !bounced_.glossy, false};
   if (!lobes.diffuse && !lobes.glossy) return;
-  const auto scatter = at.bsdf.scatter(lobes, at.random(HitDimension::environment_lobe), at.random(HitDimension::environment_u),
-                                       at.random(HitDimension::environment_v));
+  const auto scatter = at.bsdf.scatter(lobes, at.random(HitDimension::environment_lobe),
+                                       at.random(HitDimension::environment_u), at.random(HitDimension::environment_v));
   if (!scatter) return;
   const Vec3f arriving = at.path.throughput * scatter->weight * scene_.environment().radiance({});
   if (!is_bright(arriving)) return;

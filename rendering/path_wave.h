@@ -1,5 +1,5 @@
-// PathWave: many light paths traced together, hit by hit: the rays of all paths that are at the same hit go to the kernels as
-// batches, one for each kind of ray. `path` and `whitted` are two settings of it.
+// PathWave: many light paths traced together, hit by hit: the rays of all paths that are at the same hit go to the
+// kernels as batches, one for each kind of ray. `path` and `whitted` are two settings of it.
 #pragma once
 
 #include <array>
@@ -23,9 +23,9 @@ class PathWave {
  private:
   struct Path {
     Vec3f throughput{1, 1, 1};
-    std::uint32_t slot = 0;    ///< whose radiance
+    std::uint32_t slot = 0;  ///< whose radiance
     std::uint32_t bounce = 0;
-    double pdf = 0.0;          ///< of the ray's direction; 0: nothing else could have found what it meets
+    double pdf = 0.0;  ///< of the ray's direction; 0: nothing else could have found what it meets
   };
   struct Queue {
     TracedRays rays;
@@ -53,7 +53,8 @@ class PathWave {
   void trace_shadows(RenderStatistics& statistics);
   void add(std::uint32_t slot, std::uint32_t bounce, Vec3f radiance);
 
-  static constexpr std::array kPathKinds{RayKind::camera, RayKind::mirror, RayKind::glossy, RayKind::dielectric, RayKind::diffuse_gi};
+  static constexpr std::array kPathKinds{RayKind::camera, RayKind::mirror, RayKind::glossy, RayKind::dielectric,
+                                         RayKind::diffuse_gi};
   static constexpr std::array kShadowKinds{RayKind::shadow_hard, RayKind::shadow_soft, RayKind::env_light};
   static constexpr std::size_t index_of(RayKind kind) noexcept {
     const auto first = kind >= RayKind::shadow_hard ? RayKind::shadow_hard : RayKind::camera;

@@ -38,8 +38,10 @@ void check_writable(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
   const bool exists = std::filesystem::exists(status);
-  if (exists && !std::filesystem::is_regular_file(status) && !std::filesystem::is_directory(status)) return;  // opening a pipe would wait
-  if (!std::ofstream(path, std::ios::binary | std::ios::app)) throw UserError(path.string() + ": cannot be written; is it a file, and may you write there?");
+  // Opening a pipe would wait
+  if (exists && !std::filesystem::is_regular_file(status) && !std::filesystem::is_directory(status)) return;
+  if (!std::ofstream(path, std::ios::binary | std::ios::app))
+    throw UserError(path.string() + ": cannot be written; is it a file, and may you write there?");
   if (!exists) std::filesystem::remove(path, error);
 }
 
@@ -54,7 +56,8 @@ std::string pfm(const Picture& picture) {
   std::string bytes = "PF\n" + std::to_string(picture.width) + " " + std::to_string(picture.height) +
                       (std::endian::native == std::endian::little ? "\n-1.0\n" : "\n1.0\n");
   for (unsigned y = picture.height; y-- > 0;)  // rows upwards
-    bytes.append(reinterpret_cast<const char*>(picture.pixels.data() + std::size_t(y) * picture.width), picture.width * sizeof(Vec3f));
+    bytes.append(reinterpret_cast<const char*>(picture.pixels.data() + std::size_t(y) * picture.width),
+                 picture.width * sizeof(Vec3f));
   return bytes;
 }
 
@@ -82,7 +85,8 @@ std::vector<std::uint8_t> develop(const Picture& picture, double stops) {
   return bytes;
 }
 
-void write_png(const std::filesystem::path& path, unsigned width, unsigned height, const std::vector<std::uint8_t>& rgb) {
+void write_png(const std::filesystem::path& path, unsigned width, unsigned height,
+               const std::vector<std::uint8_t>& rgb) {
   check_png_size(width, height);
   std::string bytes;
   const auto append = [](void* to, void* data, int size) {
@@ -111,10 +115,12 @@ void check_picture_path(const std::filesystem::path& path) {
 }
 
 void check_png_size(unsigned width, unsigned height) {
-  constexpr std::uint64_t kMost = 1u << 30;  // the encoder counts bytes in int, and its growing buffer's capacity more than doubles
+  // The encoder counts bytes in int, and its growing buffer's capacity more than doubles
+  constexpr std::uint64_t kMost = 1u << 30;
   const std::uint64_t bytes = (std::uint64_t(3) * width + 1) * height;
   if (bytes > kMost)
-    throw UserError(std::to_string(width) + " x " + std::to_string(height) + " pixels are too many for a .png, which may hold 2^30 bytes; .pfm holds pictures of any size");
+    throw UserError(std::to_string(width) + " x " + std::to_string(height) +
+                    " pixels are too many for a .png, which may hold 2^30 bytes; .pfm holds pictures of any size");
 }
 
 }  // namespace arboretum

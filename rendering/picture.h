@@ -16,21 +16,22 @@ struct Picture {
   friend bool operator==(const Picture&, const Picture&) = default;
 };
 
-/// Stops that suit the picture: three quarters of it, black parts left out, come to be below half of white. Rounded to quarters
-/// of a stop; 0 for a black picture.
+/// Stops that suit the picture: three quarters of it, black parts left out, come to be below half of white. Rounded to
+/// quarters of a stop; 0 for a black picture.
 [[nodiscard]] double auto_exposure(const Picture& picture);
 
-/// Eight bits a channel, RGB: radiance times 2^stops, clipped to [0, 1] in each channel, by the sRGB transfer function. No other
-/// tone mapping: equal radiance has equal colours in every picture of the same exposure.
+/// Eight bits a channel, RGB: radiance times 2^stops, clipped to [0, 1] in each channel, by the sRGB transfer function.
+/// No other tone mapping: equal radiance has equal colours in every picture of the same exposure.
 [[nodiscard]] std::vector<std::uint8_t> develop(const Picture& picture, double stops);
 
-/// Writes .png (developed) or .pfm (the radiance itself, float32, exposure not applied). Throws UserError for another extension
-/// or where it cannot be written.
+/// Writes .png (developed) or .pfm (the radiance itself, float32, exposure not applied). Throws UserError for another
+/// extension or where it cannot be written.
 void write_picture(const std::filesystem::path& path, const Picture& picture, double stops);
 /// As a .png, of bytes that are colours already, rows downwards. Throws UserError.
-void write_png(const std::filesystem::path& path, unsigned width, unsigned height, const std::vector<std::uint8_t>& rgb);
-/// Throws UserError for an extension that write_picture does not know, a folder that is not there, or a file that cannot be
-/// written: before any work.
+void write_png(const std::filesystem::path& path, unsigned width, unsigned height,
+               const std::vector<std::uint8_t>& rgb);
+/// Throws UserError for an extension that write_picture does not know, a folder that is not there, or a file that
+/// cannot be written: before any work.
 void check_picture_path(const std::filesystem::path& path);
 /// Throws UserError where write_png could not hold so many pixels: before any work.
 void check_png_size(unsigned width, unsigned height);

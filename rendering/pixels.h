@@ -11,12 +11,13 @@ namespace arboretum {
 inline void check_resolution(unsigned width, unsigned height) {
   constexpr unsigned kMost = 65536;
   if (width == 0 || height == 0 || width > kMost || height > kMost) {
-    throw UserError("resolution " + std::to_string(width) + "x" + std::to_string(height) + " is not possible; each must be within 1 to " +
-                    std::to_string(kMost));
+    throw UserError("resolution " + std::to_string(width) + "x" + std::to_string(height) +
+                    " is not possible; each must be within 1 to " + std::to_string(kMost));
   }
 }
 
-/// Calls visit(x, y) for the pixels of a square of side `size` (a power of two) at (x, y) that lie in a picture of width x height, in Morton order.
+/// Calls visit(x, y) for the pixels of a square of side `size` (a power of two) at (x, y) that lie in a picture of
+/// width x height, in Morton order.
 template <class Visit>
 void visit_morton(unsigned x, unsigned y, unsigned size, unsigned width, unsigned height, const Visit& visit) {
   if (x >= width || y >= height) return;

@@ -1,4 +1,5 @@
-// RayKind: what a renderer's ray is for, by the effect that needs it; and how many of each there were, and what they took.
+// RayKind: what a renderer's ray is for, by the effect that needs it; and how many of each there were, and what they
+// took.
 #pragma once
 
 #include <array>
@@ -8,11 +9,20 @@
 namespace arboretum {
 
 enum class RayKind : unsigned char {
-  camera, mirror, glossy, dielectric, diffuse_gi, shadow_hard, shadow_soft, env_light, ambient_occlusion,
+  camera,
+  mirror,
+  glossy,
+  dielectric,
+  diffuse_gi,
+  shadow_hard,
+  shadow_soft,
+  env_light,
+  ambient_occlusion,
   alpha_cutout  ///< a ray of another kind, traced again beyond a surface that let it through
 };
-inline constexpr std::array<std::string_view, 10> kRayKindNames{"camera",      "mirror",      "glossy",    "dielectric",        "diffuse_gi",
-                                                                "shadow_hard", "shadow_soft", "env_light", "ambient_occlusion", "alpha_cutout"};
+inline constexpr std::array<std::string_view, 10> kRayKindNames{
+    "camera",      "mirror",      "glossy",    "dielectric",        "diffuse_gi",
+    "shadow_hard", "shadow_soft", "env_light", "ambient_occlusion", "alpha_cutout"};
 
 struct RenderStatistics {
   struct Rays {
@@ -20,8 +30,8 @@ struct RenderStatistics {
     double seconds = 0.0;  ///< CPU time of tracing them, shading not included
   };
   std::array<Rays, kRayKindNames.size()> of{};
-  double seconds = 0.0;             ///< CPU time of all threads, tracing and shading
-  std::uint64_t not_finite = 0;     ///< samples with a NaN or an infinity, left out of their pixel
+  double seconds = 0.0;          ///< CPU time of all threads, tracing and shading
+  std::uint64_t not_finite = 0;  ///< samples with a NaN or an infinity, left out of their pixel
 
   [[nodiscard]] Rays& operator[](RayKind kind) noexcept { return of[std::size_t(kind)]; }
   [[nodiscard]] const Rays& operator[](RayKind kind) const noexcept { return of[std::size_t(kind)]; }

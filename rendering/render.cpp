@@ -19,12 +19,12 @@
 namespace arboretum {
 namespace {
 
-constexpr unsigned kTile = 32;              // pixels a side
-constexpr unsigned kSamplesTogether = 16;   // of a pixel: 16 384 paths a wave
+constexpr unsigned kTile = 32;             // pixels a side
+constexpr unsigned kSamplesTogether = 16;  // of a pixel: 16 384 paths a wave
 
 /// Radiance of the camera rays of some samples.
-void trace_wave(const BatchTracer& tracer, const RenderSettings& settings, PathWave& paths, TracedRays& rays, std::span<Vec3d> radiance,
-                RenderStatistics& statistics) {
+void trace_wave(const BatchTracer& tracer, const RenderSettings& settings, PathWave& paths, TracedRays& rays,
+                std::span<Vec3d> radiance, RenderStatistics& statistics) {
   switch (settings.integrator) {
     case Integrator::path:
     case Integrator::whitted: return paths.trace(rays, radiance, statistics);
@@ -34,7 +34,8 @@ void trace_wave(const BatchTracer& tracer, const RenderSettings& settings, PathW
 }
 
 /// The pixels of a tile, all their samples added up in order.
-void render_tile(const BatchTracer& tracer, const RenderSettings& settings, unsigned x, unsigned y, Picture& picture, RenderStatistics& statistics) {
+void render_tile(const BatchTracer& tracer, const RenderSettings& settings, unsigned x, unsigned y, Picture& picture,
+                 RenderStatistics& statistics) {
   const double begin = thread_cpu_seconds();
   const CameraRays camera(tracer.scene(), settings);
   PathWave paths(tracer, settings);
@@ -42,7 +43,8 @@ void render_tile(const BatchTracer& tracer, const RenderSettings& settings, unsi
   std::vector<Vec3d> radiance, sums(std::size_t(kTile) * kTile);
   const auto place = [&](const PixelSample& s) { return std::size_t(s.y - y) * kTile + (s.x - x); };
   for (unsigned first = 0; first < settings.samples; first += kSamplesTogether) {
-    const std::vector<PixelSample> samples = camera.samples(x, y, kTile, first, std::min(first + kSamplesTogether, settings.samples));
+    const std::vector<PixelSample> samples =
+        camera.samples(x, y, kTile, first, std::min(first + kSamplesTogether, settings.samples));
     rays.clear();
     camera.add(samples, rays);
     radiance.assign(samples.size(), {});
@@ -56,7 +58,8 @@ void render_tile(const BatchTracer& tracer, const RenderSettings& settings, unsi
   }
   for (unsigned py = y; py < std::min(y + kTile, settings.height); ++py) {
     for (unsigned px = x; px < std::min(x + kTile, settings.width); ++px)
-      picture.pixels[std::size_t(py) * settings.width + px] = to_float(sums[place({px, py, 0})] * (1.0 / settings.samples));
+      picture.pixels[std::size_t(py) * settings.width + px] =
+          to_float(sums[place({px, py, 0})] * (1.0 / settings.samples));
   }
   statistics.seconds += thread_cpu_seconds() - begin;
 }
@@ -65,18 +68,26 @@ void render_tile(const BatchTracer& tracer, const RenderSettings& settings, unsi
 
 void check(const RenderSettings& s) {
   check_resolution(s.width, s.height);
-  if (s.samples < 1 || s.samples > 65536) throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
+  if (s.samples < 1 || s.samples > 65536)
+    throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
   if (s.integrator == Integrator::whitted && s.depth > kMostBranching)
-    throw UserError("depth " + std::to_string(s.depth) + " is not possible for whitted, which follows every branch; 0 to " + std::to_string(kMostBranching) + " are");
-  if (!(s.clamp > 0.0f)) throw UserError("a clamp of " + std::to_string(s.clamp) + " is not possible; it must be above 0");
+    throw UserError("depth " + std::to_string(s.depth) +
+                    " is not possible for whitted, which follows every branch; 0 to " + std::to_string(kMostBranching) +
+                    " are");
+  if (!(s.clamp > 0.0f))
+    throw UserError("a clamp of " + std::to_string(s.clamp) + " is not possible; it must be above 0");
 }
 
-Integrator parse_integrator(const std::string& word) { return Integrator(index_of_name("integrator", word, kIntegratorNames)); }
+Integrator parse_integrator(const std::string& word) {
+  return Integrator(index_of_name("integrator", word, kIntegratorNames));
+}
 
-Picture render(const BatchTracer& tracer, const RenderSettings& settings, RenderStatistics& statistics, const RenderProgress& progress) {
+Picture render(const BatchTracer& tracer, const RenderSettings& settings, RenderStatistics& statistics,
+               const RenderProgress& progress) {
   check(settings);
   Picture picture{settings.width, settings.height, std::vector<Vec3f>(std::size_t(settings.width) * settings.height)};
-  const unsigned across = (settings.width + kTile - 1) / kTile, tiles = across * ((settings.height + kTile - 1) / kTile);
+  const unsigned across = (settings.width + kTile - 1) / kTile,
+                 tiles = across * ((settings.height + kTile - 1) / kTile);
   std::mutex mutex;
   unsigned done = 0;
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());

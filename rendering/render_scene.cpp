@@ -13,22 +13,25 @@ namespace {
 void check_materials(const Scene& scene) {
   const std::vector<std::uint16_t>& numbers = scene.mesh.materials;
   if (!numbers.empty() && numbers.size() != scene.mesh.size())
-    throw UserError(scene.name + ": " + std::to_string(scene.mesh.size()) + " triangles have " + std::to_string(numbers.size()) + " materials' numbers");
+    throw UserError(scene.name + ": " + std::to_string(scene.mesh.size()) + " triangles have " +
+                    std::to_string(numbers.size()) + " materials' numbers");
   const std::size_t materials = std::max<std::size_t>(1, scene.materials.size());
   const auto beyond = std::ranges::find_if(numbers, [&](std::uint16_t number) { return number >= materials; });
   if (beyond != numbers.end())
-    throw UserError(scene.name + ": triangle " + std::to_string(beyond - numbers.begin()) + " is of material " + std::to_string(*beyond) + ", but there are " +
-                    std::to_string(materials));
+    throw UserError(scene.name + ": triangle " + std::to_string(beyond - numbers.begin()) + " is of material " +
+                    std::to_string(*beyond) + ", but there are " + std::to_string(materials));
 }
 
 }  // namespace
 
-RenderScene::RenderScene(const Scene& scene, EffectSet effects) : effects_(effects), camera_(view_of(scene)), shutter_(scene.shutter) {
+RenderScene::RenderScene(const Scene& scene, EffectSet effects)
+    : effects_(effects), camera_(view_of(scene)), shutter_(scene.shutter) {
   take_mesh(scene);
   settle_motion(scene);
   if (!effects.has(EffectKind::dof)) camera_.aperture_radius = 0.0f;
   if (effects.has(EffectKind::env_light) && is_bright(scene.environment))
-    environment_ = scene.environment_image.empty() ? Environment(max(scene.environment, Vec3f{})) : Environment(read_radiance(scene.environment_image));
+    environment_ = scene.environment_image.empty() ? Environment(max(scene.environment, Vec3f{}))
+                                                   : Environment(read_radiance(scene.environment_image));
   const Bounds3f bounds = mesh_.bounds();
   if (!bounds.empty()) radius_ = 0.5 * length(Vec3d(bounds.upper) - Vec3d(bounds.lower));
   for (const Material& m : scene.materials) surfaces_.push_back(make_surface(m, effects));
@@ -66,7 +69,8 @@ void RenderScene::take_mesh(const Scene& scene) {
 
 void RenderScene::settle_motion(const Scene& scene) {
   if (!mesh_.moves()) return;
-  const bool stays = std::ranges::all_of(mesh_.later_frames, [&](const auto& frame) { return frame == mesh_.vertices; });
+  const bool stays =
+      std::ranges::all_of(mesh_.later_frames, [&](const auto& frame) { return frame == mesh_.vertices; });
   if (stays)
     mesh_.later_frames.clear();
   else if (!effects_.has(EffectKind::motion_blur) || !(scene.shutter.open < scene.shutter.close))
@@ -87,7 +91,8 @@ int RenderScene::texture(const std::string& path) {
   return number;
 }
 
-/// A map multiplies. One of a single value, or without coordinates to look it up at, goes into the surface's own colour.
+/// A map multiplies. One of a single value, or without coordinates to look it up at, goes into the surface's own
+/// colour.
 void RenderScene::read_maps(const std::vector<Material>& materials) {
   bool unplaced = false;
   for (std::size_t i = 0; i < materials.size(); ++i) {
@@ -98,13 +103,15 @@ void RenderScene::read_maps(const std::vector<Material>& materials) {
     };
     if (const int number = materials[i].diffuse_map.empty() ? -1 : texture(materials[i].diffuse_map); number >= 0) {
       const Texture& map = textures_[std::size_t(number)];
-      if (!is_bright(s.diffuse)) s.diffuse = Vec3f{1, 1, 1} - s.specular;  // a map without a Kd, which many files leave out
+      // a map without a Kd, which many files leave out
+      if (!is_bright(s.diffuse)) s.diffuse = Vec3f{1, 1, 1} - s.specular;
       if (stands_for_itself(map) || !effects_.has(EffectKind::texture))
         s.diffuse = s.diffuse * map.mean_color();
       else
         s.diffuse_map = number;
     }
-    if (!effects_.has(EffectKind::alpha_cutout) || is_dielectric(materials[i]) || materials[i].opacity_map.empty()) continue;
+    if (!effects_.has(EffectKind::alpha_cutout) || is_dielectric(materials[i]) || materials[i].opacity_map.empty())
+      continue;
     if (const int number = texture(materials[i].opacity_map); number >= 0) {
       const Texture& map = textures_[std::size_t(number)];
       if (stands_for_itself(map))

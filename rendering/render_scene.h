@@ -1,5 +1,5 @@
-// RenderScene: a scene made ready for rendering with a set of effects: the mesh that is traced, surfaces, textures, lights.
-// Tables of effects that are not in the set are not made.
+// RenderScene: a scene made ready for rendering with a set of effects: the mesh that is traced, surfaces, textures,
+// lights. Tables of effects that are not in the set are not made.
 #pragma once
 
 #include <memory>
@@ -18,9 +18,9 @@ namespace arboretum {
 
 class RenderScene {
  public:
-  /// Surfaces that cannot be seen (is_invisible) are taken out of the mesh. Without `motion_blur`, and where all key frames are alike,
-  /// the mesh stands as when the shutter opens; without `instancing` it keeps no instances. Throws UserError where a triangle's
-  /// material is none of the scene's.
+  /// Surfaces that cannot be seen (is_invisible) are taken out of the mesh. Without `motion_blur`, and where all key
+  /// frames are alike, the mesh stands as when the shutter opens; without `instancing` it keeps no instances. Throws
+  /// UserError where a triangle's material is none of the scene's.
   RenderScene(const Scene& scene, EffectSet effects);
   RenderScene(const RenderScene&) = delete;  // the light table points at the mesh
   RenderScene& operator=(const RenderScene&) = delete;

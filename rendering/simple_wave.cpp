@@ -15,7 +15,8 @@ std::vector<Hit> camera_hits(const BatchTracer& tracer, const TracedRays& rays, 
 
 }  // namespace
 
-void trace_normals(const BatchTracer& tracer, const TracedRays& camera_rays, std::span<Vec3d> radiance, RenderStatistics& statistics) {
+void trace_normals(const BatchTracer& tracer, const TracedRays& camera_rays, std::span<Vec3d> radiance,
+                   RenderStatistics& statistics) {
   const std::vector<Hit> hits = camera_hits(tracer, camera_rays, statistics);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (!hits[i].is_hit()) continue;
@@ -24,7 +25,8 @@ void trace_normals(const BatchTracer& tracer, const TracedRays& camera_rays, std
   }
 }
 
-void trace_ambient_occlusion(const BatchTracer& tracer, const TracedRays& camera_rays, std::span<Vec3d> radiance, RenderStatistics& statistics) {
+void trace_ambient_occlusion(const BatchTracer& tracer, const TracedRays& camera_rays, std::span<Vec3d> radiance,
+                             RenderStatistics& statistics) {
   const std::vector<Hit> hits = camera_hits(tracer, camera_rays, statistics);
   TracedRays rays;
   std::vector<std::size_t> places;
@@ -32,7 +34,8 @@ void trace_ambient_occlusion(const BatchTracer& tracer, const TracedRays& camera
     if (!hits[i].is_hit()) continue;  // black, or what is open would not stand out from it
     const SurfacePoint point(tracer.scene().mesh(), camera_rays.rays[i], camera_rays.time(i), hits[i]);
     const Sampler& sampler = camera_rays.owners[i].sampler;
-    const Vec3d in = cosine_direction(sampler.hit(0, HitDimension::environment_u), UnitCircle(sampler.hit(0, HitDimension::environment_v)));
+    const Vec3d in = cosine_direction(sampler.hit(0, HitDimension::environment_u),
+                                      UnitCircle(sampler.hit(0, HitDimension::environment_v)));
     rays.rays.push_back({.origin = point.origin(point.normal(), SelfIntersection::error_bound),
                          .direction = leaving(Frame(point.normal()).to_world(in), point.normal()),
                          .tfar = float(kOcclusionReach * 2.0 * tracer.scene().radius())});

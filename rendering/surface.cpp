@@ -35,7 +35,8 @@ Surface make_surface(const Material& m, EffectSet effects) {
     s.ior = m.ior > 0.0f ? double(m.ior) : 1.0;
   }
   const double rough = double(m.roughness);
-  s.alpha = std::clamp(rough > 0.0 ? rough * rough : std::sqrt(2.0 / (std::max(0.0, double(m.shininess)) + 2.0)), kLeastAlpha, 1.0);
+  s.alpha = std::clamp(rough > 0.0 ? rough * rough : std::sqrt(2.0 / (std::max(0.0, double(m.shininess)) + 2.0)),
+                       kLeastAlpha, 1.0);
   s.emission = max(m.emission, Vec3f{0, 0, 0});
   if (effects.has(EffectKind::alpha_cutout) && !is_dielectric(m)) s.opacity = std::clamp(m.opacity, 0.0f, 1.0f);
   return s;

@@ -1,8 +1,9 @@
 // Surface: a material made ready for shading, with the lobes that the effects leave it.
 //
-// Diffuse: Lambert. Mirror: Ks, perfect. Glossy: GGX with Schlick's Fresnel, F0 = Ks, alpha = Pr^2, or sqrt(2 / (Ns + 2)) without a Pr.
-// Dielectric: smooth glass, Fresnel's equations, Ks and Tf as filters of what it reflects and lets through. Beside a specular lobe
-// Kd is lowered to 1 - Ks where it is more, so that no surface gives back more light than it gets.
+// Diffuse: Lambert. Mirror: Ks, perfect. Glossy: GGX with Schlick's Fresnel, F0 = Ks, alpha = Pr^2, or sqrt(2 / (Ns +
+// 2)) without a Pr. Dielectric: smooth glass, Fresnel's equations, Ks and Tf as filters of what it reflects and lets
+// through. Beside a specular lobe Kd is lowered to 1 - Ks where it is more, so that no surface gives back more light
+// than it gets.
 #pragma once
 
 #include "core/vec3.h"

@@ -12,9 +12,7 @@ namespace arboretum {
 namespace {
 
 /// A double rounded to a multiple of 2^-149; all beyond 2^-96 are one.
-double on_grid(double x) {
-  return std::fabs(x) < 0x1p-96 ? std::ldexp(std::nearbyint(std::ldexp(x, 149)), -149) : x;
-}
+double on_grid(double x) { return std::fabs(x) < 0x1p-96 ? std::ldexp(std::nearbyint(std::ldexp(x, 149)), -149) : x; }
 
 }  // namespace
 
@@ -53,8 +51,8 @@ Vec3f SurfacePoint::origin(Vec3d side, SelfIntersection method) const noexcept {
   return to_float(point_);
 }
 
-/// Off the surface along the normal by the error bound, rounded away from it, further until the float32 point is on that side of
-/// the triangle's plane.
+/// Off the surface along the normal by the error bound, rounded away from it, further until the float32 point is on
+/// that side of the triangle's plane.
 Vec3f SurfacePoint::beyond_error_bound(Vec3d side) const noexcept {
   double distance = std::abs(side.x) * error_.x + std::abs(side.y) * error_.y + std::abs(side.z) * error_.z;
   distance = std::max(distance, 0x1p-126);

@@ -33,7 +33,8 @@ class SurfacePoint {
   bool front_ = true;
 };
 
-/// A float32 point moved along a unit vector by 256 steps of its own number format, or by 2^-16 where it is within 2^-5 of 0.
+/// A float32 point moved along a unit vector by 256 steps of its own number format, or by 2^-16 where it is within 2^-5
+/// of 0.
 [[nodiscard]] Vec3f integer_offset(Vec3f point, Vec3f along) noexcept;
 
 }  // namespace arboretum

@@ -33,7 +33,7 @@ Texture::Texture(const Image& image) : width_(image.width), height_(image.height
 }
 
 Texture::Texel Texture::at(std::array<float, 2> coordinates) const noexcept {
-  const auto place = [](float coordinate, unsigned size, unsigned (&pixels)[2]) {
+  const auto place = [](float coordinate, unsigned size, unsigned(&pixels)[2]) {
     const double within = double(coordinate) - std::floor(double(coordinate));
     const double position = (std::isfinite(within) ? within : 0.0) * size - 0.5, first = std::floor(position);
     pixels[0] = unsigned((std::int64_t(first) + size) % size), pixels[1] = (pixels[0] + 1) % size;

@@ -1,5 +1,5 @@
-// Texture: an image looked up at texture coordinates, repeated over the plane, bilinear between pixels' centres. Colours are
-// taken as sRGB and come out linear; opacity is taken as it is stored.
+// Texture: an image looked up at texture coordinates, repeated over the plane, bilinear between pixels' centres.
+// Colours are taken as sRGB and come out linear; opacity is taken as it is stored.
 #pragma once
 
 #include <array>

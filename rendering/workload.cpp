@@ -20,11 +20,14 @@ constexpr std::array<std::string_view, 6> kNames{"primary",    "shadow",  "ambie
                                                  "reflection", "diffuse", "random"};
 
 /// Random dimensions: each workload draws its own, so that two of them never share a number.
-enum Dimension : std::uint64_t { kTimeDimension = 8, kOcclusionDimension = 16, kDiffuseDimension = 32, kRandomDimension = 48 };
+enum Dimension : std::uint64_t {
+  kTimeDimension = 8,
+  kOcclusionDimension = 16,
+  kDiffuseDimension = 32,
+  kRandomDimension = 48
+};
 
-void check_known(std::string_view name) {
-  (void)index_of_name("workload", name, kNames);
-}
+void check_known(std::string_view name) { (void)index_of_name("workload", name, kNames); }
 
 Vec3d point_on_sphere(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension) {
   const double z = 2.0 * random_double(seed, index, dimension) - 1.0;
@@ -41,7 +44,8 @@ struct SecondaryRay {
 SecondaryRay shadow_ray(const SurfacePoint& surface, Vec3d light, SelfIntersection method) {
   const Vec3d to_light = light - surface.point();
   if (!(length(to_light) > 0.0)) {
-    const Ray none{.origin = surface.origin(surface.normal(), method), .direction = to_float(surface.normal()), .tfar = 0.0f};
+    const Ray none{
+        .origin = surface.origin(surface.normal(), method), .direction = to_float(surface.normal()), .tfar = 0.0f};
     return {none, none};
   }
   // A light behind the surface is seen from behind: the ray starts on the light's side, or it would meet its
@@ -83,9 +87,7 @@ std::vector<Ray> random_rays(const Bounds3f& bounds, const View& view) {
 
 }  // namespace
 
-std::span<const std::string_view> workload_names() {
-  return kNames;
-}
+std::span<const std::string_view> workload_names() { return kNames; }
 
 bool is_secondary(std::string_view workload) {
   check_known(workload);
@@ -135,8 +137,8 @@ Workload make_primary(const Scene& scene, const View& view) {
   return workload;
 }
 
-Workload make_workload(std::string_view name, const Scene& scene, const View& view,
-                       RayBatch primary_rays, std::span<const Hit> primary_hits) {
+Workload make_workload(std::string_view name, const Scene& scene, const View& view, RayBatch primary_rays,
+                       std::span<const Hit> primary_hits) {
   check_known(name);
   check_resolution(view.width, view.height);
   if (name == "primary") return make_primary(scene, view);

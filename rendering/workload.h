@@ -28,10 +28,10 @@ struct Workload {
   std::vector<float> times{};
   std::vector<std::array<float, 2>> pixels{};  ///< of `camera_edges`: where in the picture each ray is aimed at
   // Of secondary rays, one a ray; else empty.
-  std::vector<std::uint32_t> sources{};             ///< the primitive that the ray starts on
-  std::vector<std::array<double, 3>> starts{};      ///< the hit point itself, in doubles on the grid of float32
-  std::vector<Ray> references{};                    ///< the ray as it leaves the hit point itself, its origin rounded
-  bool excludes_sources = false;                    ///< rays pass through their source: SelfIntersection::exclusion
+  std::vector<std::uint32_t> sources{};         ///< the primitive that the ray starts on
+  std::vector<std::array<double, 3>> starts{};  ///< the hit point itself, in doubles on the grid of float32
+  std::vector<Ray> references{};                ///< the ray as it leaves the hit point itself, its origin rounded
+  bool excludes_sources = false;                ///< rays pass through their source: SelfIntersection::exclusion
   /// `primary` and `shadow` rays are marked coherent.
   [[nodiscard]] RayBatch batch() const noexcept;
 };
@@ -52,13 +52,13 @@ struct View {
 
 /// One primary ray a pixel, Morton order. A scene without a camera is framed whole from a fixed three-quarter view.
 [[nodiscard]] Workload make_primary(const Scene& scene, const View& view);
-/// Where `shadow` rays go to: the scene's first point light, else a point above the camera by a quarter of the median distance to
-/// what it sees.
+/// Where `shadow` rays go to: the scene's first point light, else a point above the camera by a quarter of the median
+/// distance to what it sees.
 [[nodiscard]] Vec3d light_position(const Scene& scene, RayBatch primary_rays, std::span<const Hit> primary_hits);
-/// Any workload. `primary_hits` are the reference hits (the oracle's) of make_primary's rays; secondary workloads have one
-/// ray for each of them that hit, starting as view.start says (by default offset so that it does not meet its own surface):
-/// for every way as many, in the same order, in the same directions. `primary` and `random` ignore them.
-[[nodiscard]] Workload make_workload(std::string_view name, const Scene& scene, const View& view,
-                                     RayBatch primary_rays, std::span<const Hit> primary_hits);
+/// Any workload. `primary_hits` are the reference hits (the oracle's) of make_primary's rays; secondary workloads have
+/// one ray for each of them that hit, starting as view.start says (by default offset so that it does not meet its own
+/// surface): for every way as many, in the same order, in the same directions. `primary` and `random` ignore them.
+[[nodiscard]] Workload make_workload(std::string_view name, const Scene& scene, const View& view, RayBatch primary_rays,
+                                     std::span<const Hit> primary_hits);
 
 }  // namespace arboretum

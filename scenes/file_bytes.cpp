@@ -56,8 +56,6 @@ FileBytes::~FileBytes() {
   if (data_) ::munmap(data_, size_);
 }
 
-void check_readable_file(const std::filesystem::path& path) {
-  ::close(open_file(path).first);
-}
+void check_readable_file(const std::filesystem::path& path) { ::close(open_file(path).first); }
 
 }  // namespace arboretum

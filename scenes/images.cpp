@@ -17,8 +17,8 @@ namespace arboretum {
 RadianceImage read_radiance(const std::filesystem::path& image) {
   check_readable_file(image);
   int width = 0, height = 0, channels = 0;
-  const std::unique_ptr<float, void (*)(void*)> pixels(
-      stbi_loadf(image.c_str(), &width, &height, &channels, 3), stbi_image_free);
+  const std::unique_ptr<float, void (*)(void*)> pixels(stbi_loadf(image.c_str(), &width, &height, &channels, 3),
+                                                       stbi_image_free);
   if (!pixels) throw UserError(image.string() + ": no image that can be read: " + stbi_failure_reason());
   RadianceImage read{unsigned(width), unsigned(height), {}};
   read.pixels.resize(std::size_t(width) * std::size_t(height));
@@ -35,7 +35,8 @@ Vec3f mean_radiance(const RadianceImage& image) {
   double weights = 0.0;
   for (unsigned y = 0; y < image.height; ++y) {
     const double weight = UnitCircle(0.5 * (y + 0.5) / image.height).sine;  // solid angle of the row's pixels
-    for (unsigned x = 0; x < image.width; ++x) sum = sum + Vec3d(image.pixels[std::size_t(y) * image.width + x]) * weight;
+    for (unsigned x = 0; x < image.width; ++x)
+      sum = sum + Vec3d(image.pixels[std::size_t(y) * image.width + x]) * weight;
     weights += weight * image.width;
   }
   return to_float(sum * (1.0 / weights));
@@ -43,8 +44,8 @@ Vec3f mean_radiance(const RadianceImage& image) {
 
 std::optional<Image> read_image(const std::filesystem::path& image) {
   int width = 0, height = 0, channels = 0;
-  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
-      stbi_load(image.c_str(), &width, &height, &channels, 0), stbi_image_free);
+  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(stbi_load(image.c_str(), &width, &height, &channels, 0),
+                                                         stbi_image_free);
   if (!pixels) return std::nullopt;
   Image read{unsigned(width), unsigned(height), unsigned(channels), {}};
   read.pixels.assign(pixels.get(), pixels.get() + std::size_t(width) * std::size_t(height) * std::size_t(channels));

@@ -61,8 +61,7 @@ SceneInfo inspect_scene(const Scene& scene) {
   std::vector<std::uint64_t> edges;
   edges.reserve(3 * triples.size());
   for (const auto& [a, b, c] : triples)
-    for (const auto& [from, to] : {std::pair{a, b}, {b, c}, {a, c}})
-      edges.push_back(std::uint64_t(from) << 32 | to);
+    for (const auto& [from, to] : {std::pair{a, b}, {b, c}, {a, c}}) edges.push_back(std::uint64_t(from) << 32 | to);
   tbb::parallel_sort(edges.begin(), edges.end());
   for (std::size_t i = 0; i < edges.size();) {
     std::size_t next = i + 1;

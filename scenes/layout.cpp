@@ -93,7 +93,9 @@ TriangleMesh Layout::take(bool keep_instances) {
     moves = true;
     intervals = std::lcm(intervals, parts_[p.part].frames() - 1);
     if (intervals >= kMostFrames)
-      throw UserError("the meshes' key frames fall on more than 4096 different times; give them counts that go together, as 3, 5 and 9");
+      throw UserError(
+          "the meshes' key frames fall on more than 4096 different times; give them counts that go together, as 3, 5 "
+          "and 9");
   }
   if (moves) {
     for (TriangleMesh& part : parts_) part = with_frames(part, intervals + 1);
@@ -121,7 +123,8 @@ std::shared_ptr<const Instancing> kept_instances(const TriangleMesh& mesh, const
   const Instancing& before = *mesh.instancing;
   auto after = std::make_shared<Instancing>();
   constexpr std::uint32_t kNone = ~0u;
-  std::map<std::pair<std::uint32_t, std::vector<bool>>, std::uint32_t> known;  // what of a prototype is kept: its new number
+  // What of a prototype is kept: its new number
+  std::map<std::pair<std::uint32_t, std::vector<bool>>, std::uint32_t> known;
   std::uint32_t next = 0;
   for (const Instance& instance : before.instances) {
     const TriangleMesh& prototype = before.prototypes[instance.prototype];

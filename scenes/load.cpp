@@ -40,9 +40,9 @@ std::uint64_t parse_whole_number(std::string_view text, std::string_view what, c
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size())
-    throw UserError(fmt::format(
-        "scene '{}': {} '{}' is no whole number; write GENERATOR:TRIANGLES or GENERATOR:TRIANGLES:SEED", word,
-        what, text));
+    throw UserError(
+        fmt::format("scene '{}': {} '{}' is no whole number; write GENERATOR:TRIANGLES or GENERATOR:TRIANGLES:SEED",
+                    word, what, text));
   return value;
 }
 
@@ -61,17 +61,15 @@ std::string SceneSpec::name() const {
   if (!file.empty()) return file.stem().string();
   if (!scene.empty()) {
     std::error_code error;
-    return is_yaml(scene) && std::filesystem::is_regular_file(scene, error) ? scene_file_name(scene) : scene.stem().string();
+    return is_yaml(scene) && std::filesystem::is_regular_file(scene, error) ? scene_file_name(scene)
+                                                                            : scene.stem().string();
   }
-  return fmt::format("{}-{}{}", generator, triangles,
-                     seed == 1 ? std::string() : fmt::format("-seed{}", seed));
+  return fmt::format("{}-{}{}", generator, triangles, seed == 1 ? std::string() : fmt::format("-seed{}", seed));
 }
 
 Scene load_scene(const SceneSpec& spec) {
-  const int forms =
-      !spec.catalogue.empty() + !spec.file.empty() + !spec.scene.empty() + !spec.generator.empty();
-  if (forms != 1)
-    throw UserError("a scene is named by exactly one of: a catalogue name, file, scene, generate");
+  const int forms = !spec.catalogue.empty() + !spec.file.empty() + !spec.scene.empty() + !spec.generator.empty();
+  if (forms != 1) throw UserError("a scene is named by exactly one of: a catalogue name, file, scene, generate");
   if (!spec.generator.empty()) {
     Scene scene = generate_scene(spec.generator, spec.triangles, spec.seed);
     scene.name = spec.name();
@@ -88,8 +86,7 @@ Scene load_scene(const SceneSpec& spec) {
   if (!spec.file.empty() && is_yaml(path))
     throw UserError(path.string() + ": is a scene file; name it with 'scene:' instead of 'file:'");
   if (!spec.scene.empty() && !is_yaml(path))
-    throw UserError(path.string() +
-                    ": is no scene file (.yaml); name a model with 'file:' instead of 'scene:'");
+    throw UserError(path.string() + ": is no scene file (.yaml); name a model with 'file:' instead of 'scene:'");
   Scene scene = spec.file.empty() ? read_scene_yaml(path) : read_model(path);
   rescale(scene, path.string());
   sanitise(scene, path.string());
@@ -112,8 +109,8 @@ SceneSpec parse_scene_word(const std::string& word) {
   const std::string head = word.substr(0, colon);
   const std::vector<std::string> names = generator_names();
   const bool generated = std::find(names.begin(), names.end(), head) != names.end();
-  if (!generated && (word.find('/') != std::string::npos || std::filesystem::exists(path, error) ||
-                     !path.extension().empty())) {
+  if (!generated &&
+      (word.find('/') != std::string::npos || std::filesystem::exists(path, error) || !path.extension().empty())) {
     (is_yaml(path) ? spec.scene : spec.file) = path;
     return spec;
   }

@@ -1,5 +1,5 @@
-// What a material's surface does with light, read from its MTL entry: one definition for the effects that a scene calls for
-// and for the renderer that simulates them.
+// What a material's surface does with light, read from its MTL entry: one definition for the effects that a scene calls
+// for and for the renderer that simulates them.
 #pragma once
 
 #include "scenes/scene.h"
@@ -22,8 +22,8 @@ namespace arboretum {
          !is_bright(m.emission);
 }
 [[nodiscard]] inline bool is_mirror(const Material& m) noexcept {
-  return !is_dielectric(m) && !is_invisible(m) && (m.illum == 3 || m.illum == 5 || m.illum == 8) && is_bright(m.specular) &&
-         m.roughness == 0.0f;
+  return !is_dielectric(m) && !is_invisible(m) && (m.illum == 3 || m.illum == 5 || m.illum == 8) &&
+         is_bright(m.specular) && m.roughness == 0.0f;
 }
 [[nodiscard]] inline bool is_glossy(const Material& m) noexcept {
   return !is_dielectric(m) && !is_invisible(m) && !is_mirror(m) && is_bright(m.specular) && m.illum >= 2;

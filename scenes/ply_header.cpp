@@ -22,17 +22,14 @@ std::vector<std::string_view> words(std::string_view line) {
 
 Type parse_type(std::string_view word, std::size_t line, const Failure& fail) {
   constexpr std::pair<std::string_view, Type> kTypes[] = {
-      {"char", Type::int8},      {"int8", Type::int8},       {"uchar", Type::uint8},
-      {"uint8", Type::uint8},    {"short", Type::int16},     {"int16", Type::int16},
-      {"ushort", Type::uint16},  {"uint16", Type::uint16},   {"int", Type::int32},
-      {"int32", Type::int32},    {"uint", Type::uint32},     {"uint32", Type::uint32},
-      {"float", Type::float32},  {"float32", Type::float32}, {"double", Type::float64},
-      {"float64", Type::float64}};
+      {"char", Type::int8},     {"int8", Type::int8},       {"uchar", Type::uint8},    {"uint8", Type::uint8},
+      {"short", Type::int16},   {"int16", Type::int16},     {"ushort", Type::uint16},  {"uint16", Type::uint16},
+      {"int", Type::int32},     {"int32", Type::int32},     {"uint", Type::uint32},    {"uint32", Type::uint32},
+      {"float", Type::float32}, {"float32", Type::float32}, {"double", Type::float64}, {"float64", Type::float64}};
   for (const auto& [name, type] : kTypes)
     if (name == word) return type;
-  fail.line(line,
-            fmt::format("unknown property type '{}'; PLY has char uchar short ushort int uint float double",
-                        one_line(word)));
+  fail.line(line, fmt::format("unknown property type '{}'; PLY has char uchar short ushort int uint float double",
+                              one_line(word)));
 }
 
 }  // namespace
@@ -44,8 +41,7 @@ Header parse_header(std::string_view text, const Failure& fail) {
   for (std::size_t number = 1;; ++number) {
     const std::size_t end = text.find('\n', position);
     if (number == 1 && text.substr(0, 3) != "ply") fail("not a PLY file: it does not begin with 'ply'");
-    if (end == std::string_view::npos)
-      fail("the PLY header has no 'end_header' line; the file is truncated or broken");
+    if (end == std::string_view::npos) fail("the PLY header has no 'end_header' line; the file is truncated or broken");
     const auto word = words(text.substr(position, end - position));
     position = end + 1;
     if (word.empty() || word[0] == "ply" || word[0] == "comment" || word[0] == "obj_info") continue;
@@ -59,9 +55,8 @@ Header parse_header(std::string_view text, const Failure& fail) {
       else if (word[1] == "binary_big_endian")
         header.format = Format::big_endian;
       else
-        fail.line(number,
-                  fmt::format("unknown format '{}'; PLY has ascii, binary_little_endian, binary_big_endian",
-                              one_line(word[1])));
+        fail.line(number, fmt::format("unknown format '{}'; PLY has ascii, binary_little_endian, binary_big_endian",
+                                      one_line(word[1])));
     } else if (word[0] == "element" && word.size() == 3) {
       Element element{.name = std::string(word[1]), .count = 0, .properties = {}};
       const auto [p, error] = std::from_chars(word[2].data(), word[2].data() + word[2].size(), element.count);
@@ -74,8 +69,7 @@ Header parse_header(std::string_view text, const Failure& fail) {
         if (word.size() != 5) fail.line(number, "a list property is 'property list COUNT_TYPE TYPE NAME'");
         property.is_list = true;
         property.count_type = parse_type(word[2], number, fail);
-        if (property.count_type >= Type::float32)
-          fail.line(number, "a list's count cannot be a floating-point number");
+        if (property.count_type >= Type::float32) fail.line(number, "a list's count cannot be a floating-point number");
         property.type = parse_type(word[3], number, fail);
       } else {
         property.type = parse_type(word[1], number, fail);

@@ -12,9 +12,7 @@ struct Point2 {
   double x, y;
 };
 
-double turn(Point2 a, Point2 b, Point2 c) noexcept {
-  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-}
+double turn(Point2 a, Point2 b, Point2 c) noexcept { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
 
 /// Projects along the largest component of Newell's normal, mirrored where needed so that the polygon turns
 /// left.
@@ -77,8 +75,7 @@ void triangulate(std::span<const std::uint32_t> corners, std::span<const Vec3f> 
     return true;
   };
   if (corners.size() > kMaxClipped || is_strictly_convex(points)) {
-    for (std::size_t i = 1; i + 1 < corners.size(); ++i)
-      triangles.push_back({corners[0], corners[i], corners[i + 1]});
+    for (std::size_t i = 1; i + 1 < corners.size(); ++i) triangles.push_back({corners[0], corners[i], corners[i + 1]});
     return;
   }
   std::size_t next = 1;

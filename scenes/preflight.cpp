@@ -31,8 +31,8 @@ void check_off(std::string_view text, const std::string& name) {
   // A vertex takes six characters at least ("0 0 0\n"), a face four.
   if (found < 2 || counts[0] > text.size() / 6 + 1 || counts[1] > text.size() / 4 + 1) {
     throw UserError(fmt::format(
-        "{}: broken or truncated: the header promises {} vertices and {} faces, more than the file can hold",
-        name, counts[0], counts[1]));
+        "{}: broken or truncated: the header promises {} vertices and {} faces, more than the file can hold", name,
+        counts[0], counts[1]));
   }
 }
 

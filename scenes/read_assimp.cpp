@@ -36,8 +36,7 @@ class LogCapture {
  public:
   explicit LogCapture(std::vector<std::string>& lines) : lock_(mutex()) {
     Assimp::DefaultLogger::create("", Assimp::Logger::NORMAL, 0);
-    Assimp::DefaultLogger::get()->attachStream(new Listener(lines),
-                                               Assimp::Logger::Warn | Assimp::Logger::Err);
+    Assimp::DefaultLogger::get()->attachStream(new Listener(lines), Assimp::Logger::Warn | Assimp::Logger::Err);
   }
   LogCapture(const LogCapture&) = delete;
   LogCapture& operator=(const LogCapture&) = delete;
@@ -51,9 +50,7 @@ class LogCapture {
   std::scoped_lock<std::mutex> lock_;
 };
 
-Vec3f color(const aiColor4D& c) {
-  return {c.r, c.g, c.b};
-}
+Vec3f color(const aiColor4D& c) { return {c.r, c.g, c.b}; }
 
 /// `folder`: of the file, which the paths of images are relative to.
 Material convert(const aiMaterial& in, const std::filesystem::path& folder) {
@@ -93,7 +90,8 @@ class AssimpReader {
   AssimpReader(const std::filesystem::path& path, const aiScene& in) : name_(path.string()), in_(in) {}
 
   Scene read() {
-    for (unsigned i = 0; i < in_.mNumMaterials; ++i) scene_.materials.push_back(convert(*in_.mMaterials[i], std::filesystem::path(name_).parent_path()));
+    for (unsigned i = 0; i < in_.mNumMaterials; ++i)
+      scene_.materials.push_back(convert(*in_.mMaterials[i], std::filesystem::path(name_).parent_path()));
     if (scene_.materials.size() > 65534) throw UserError(name_ + ": more than 65534 materials");
     add_node(*in_.mRootNode, aiMatrix4x4t<double>());
     if (short_faces_ > 0)
@@ -106,9 +104,8 @@ class AssimpReader {
  private:
   void add_node(const aiNode& node, const aiMatrix4x4t<double>& parent) {
     const aiMatrix4x4& m = node.mTransformation;
-    const aiMatrix4x4t<double> to_world =
-        parent * aiMatrix4x4t<double>(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4,
-                                      m.d1, m.d2, m.d3, m.d4);
+    const aiMatrix4x4t<double> to_world = parent * aiMatrix4x4t<double>(m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4,
+                                                                        m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3, m.d4);
     for (unsigned i = 0; i < node.mNumMeshes; ++i) add_mesh(*in_.mMeshes[node.mMeshes[i]], to_world);
     for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(*node.mChildren[i], to_world);
   }
@@ -129,8 +126,8 @@ class AssimpReader {
       corners_.clear();
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
         if (face.mIndices[k] >= mesh.mNumVertices) {
-          throw UserError(fmt::format("{}: face {} names vertex {}, but its mesh has {}", name_, f,
-                                      face.mIndices[k], mesh.mNumVertices));
+          throw UserError(fmt::format("{}: face {} names vertex {}, but its mesh has {}", name_, f, face.mIndices[k],
+                                      mesh.mNumVertices));
         }
         corners_.push_back(std::uint32_t(first + face.mIndices[k]));
       }
@@ -175,9 +172,9 @@ Scene read_assimp(const std::filesystem::path& path) {
   Assimp::Importer importer;
   if (const std::string extension = path.extension().string();
       extension.empty() || !importer.IsExtensionSupported(extension)) {
-    throw UserError(fmt::format(
-        "{}: unknown kind of file '{}'; OBJ, PLY, STL, glTF, GLB, OFF and others of assimp are read",
-        path.string(), extension));
+    throw UserError(
+        fmt::format("{}: unknown kind of file '{}'; OBJ, PLY, STL, glTF, GLB, OFF and others of assimp are read",
+                    path.string(), extension));
   }
   const aiScene* in = nullptr;
   try {

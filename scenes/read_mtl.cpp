@@ -11,9 +11,7 @@
 namespace arboretum {
 namespace {
 
-Vec3f color(const tinyobj::real_t (&c)[3]) {
-  return {float(c[0]), float(c[1]), float(c[2])};
-}
+Vec3f color(const tinyobj::real_t (&c)[3]) { return {float(c[0]), float(c[1]), float(c[2])}; }
 
 }  // namespace
 

@@ -93,9 +93,8 @@ struct ObjReader {
       const std::int64_t index = indices[i].vertex_index;
       const std::int64_t vertex = index > 0 ? index - 1 : vertices + index;
       if (index == 0 || vertex < 0 || vertex >= vertices) {
-        fail(fmt::format(
-            "face index {} is out of range: {} vertices precede it, so valid are 1 to {} and -1 to -{}",
-            index, vertices, vertices, vertices));
+        fail(fmt::format("face index {} is out of range: {} vertices precede it, so valid are 1 to {} and -1 to -{}",
+                         index, vertices, vertices, vertices));
       }
       corners.push_back(std::uint32_t(vertex));
     }
@@ -150,9 +149,8 @@ struct ObjReader {
       return;
     }
     if (material_library_seen) {
-      scene.report.warnings.push_back(
-          fmt::format("{}:{}: no material '{}' in the material library; grey stands in", path.string(),
-                      buffer.line_number(), one_line(name)));
+      scene.report.warnings.push_back(fmt::format("{}:{}: no material '{}' in the material library; grey stands in",
+                                                  path.string(), buffer.line_number(), one_line(name)));
     }
     use_default_material();
   }
@@ -161,9 +159,8 @@ struct ObjReader {
     material_library_seen = true;
     const std::filesystem::path file = path.parent_path() / name;
     if (std::error_code error; !std::filesystem::exists(file, error)) {
-      scene.report.warnings.push_back(
-          fmt::format("{}:{}: no material library '{}'; grey stands in for its materials", path.string(),
-                      buffer.line_number(), one_line(file.string())));
+      scene.report.warnings.push_back(fmt::format("{}:{}: no material library '{}'; grey stands in for its materials",
+                                                  path.string(), buffer.line_number(), one_line(file.string())));
       material_library_seen = false;
       return;
     }
@@ -193,8 +190,8 @@ std::string argument(std::string_view line, std::size_t keyword) {
 class LibraryReader : public tinyobj::MaterialReader {
  public:
   explicit LibraryReader(ObjReader& reader) : reader_(reader) {}
-  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*, std::map<std::string, int>*,
-                  std::string*, std::string*) override {
+  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*, std::map<std::string, int>*, std::string*,
+                  std::string*) override {
     reader_.add_library(name);
     return true;
   }
@@ -233,8 +230,8 @@ Scene read_obj(const std::filesystem::path& path) {
         fmt::format("{}: {} faces of fewer than three corners left out", path.string(), reader.short_faces));
   }
   if (scene.mesh.triangles.empty()) {
-    throw UserError(fmt::format("{}: no face in it ({} vertices); is it an OBJ file?", path.string(),
-                                scene.mesh.vertices.size()));
+    throw UserError(
+        fmt::format("{}: no face in it ({} vertices); is it an OBJ file?", path.string(), scene.mesh.vertices.size()));
   }
   return std::move(reader.scene);
 }

@@ -33,9 +33,7 @@ class Cursor {
 
   [[nodiscard]] std::size_t left() const noexcept { return std::size_t(end_ - p_); }
   [[nodiscard]] bool is_ascii() const noexcept { return format_ == Format::ascii; }
-  void set_place(const Element& element, std::uint64_t index) noexcept {
-    element_ = &element, index_ = index;
-  }
+  void set_place(const Element& element, std::uint64_t index) noexcept { element_ = &element, index_ = index; }
 
   [[noreturn]] void fail(std::string_view what) const {
     fail_(fmt::format("{} {} of {}: {}", element_->name, index_, element_->count, what));
@@ -48,12 +46,9 @@ class Cursor {
       return value;
     }
     switch (type) {
-      case Type::float32:
-        return take<float>();
-      case Type::float64:
-        return float(take<double>());
-      default:
-        return float(read_integer(type));
+      case Type::float32: return take<float>();
+      case Type::float64: return float(take<double>());
+      default: return float(read_integer(type));
     }
   }
 
@@ -66,20 +61,13 @@ class Cursor {
       return value;
     }
     switch (type) {
-      case Type::int8:
-        return take<std::int8_t>();
-      case Type::uint8:
-        return take<std::uint8_t>();
-      case Type::int16:
-        return take<std::int16_t>();
-      case Type::uint16:
-        return take<std::uint16_t>();
-      case Type::int32:
-        return take<std::int32_t>();
-      case Type::uint32:
-        return take<std::uint32_t>();
-      default:
-        fail("an index or a count is stored as a floating-point number");
+      case Type::int8: return take<std::int8_t>();
+      case Type::uint8: return take<std::uint8_t>();
+      case Type::int16: return take<std::int16_t>();
+      case Type::uint16: return take<std::uint16_t>();
+      case Type::int32: return take<std::int32_t>();
+      case Type::uint32: return take<std::uint32_t>();
+      default: fail("an index or a count is stored as a floating-point number");
     }
   }
 
@@ -141,13 +129,15 @@ class Cursor {
 };
 
 /// `texture`: becomes one pair a vertex where the file has any.
-void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh, std::vector<std::array<float, 2>>& texture, const Failure& fail) {
+void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh,
+                   std::vector<std::array<float, 2>>& texture, const Failure& fail) {
   const int axes[] = {element.find({"x"}), element.find({"y"}), element.find({"z"})};
   for (const int axis : axes)
-    if (axis < 0 || element.properties[std::size_t(axis)].is_list)
-      fail("the vertices have no properties x, y and z");
-  const int u = element.find({"u", "s", "texture_u", "texture_s"}), v_axis = element.find({"v", "t", "texture_v", "texture_t"});
-  const bool textured = u >= 0 && v_axis >= 0 && !element.properties[std::size_t(u)].is_list && !element.properties[std::size_t(v_axis)].is_list;
+    if (axis < 0 || element.properties[std::size_t(axis)].is_list) fail("the vertices have no properties x, y and z");
+  const int u = element.find({"u", "s", "texture_u", "texture_s"}),
+            v_axis = element.find({"v", "t", "texture_v", "texture_t"});
+  const bool textured = u >= 0 && v_axis >= 0 && !element.properties[std::size_t(u)].is_list &&
+                        !element.properties[std::size_t(v_axis)].is_list;
   mesh.vertices.reserve(element.count);
   for (std::uint64_t i = 0; i < element.count; ++i) {
     cursor.set_place(element, i);
@@ -176,8 +166,7 @@ void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh, s
 void read_faces(const Element& element, Cursor& cursor, Scene& scene, const Failure& fail) {
   const std::size_t vertices = scene.mesh.vertices.size();
   const int list = element.find({"vertex_indices", "vertex_index"});
-  if (list < 0 || !element.properties[std::size_t(list)].is_list)
-    fail("the faces have no list 'vertex_indices'");
+  if (list < 0 || !element.properties[std::size_t(list)].is_list) fail("the faces have no list 'vertex_indices'");
   const int material = element.find({"material_id"});
   TriangleMesh& mesh = scene.mesh;
   mesh.triangles.reserve(element.count);
@@ -194,8 +183,7 @@ void read_faces(const Element& element, Cursor& cursor, Scene& scene, const Fail
         for (std::uint64_t n = cursor.read_count(property); n > 0; --n) {
           const std::int64_t vertex = cursor.read_integer(property.type);
           if (vertex < 0 || std::uint64_t(vertex) >= vertices)
-            cursor.fail(
-                fmt::format("vertex index {} is out of range: there are {} vertices", vertex, vertices));
+            cursor.fail(fmt::format("vertex index {} is out of range: there are {} vertices", vertex, vertices));
           corners.push_back(std::uint32_t(vertex));
         }
       } else if (k == material) {
@@ -214,14 +202,12 @@ void read_faces(const Element& element, Cursor& cursor, Scene& scene, const Fail
     if (material >= 0) mesh.materials.resize(mesh.triangles.size(), std::uint16_t(id));
   }
   if (short_faces > 0)
-    scene.report.warnings.push_back(
-        fmt::format("{} faces of fewer than three corners left out", short_faces));
+    scene.report.warnings.push_back(fmt::format("{} faces of fewer than three corners left out", short_faces));
 }
 
 void read_materials(const std::filesystem::path& path, Scene& scene, const Failure& fail) {
   if (scene.mesh.materials.empty()) return;
-  const std::size_t used =
-      std::size_t(*std::max_element(scene.mesh.materials.begin(), scene.mesh.materials.end())) + 1;
+  const std::size_t used = std::size_t(*std::max_element(scene.mesh.materials.begin(), scene.mesh.materials.end())) + 1;
   std::filesystem::path library = path;
   library.replace_extension(".mtl");
   if (std::error_code error; std::filesystem::exists(library, error)) {
@@ -231,8 +217,7 @@ void read_materials(const std::filesystem::path& path, Scene& scene, const Failu
                        scene.materials.size()));
     return;
   }
-  for (std::size_t i = 0; i < used; ++i)
-    scene.materials.push_back(Material{.name = fmt::format("material{}", i)});
+  for (std::size_t i = 0; i < used; ++i) scene.materials.push_back(Material{.name = fmt::format("material{}", i)});
 }
 
 }  // namespace
@@ -250,8 +235,8 @@ Scene read_ply(const std::filesystem::path& path) {
     // asked for.
     cursor.set_place(element, 0);
     if (!element.properties.empty() && element.count > cursor.left() / element.properties.size()) {
-      fail(fmt::format("truncated: the header promises {} of element '{}', more than the file can hold",
-                       element.count, one_line(element.name)));
+      fail(fmt::format("truncated: the header promises {} of element '{}', more than the file can hold", element.count,
+                       one_line(element.name)));
     }
     if (element.name == "vertex" && !has_vertices) {
       if (element.count >= 0xffffffffu) fail("more than 2^32 - 2 vertices");
@@ -274,7 +259,8 @@ Scene read_ply(const std::filesystem::path& path) {
     fail(has_faces ? "no face in it" : "no element 'face' in it; a point cloud cannot be traced");
   if (scene.mesh.triangles.size() >= 0xffffffffu) fail("more than 2^32 - 2 triangles");
   if (!texture.empty())
-    for (const Triangle& t : scene.mesh.triangles) scene.texture_coordinates.push_back({texture[t.a], texture[t.b], texture[t.c]});
+    for (const Triangle& t : scene.mesh.triangles)
+      scene.texture_coordinates.push_back({texture[t.a], texture[t.b], texture[t.c]});
   read_materials(path, scene, fail);
   return scene;
 }

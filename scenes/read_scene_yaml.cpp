@@ -30,11 +30,14 @@ std::string name_of(const YamlFile& file) {
   const YAML::Node node = file.root()["name"];
   if (!node) return file.path().stem().string();
   for (const auto& entry : file.root())  // what is not there has the next line for its place
-    if (entry.first.IsScalar() && entry.first.Scalar() == "name" && entry.second.IsNull()) file.fail(entry.first, "name has no value; give one or take the line out");
+    if (entry.first.IsScalar() && entry.first.Scalar() == "name" && entry.second.IsNull())
+      file.fail(entry.first, "name has no value; give one or take the line out");
   const std::string name = file.text(node, "name");
   const auto is_bad = [](unsigned char c) { return c == '/' || c < ' ' || c == 127; };
   if (std::ranges::any_of(name, is_bad) || name.find_first_not_of(' ') == std::string::npos)
-    file.fail(node, fmt::format("name '{}' cannot be a part of a cell's name: leave out '/' and control characters, and have more than blanks", one_line(name)));
+    file.fail(node, fmt::format("name '{}' cannot be a part of a cell's name: leave out '/' and control characters, "
+                                "and have more than blanks",
+                                one_line(name)));
   return name;
 }
 
@@ -81,8 +84,7 @@ class SceneFile {
 
   void read_shutter(const YAML::Node& node) {
     if (!node.IsSequence() || node.size() != 2) file_.fail(node, "shutter must be [open, close]");
-    scene_.shutter = {float(file_.number(node[0], "shutter open")),
-                      float(file_.number(node[1], "shutter close"))};
+    scene_.shutter = {float(file_.number(node[0], "shutter open")), float(file_.number(node[1], "shutter close"))};
     if (scene_.shutter.close < scene_.shutter.open) file_.fail(node, "the shutter closes before it opens");
   }
 
@@ -112,7 +114,8 @@ class SceneFile {
         if (bool(entry["file"]) == bool(entry["keyframes"]))
           file_.fail(entry, "a mesh is a path, {file: path} or {keyframes: [paths]}");
         if (entry["name"]) name = file_.text(entry["name"], "a mesh's name");
-        if (entry["file"]) frames.push_back(file_.text(entry["file"], "a mesh's file")), places.push_back(entry["file"]);
+        if (entry["file"])
+          frames.push_back(file_.text(entry["file"], "a mesh's file")), places.push_back(entry["file"]);
         if (entry["keyframes"]) {
           file_.check_list(entry["keyframes"], "keyframes");
           for (const YAML::Node& frame : entry["keyframes"])
@@ -130,11 +133,11 @@ class SceneFile {
   }
 
   /// The later frames must have the first one's triangles, corner by corner.
-  void read_key_frames(const YAML::Node& node, const std::vector<std::string>& frames, const std::vector<YAML::Node>& places, Scene& first) {
+  void read_key_frames(const YAML::Node& node, const std::vector<std::string>& frames,
+                       const std::vector<YAML::Node>& places, Scene& first) {
     for (std::size_t i = 1; i < frames.size(); ++i) {
       Scene frame = at(places[i], [&] { return read_model(file_.beside(frames[i])); });
-      if (frame.mesh.triangles != first.mesh.triangles ||
-          frame.mesh.vertices.size() != first.mesh.vertices.size())
+      if (frame.mesh.triangles != first.mesh.triangles || frame.mesh.vertices.size() != first.mesh.vertices.size())
         file_.fail(node, fmt::format("key frame '{}' has other triangles than '{}'", frames[i], frames[0]));
       first.mesh.later_frames.push_back(std::move(frame.mesh.vertices));
     }
@@ -146,7 +149,10 @@ class SceneFile {
     if (!scene_.mesh.moves()) return;
     const auto [open, close] = scene_.shutter;
     if (!(open >= 0.0f && close <= 1.0f))
-      file_.fail(shutter, fmt::format("the shutter [{:g}, {:g}] must lie within [0, 1], the time from the first key frame to the last", open, close));
+      file_.fail(
+          shutter,
+          fmt::format("the shutter [{:g}, {:g}] must lie within [0, 1], the time from the first key frame to the last",
+                      open, close));
     if (open < close) return;
     scene_.mesh = pose(scene_.mesh, open);
     scene_.report.warnings.push_back(
@@ -159,14 +165,12 @@ class SceneFile {
     for (Part& part : parts_) {
       part.first_material = scene_.materials.size();
       if (part.model.materials.empty()) part.model.materials.push_back(Material{.name = "default"});
-      scene_.materials.insert(scene_.materials.end(), part.model.materials.begin(),
-                              part.model.materials.end());
+      scene_.materials.insert(scene_.materials.end(), part.model.materials.begin(), part.model.materials.end());
       LoadReport& from = part.model.report;
       scene_.report.polygons_split += from.polygons_split;
       scene_.report.warnings.insert(scene_.report.warnings.end(), from.warnings.begin(), from.warnings.end());
     }
-    if (scene_.materials.size() > 65535)
-      throw UserError(file_.path().string() + ": more than 65535 materials");
+    if (scene_.materials.size() > 65535) throw UserError(file_.path().string() + ": more than 65535 materials");
     std::vector<std::pair<std::size_t, Transform>> placed;
     if (instances) {
       file_.check_list(instances, "instances");
@@ -213,8 +217,7 @@ class SceneFile {
     }
     if (unsigned index = 0; YAML::convert<unsigned>::decode(node, index)) {
       if (index < parts_.size()) return index;
-      file_.fail(node,
-                 fmt::format("mesh {} does not exist: there are {}, counted from 0", index, parts_.size()));
+      file_.fail(node, fmt::format("mesh {} does not exist: there are {}, counted from 0", index, parts_.size()));
     }
     file_.fail(node, unknown_name_message("mesh", one_line(word), names));
   }
@@ -240,8 +243,8 @@ class SceneFile {
         const Vec3f axis = file_.vec3(file_.need(r, "axis", "rotate"), "rotate axis");
         if (axis == Vec3f{0, 0, 0}) file_.fail(r, "rotate axis must not be zero");
         const double degrees = file_.number(file_.need(r, "degrees", "rotate"), "rotate degrees");
-        result.rotate(Eigen::AngleAxisd(degrees * EIGEN_PI / 180.0,
-                                        Eigen::Vector3d(axis.x, axis.y, axis.z).normalized()));
+        result.rotate(
+            Eigen::AngleAxisd(degrees * EIGEN_PI / 180.0, Eigen::Vector3d(axis.x, axis.y, axis.z).normalized()));
       }
       if (const YAML::Node s = node["scale"]) {
         Vec3f v;
@@ -252,8 +255,7 @@ class SceneFile {
         result.scale(Eigen::Vector3d(v.x, v.y, v.z));
       }
     }
-    if (result.linear().determinant() == 0.0)
-      file_.fail(node, "a transform flattens its mesh: its determinant is 0");
+    if (result.linear().determinant() == 0.0) file_.fail(node, "a transform flattens its mesh: its determinant is 0");
     return result;
   }
 
@@ -264,13 +266,9 @@ class SceneFile {
 
 }  // namespace
 
-Scene read_scene_yaml(const std::filesystem::path& path) {
-  return SceneFile(path).read();
-}
+Scene read_scene_yaml(const std::filesystem::path& path) { return SceneFile(path).read(); }
 
-std::string scene_file_name(const std::filesystem::path& path) {
-  return name_of(YamlFile(path));
-}
+std::string scene_file_name(const std::filesystem::path& path) { return name_of(YamlFile(path)); }
 
 bool scene_file_moves(const std::filesystem::path& path) {
   const YamlFile file(path);

@@ -19,11 +19,11 @@ namespace arboretum {
 /// STL, glTF, GLB, OFF and whatever else assimp knows, node transforms applied. Throws UserError.
 [[nodiscard]] Scene read_assimp(const std::filesystem::path& path);
 /// Materials in the file's order. Warnings of the parser are appended, one line each.
-[[nodiscard]] std::vector<Material> read_mtl(const std::filesystem::path& path,
-                                             std::vector<std::string>& warnings);
+[[nodiscard]] std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<std::string>& warnings);
 /// A scene file of the project. Throws UserError.
 [[nodiscard]] Scene read_scene_yaml(const std::filesystem::path& path);
-/// Its `name:`, or the file's stem where it gives none; models are not read. Throws UserError for a name that cannot be part of a cell's.
+/// Its `name:`, or the file's stem where it gives none; models are not read. Throws UserError for a name that cannot be
+/// part of a cell's.
 [[nodiscard]] std::string scene_file_name(const std::filesystem::path& path);
 /// Whether a mesh of the scene file has key frames and its shutter opens; models are not read.
 [[nodiscard]] bool scene_file_moves(const std::filesystem::path& path);

@@ -13,14 +13,15 @@
 namespace arboretum {
 namespace {
 
-constexpr int kExponent = 40;            ///< promises hold for largest coordinates within 2^-40 .. 2^40
-constexpr std::size_t kStray = 100;     ///< one triangle of so many far out is a stray one
+constexpr int kExponent = 40;        ///< promises hold for largest coordinates within 2^-40 .. 2^40
+constexpr std::size_t kStray = 100;  ///< one triangle of so many far out is a stray one
 constexpr int kLeastNormalExponent = std::numeric_limits<float>::min_exponent - 1;
 static_assert(kMaxCoordinate == float(std::uint64_t{1} << kExponent));
 
 /// What the coordinates of all triangles span, in all key frames; those with a corner that is not finite do not count.
 struct Span {
-  float largest = 0.0f, smallest = std::numeric_limits<float>::infinity();  ///< |coordinate|, of the smallest that is not 0
+  /// |coordinate|, of the smallest that is not 0
+  float largest = 0.0f, smallest = std::numeric_limits<float>::infinity();
   std::size_t triangles = 0, out_of_range = 0;
 };
 
@@ -79,15 +80,18 @@ void rescale(Scene& scene, const std::string& source) {
   }
   if (scene.camera) {
     scale(scene.camera->position), scale(scene.camera->look_at);
-    scene.camera->aperture_radius = scaled(scene.camera->aperture_radius), scene.camera->focus_distance = scaled(scene.camera->focus_distance);
+    scene.camera->aperture_radius = scaled(scene.camera->aperture_radius),
+    scene.camera->focus_distance = scaled(scene.camera->focus_distance);
   }
   for (Light& light : scene.lights) {
     scale(light.position);
-    if (light.type != Light::Type::directional) scale(light.intensity), scale(light.intensity);  // it falls with the square of the distance
+    // It falls with the square of the distance
+    if (light.type != Light::Type::directional) scale(light.intensity), scale(light.intensity);
   }
   scene.report.scaled_by = *exponent;
-  scene.report.warnings.push_back(fmt::format("{}: the largest coordinate is {:.3g}, outside of 2^-{} to 2^{}; the scene is multiplied by 2^{}, which is exact", source,
-                                              span.largest, kExponent, kExponent, *exponent));
+  scene.report.warnings.push_back(fmt::format(
+      "{}: the largest coordinate is {:.3g}, outside of 2^-{} to 2^{}; the scene is multiplied by 2^{}, which is exact",
+      source, span.largest, kExponent, kExponent, *exponent));
 }
 
 }  // namespace arboretum

@@ -75,9 +75,9 @@ void sanitise(Scene& scene, const std::string& source) {
   mend(mesh.vertices);
   for (std::vector<Vec3f>& frame : mesh.later_frames) mend(frame);
   if (kept == 0) {
-    throw UserError(fmt::format(
-        "{}: no triangle left: of {} read, {} are not finite, {} out of range, {} of zero area", source,
-        report.triangles_read, report.non_finite, report.out_of_range, report.degenerate));
+    throw UserError(fmt::format("{}: no triangle left: of {} read, {} are not finite, {} out of range, {} of zero area",
+                                source, report.triangles_read, report.non_finite, report.out_of_range,
+                                report.degenerate));
   }
   if (scene.materials.empty()) {
     scene.materials.push_back(Material{.name = "default"});

@@ -7,9 +7,9 @@
 namespace arboretum {
 
 /// Drops triangles with a corner that is not finite or beyond kMaxCoordinate and those of exactly zero area,
-/// in any key frame (zero area: in all), keeps the order of the others and the instances in step, and counts into `scene.report`. A scene without materials gets one grey.
-/// Vertices stay, since indices refer to them; unusable ones are set to the origin. Throws UserError, led by
-/// `source`, when no triangle is left.
+/// in any key frame (zero area: in all), keeps the order of the others and the instances in step, and counts into
+/// `scene.report`. A scene without materials gets one grey. Vertices stay, since indices refer to them; unusable ones
+/// are set to the origin. Throws UserError, led by `source`, when no triangle is left.
 void sanitise(Scene& scene, const std::string& source);
 
 }  // namespace arboretum

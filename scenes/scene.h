@@ -72,8 +72,8 @@ struct Scene {
   std::vector<TextureTriangle> texture_coordinates;  ///< one a triangle of `mesh`, or empty: the scene has none
   std::vector<Material> materials;
   std::vector<Light> lights;
-  Vec3f environment{0, 0, 0};        ///< mean radiance from afar
-  std::string environment_image{};   ///< latitude-longitude, y up; empty: the radiance is the same all around
+  Vec3f environment{0, 0, 0};       ///< mean radiance from afar
+  std::string environment_image{};  ///< latitude-longitude, y up; empty: the radiance is the same all around
   std::optional<Camera> camera;
   Shutter shutter;
   unsigned key_frames = 1;    ///< most key frames of one mesh in the scene file
@@ -90,15 +90,16 @@ struct SceneSpec {
   std::size_t triangles = 100000;
   std::uint64_t seed = 1;
   /// What cells are named after: `bunny`, `model`, a scene file's `name:` (else its stem), `sphere_flake-100000`, with
-  /// `-seed2` when the seed is not 1. Throws UserError for a scene file that cannot be read as YAML, or whose name is of no use.
+  /// `-seed2` when the seed is not 1. Throws UserError for a scene file that cannot be read as YAML, or whose name is
+  /// of no use.
   [[nodiscard]] std::string name() const;
 };
 
 /// Loads or generates. Throws UserError with one clear line for a missing, empty or broken file, an unknown
 /// name, or a scene with no triangle left.
 [[nodiscard]] Scene load_scene(const SceneSpec& spec);
-/// Whether the scene moves, without loading models: it has key frames, and its shutter opens. Throws UserError for a scene
-/// file that cannot be read as YAML.
+/// Whether the scene moves, without loading models: it has key frames, and its shutter opens. Throws UserError for a
+/// scene file that cannot be read as YAML.
 [[nodiscard]] bool scene_moves(const SceneSpec& spec);
 /// A command-line word: a catalogue name, a path to a model or scene YAML, or `generator:triangles[:seed]`.
 [[nodiscard]] SceneSpec parse_scene_word(const std::string& word);

@@ -16,34 +16,18 @@ struct Vec3d {
   explicit Vec3d(Vec3f v) noexcept : x(v.x), y(v.y), z(v.z) {}
 };
 
-[[nodiscard]] constexpr Vec3d operator+(Vec3d a, Vec3d b) noexcept {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-[[nodiscard]] constexpr Vec3d operator-(Vec3d a, Vec3d b) noexcept {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-[[nodiscard]] constexpr Vec3d operator*(Vec3d a, double s) noexcept {
-  return {a.x * s, a.y * s, a.z * s};
-}
-[[nodiscard]] constexpr Vec3d operator*(double s, Vec3d a) noexcept {
-  return a * s;
-}
-[[nodiscard]] constexpr double dot(Vec3d a, Vec3d b) noexcept {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+[[nodiscard]] constexpr Vec3d operator+(Vec3d a, Vec3d b) noexcept { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+[[nodiscard]] constexpr Vec3d operator-(Vec3d a, Vec3d b) noexcept { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+[[nodiscard]] constexpr Vec3d operator*(Vec3d a, double s) noexcept { return {a.x * s, a.y * s, a.z * s}; }
+[[nodiscard]] constexpr Vec3d operator*(double s, Vec3d a) noexcept { return a * s; }
+[[nodiscard]] constexpr double dot(Vec3d a, Vec3d b) noexcept { return a.x * b.x + a.y * b.y + a.z * b.z; }
 [[nodiscard]] constexpr Vec3d cross(Vec3d a, Vec3d b) noexcept {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-[[nodiscard]] inline double length(Vec3d a) noexcept {
-  return std::sqrt(dot(a, a));
-}
+[[nodiscard]] inline double length(Vec3d a) noexcept { return std::sqrt(dot(a, a)); }
 /// `a` scaled to unit length; a zero vector gives NaN components.
-[[nodiscard]] inline Vec3d normalize(Vec3d a) noexcept {
-  return a * (1.0 / length(a));
-}
-[[nodiscard]] inline Vec3f to_float(Vec3d a) noexcept {
-  return {float(a.x), float(a.y), float(a.z)};
-}
+[[nodiscard]] inline Vec3d normalize(Vec3d a) noexcept { return a * (1.0 / length(a)); }
+[[nodiscard]] inline Vec3f to_float(Vec3d a) noexcept { return {float(a.x), float(a.y), float(a.z)}; }
 
 /// Two unit vectors that make a right-handed frame with the unit vector `n` (Duff et al., JCGT 6(1), 2017).
 struct Frame {
@@ -54,9 +38,7 @@ struct Frame {
     tangent = {1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x};
     bitangent = {b, sign + n.y * n.y * a, -n.y};
   }
-  [[nodiscard]] Vec3d to_world(Vec3d v) const noexcept {
-    return tangent * v.x + bitangent * v.y + normal * v.z;
-  }
+  [[nodiscard]] Vec3d to_world(Vec3d v) const noexcept { return tangent * v.x + bitangent * v.y + normal * v.z; }
 };
 
 /// Cosine and sine of an angle given in turns (1 turn = 360 degrees). Exact at quarter turns, bit-identical
@@ -75,18 +57,10 @@ struct UnitCircle {
     }
     s *= a;
     switch (quarter & 3) {
-      case 0:
-        cosine = c, sine = s;
-        break;
-      case 1:
-        cosine = -s, sine = c;
-        break;
-      case 2:
-        cosine = -c, sine = -s;
-        break;
-      default:
-        cosine = s, sine = -c;
-        break;
+      case 0: cosine = c, sine = s; break;
+      case 1: cosine = -s, sine = c; break;
+      case 2: cosine = -c, sine = -s; break;
+      default: cosine = s, sine = -c; break;
     }
   }
 

@@ -51,8 +51,7 @@ YAML::Node YamlFile::need(const YAML::Node& map, const char* key, std::string_vi
 }
 
 void YamlFile::check_list(const YAML::Node& node, std::string_view what) const {
-  if (!node.IsSequence() || node.size() == 0)
-    fail(node, fmt::format("{} must be a list with something in it", what));
+  if (!node.IsSequence() || node.size() == 0) fail(node, fmt::format("{} must be a list with something in it", what));
 }
 
 std::string YamlFile::text(const YAML::Node& node, std::string_view what) const {
@@ -84,8 +83,7 @@ bool YamlFile::boolean(const YAML::Node& node, std::string_view what) const {
 }
 
 Vec3f YamlFile::vec3(const YAML::Node& node, std::string_view what) const {
-  if (!node.IsSequence() || node.size() != 3)
-    fail(node, fmt::format("{} must be a list of three numbers", what));
+  if (!node.IsSequence() || node.size() != 3) fail(node, fmt::format("{} must be a list of three numbers", what));
   return {float(number(node[0], what)), float(number(node[1], what)), float(number(node[2], what))};
 }
 
@@ -102,9 +100,9 @@ Vec3f YamlFile::color(const YAML::Node& node, std::string_view what) const {
 }
 
 Camera YamlFile::camera(const YAML::Node& node) const {
-  check_keys(node, "camera",
-             {"position", "look_at", "up", "vertical_fov", "mirror_x", "resolution", "aperture_radius",
-              "focus_distance"});
+  check_keys(
+      node, "camera",
+      {"position", "look_at", "up", "vertical_fov", "mirror_x", "resolution", "aperture_radius", "focus_distance"});
   Camera camera;
   camera.position = vec3(need(node, "position", "camera"), "camera position");
   camera.look_at = vec3(need(node, "look_at", "camera"), "camera look_at");

@@ -22,15 +22,12 @@ class YamlFile {
   [[nodiscard]] const YAML::Node& root() const noexcept { return root_; }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// `name`, relative to the folder of the file.
-  [[nodiscard]] std::filesystem::path beside(const std::string& name) const {
-    return path_.parent_path() / name;
-  }
+  [[nodiscard]] std::filesystem::path beside(const std::string& name) const { return path_.parent_path() / name; }
 
   [[noreturn]] void fail(const YAML::Node& node, const std::string& what) const;
   /// Fails unless `node` is a map whose keys are all among `keys`, each once. `what` names the map in the
   /// message.
-  void check_keys(const YAML::Node& node, std::string_view what,
-                  std::initializer_list<const char*> keys) const;
+  void check_keys(const YAML::Node& node, std::string_view what, std::initializer_list<const char*> keys) const;
   /// The value of a key that must be there.
   [[nodiscard]] YAML::Node need(const YAML::Node& map, const char* key, std::string_view what) const;
   void check_list(const YAML::Node& node, std::string_view what) const;
@@ -38,8 +35,7 @@ class YamlFile {
   [[nodiscard]] std::string text(const YAML::Node& node, std::string_view what) const;
   /// A finite number.
   [[nodiscard]] double number(const YAML::Node& node, std::string_view what) const;
-  [[nodiscard]] std::uint64_t count(const YAML::Node& node, std::string_view what,
-                                    std::uint64_t at_most) const;
+  [[nodiscard]] std::uint64_t count(const YAML::Node& node, std::string_view what, std::uint64_t at_most) const;
   [[nodiscard]] bool boolean(const YAML::Node& node, std::string_view what) const;
   [[nodiscard]] Vec3f vec3(const YAML::Node& node, std::string_view what) const;
   /// Three numbers, or one that stands for all three; none negative.

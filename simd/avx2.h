@@ -41,8 +41,14 @@ struct vi<8> {
   friend ARBORETUM_INLINE vi min(vi a, vi b) { return vi(_mm256_min_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return vi(_mm256_max_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi select(vm<8> m, vi a, vi b) { return vi(_mm256_blendv_epi8(b.v, a.v, _mm256_castps_si256(m.v))); }
-  template <int S> ARBORETUM_INLINE vi shift_left() const { return vi(_mm256_slli_epi32(v, S)); }
-  template <int S> ARBORETUM_INLINE vi shift_right_logical() const { return vi(_mm256_srli_epi32(v, S)); }
+  template <int S>
+  ARBORETUM_INLINE vi shift_left() const {
+    return vi(_mm256_slli_epi32(v, S));
+  }
+  template <int S>
+  ARBORETUM_INLINE vi shift_right_logical() const {
+    return vi(_mm256_srli_epi32(v, S));
+  }
 };
 
 template <>

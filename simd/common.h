@@ -4,15 +4,36 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-template <int W> ARBORETUM_INLINE bool any(vm<W> m) { return m.bits() != 0; }
-template <int W> ARBORETUM_INLINE bool none(vm<W> m) { return m.bits() == 0; }
-template <int W> ARBORETUM_INLINE bool all(vm<W> m) { return m.bits() == (1u << W) - 1u; }
+template <int W>
+ARBORETUM_INLINE bool any(vm<W> m) {
+  return m.bits() != 0;
+}
+template <int W>
+ARBORETUM_INLINE bool none(vm<W> m) {
+  return m.bits() == 0;
+}
+template <int W>
+ARBORETUM_INLINE bool all(vm<W> m) {
+  return m.bits() == (1u << W) - 1u;
+}
 
-template <int W> ARBORETUM_INLINE vf<W> abs(vf<W> a) { return vf<W>::from_int_bits(a.as_int() & vi<W>(0x7fffffff)); }
+template <int W>
+ARBORETUM_INLINE vf<W> abs(vf<W> a) {
+  return vf<W>::from_int_bits(a.as_int() & vi<W>(0x7fffffff));
+}
 /// The sign bit of each lane, nothing else.
-template <int W> ARBORETUM_INLINE vi<W> sign_bits(vf<W> a) { return a.as_int() & vi<W>(std::numeric_limits<std::int32_t>::min()); }
-template <int W> ARBORETUM_INLINE vf<W> xor_sign(vf<W> a, vi<W> sign) { return vf<W>::from_int_bits(a.as_int() ^ sign); }
-template <int W> ARBORETUM_INLINE vf<W> operator-(vf<W> a) { return xor_sign(a, vi<W>(std::numeric_limits<std::int32_t>::min())); }
+template <int W>
+ARBORETUM_INLINE vi<W> sign_bits(vf<W> a) {
+  return a.as_int() & vi<W>(std::numeric_limits<std::int32_t>::min());
+}
+template <int W>
+ARBORETUM_INLINE vf<W> xor_sign(vf<W> a, vi<W> sign) {
+  return vf<W>::from_int_bits(a.as_int() ^ sign);
+}
+template <int W>
+ARBORETUM_INLINE vf<W> operator-(vf<W> a) {
+  return xor_sign(a, vi<W>(std::numeric_limits<std::int32_t>::min()));
+}
 
 /// The largest |component| of a point or direction; of W of them, given by component.
 template <class Vector>
@@ -55,9 +76,13 @@ template <int W>
 using vf3 = vec3<vf<W>>;
 
 /// Fused where the ISA has FMA.
-template <class F> ARBORETUM_INLINE F dot(vec3<F> a, vec3<F> b) { return madd(a.x, b.x, madd(a.y, b.y, a.z * b.z)); }
+template <class F>
+ARBORETUM_INLINE F dot(vec3<F> a, vec3<F> b) {
+  return madd(a.x, b.x, madd(a.y, b.y, a.z * b.z));
+}
 /// Fused where the ISA has FMA.
-template <class F> ARBORETUM_INLINE vec3<F> cross(vec3<F> a, vec3<F> b) {
+template <class F>
+ARBORETUM_INLINE vec3<F> cross(vec3<F> a, vec3<F> b) {
   return {msub(a.y, b.z, a.z * b.y), msub(a.z, b.x, a.x * b.z), msub(a.x, b.y, a.y * b.x)};
 }
 

@@ -11,11 +11,14 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-template <int W> struct vd;
+template <int W>
+struct vd;
 
 /// How many of W lanes are worked on at a time in double.
 template <int W>
-inline constexpr int kDoubleLanes = kRegisterWidth / 2 >= W ? W : kRegisterWidth >= 4 ? kRegisterWidth / 2 : 1;
+inline constexpr int kDoubleLanes = kRegisterWidth / 2 >= W ? W
+                                    : kRegisterWidth >= 4   ? kRegisterWidth / 2
+                                                            : 1;
 
 template <>
 struct vd<1> {
@@ -117,13 +120,18 @@ struct vd<8> {
 
 template <int W>
 using vd3 = vec3<vd<W>>;
-template <int W> ARBORETUM_INLINE vd<W> abs(vd<W> a) { return flip_sign(a, a); }
+template <int W>
+ARBORETUM_INLINE vd<W> abs(vd<W> a) {
+  return flip_sign(a, a);
+}
 /// W floats of each of three arrays, widened.
-template <int W> ARBORETUM_INLINE vd3<W> load3(const float* x, const float* y, const float* z) {
+template <int W>
+ARBORETUM_INLINE vd3<W> load3(const float* x, const float* y, const float* z) {
   return {vd<W>::load(x), vd<W>::load(y), vd<W>::load(z)};
 }
 /// All of them, rounded. In registers where it can be: a load of what two stores have written waits for them.
-template <int W, int D> ARBORETUM_INLINE vf<W> to_floats(const vd<D> (&a)[W / D]) {
+template <int W, int D>
+ARBORETUM_INLINE vf<W> to_floats(const vd<D> (&a)[W / D]) {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
   if constexpr (W == 4 && D == 2) return vf<W>(_mm_movelh_ps(_mm_cvtpd_ps(a[0].v), _mm_cvtpd_ps(a[1].v)));
 #elif ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2

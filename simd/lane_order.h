@@ -1,5 +1,5 @@
-// Lanes in another order, chosen as the program runs: moved to the front, permuted, sorted. On AVX2 and AVX-512, for widths of one register. Include only between simd/target_begin.h and
-// simd/target_end.h.
+// Lanes in another order, chosen as the program runs: moved to the front, permuted, sorted. On AVX2 and AVX-512, for widths of one
+// register. Include only between simd/target_begin.h and simd/target_end.h.
 #pragma once
 
 #include "simd/simd.h"
@@ -66,7 +66,8 @@ ARBORETUM_INLINE vi<W> compress(unsigned bits, vi<W> a) {
   const __m128i from = _mm_cvtsi64_si128(std::int64_t(kCompress.lanes[bits]));  // as bytes
   const int count = __builtin_popcount(bits);
   if constexpr (W == 4) return permute(a, vi<4>(_mm_cvtepu8_epi32(from))) & vi<4>(_mm_cmpgt_epi32(_mm_set1_epi32(count), vi<4>::iota().v));
-  if constexpr (W == 8) return permute(a, vi<8>(_mm256_cvtepu8_epi32(from))) & vi<8>(_mm256_cmpgt_epi32(_mm256_set1_epi32(count), vi<8>::iota().v));
+  if constexpr (W == 8)
+    return permute(a, vi<8>(_mm256_cvtepu8_epi32(from))) & vi<8>(_mm256_cmpgt_epi32(_mm256_set1_epi32(count), vi<8>::iota().v));
 #endif
 }
 
@@ -81,7 +82,10 @@ ARBORETUM_INLINE vi<8> larger_first(vi<8> a) {
   __m256i other = a.v;
   if constexpr (X >= 4) other = _mm256_permute4x64_epi64(other, 0x4e);
   if constexpr ((X & 3) != 0) other = _mm256_shuffle_epi32(other, ((X & 3) ^ (1 ^ (X & 3)) << 2 ^ (2 ^ (X & 3)) << 4 ^ (3 ^ (X & 3)) << 6));
-  return vi<8>(_mm256_blend_epi32(_mm256_max_epi32(a.v, other), _mm256_min_epi32(a.v, other), X == 1 ? 0b10101010 : X < 4 ? 0b11001100 : 0b11110000));
+  return vi<8>(_mm256_blend_epi32(_mm256_max_epi32(a.v, other), _mm256_min_epi32(a.v, other),
+                                  X == 1  ? 0b10101010
+                                  : X < 4 ? 0b11001100
+                                          : 0b11110000));
 }
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
 template <int X>

@@ -22,7 +22,11 @@ struct vi<1> {
   std::int32_t v;
   vi() = default;
   ARBORETUM_INLINE vi(std::int32_t s) : v(s) {}
-  static ARBORETUM_INLINE vi load(const void* p) { vi r; __builtin_memcpy(&r.v, p, 4); return r; }
+  static ARBORETUM_INLINE vi load(const void* p) {
+    vi r;
+    __builtin_memcpy(&r.v, p, 4);
+    return r;
+  }
   static ARBORETUM_INLINE vi iota() { return 0; }
   ARBORETUM_INLINE void store(void* p) const { __builtin_memcpy(p, &v, 4); }
   friend ARBORETUM_INLINE vi operator&(vi a, vi b) { return a.v & b.v; }
@@ -39,7 +43,11 @@ struct vf<1> {
   float v;
   vf() = default;
   ARBORETUM_INLINE vf(float s) : v(s) {}
-  static ARBORETUM_INLINE vf load(const void* p) { vf r; __builtin_memcpy(&r.v, p, 4); return r; }
+  static ARBORETUM_INLINE vf load(const void* p) {
+    vf r;
+    __builtin_memcpy(&r.v, p, 4);
+    return r;
+  }
   ARBORETUM_INLINE void store(void* p) const { __builtin_memcpy(p, &v, 4); }
   friend ARBORETUM_INLINE vf operator+(vf a, vf b) { return a.v + b.v; }
   friend ARBORETUM_INLINE vf operator-(vf a, vf b) { return a.v - b.v; }

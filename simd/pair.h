@@ -40,8 +40,14 @@ struct vi {
   friend ARBORETUM_INLINE vi min(vi a, vi b) { return {min(a.lo, b.lo), min(a.hi, b.hi)}; }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return {max(a.lo, b.lo), max(a.hi, b.hi)}; }
   friend ARBORETUM_INLINE vi select(vm<W> m, vi a, vi b) { return {select(m.lo, a.lo, b.lo), select(m.hi, a.hi, b.hi)}; }
-  template <int S> ARBORETUM_INLINE vi shift_left() const { return {lo.template shift_left<S>(), hi.template shift_left<S>()}; }
-  template <int S> ARBORETUM_INLINE vi shift_right_logical() const { return {lo.template shift_right_logical<S>(), hi.template shift_right_logical<S>()}; }
+  template <int S>
+  ARBORETUM_INLINE vi shift_left() const {
+    return {lo.template shift_left<S>(), hi.template shift_left<S>()};
+  }
+  template <int S>
+  ARBORETUM_INLINE vi shift_right_logical() const {
+    return {lo.template shift_right_logical<S>(), hi.template shift_right_logical<S>()};
+  }
 };
 
 template <int W>
@@ -75,8 +81,14 @@ struct vf {
   friend ARBORETUM_INLINE float reduce_max(vf a) { return reduce_max(max_x86(a.lo, a.hi)); }
 };
 
-template <int W> ARBORETUM_INLINE vf<W> to_float(vi<W> a) { return {to_float(a.lo), to_float(a.hi)}; }
-template <int W> ARBORETUM_INLINE vi<W> truncate_to_int(vf<W> a) { return {truncate_to_int(a.lo), truncate_to_int(a.hi)}; }
+template <int W>
+ARBORETUM_INLINE vf<W> to_float(vi<W> a) {
+  return {to_float(a.lo), to_float(a.hi)};
+}
+template <int W>
+ARBORETUM_INLINE vi<W> truncate_to_int(vf<W> a) {
+  return {truncate_to_int(a.lo), truncate_to_int(a.hi)};
+}
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -12,13 +12,19 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-template <int W> struct vf;  ///< W floats
-template <int W> struct vi;  ///< W signed 32-bit integers
-template <int W> struct vm;  ///< W truth values
+template <int W>
+struct vf;  ///< W floats
+template <int W>
+struct vi;  ///< W signed 32-bit integers
+template <int W>
+struct vm;  ///< W truth values
 
 inline constexpr bool kHasFma = ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2;
 /// Float lanes of a register; 1 for scalar.
-inline constexpr int kRegisterWidth = ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512 ? 16 : ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2 ? 8 : ARBORETUM_TARGET == ARBORETUM_TARGET_SSE ? 4 : 1;
+inline constexpr int kRegisterWidth = ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512 ? 16
+                                      : ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2 ? 8
+                                      : ARBORETUM_TARGET == ARBORETUM_TARGET_SSE  ? 4
+                                                                                  : 1;
 inline constexpr Isa kIsa = static_cast<Isa>(ARBORETUM_TARGET);
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -158,7 +158,8 @@ ARBORETUM_INLINE vi<W> load_bytes(const void* p) {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
     if constexpr (W == 16) return vi<W>(_mm512_cvtepu8_epi32(_mm_loadu_si128(static_cast<const __m128i*>(p))));
 #endif
-    if constexpr (requires(vi<W> b) { b.lo; }) return vi<W>(load_bytes<W / 2>(p), load_bytes<W / 2>(static_cast<const std::uint8_t*>(p) + W / 2));
+    if constexpr (requires(vi<W> b) { b.lo; })
+      return vi<W>(load_bytes<W / 2>(p), load_bytes<W / 2>(static_cast<const std::uint8_t*>(p) + W / 2));
   }
 #endif
 }

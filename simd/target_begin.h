@@ -5,7 +5,8 @@
 #elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
 #pragma clang attribute push(__attribute__((target("avx2,fma,bmi,bmi2,lzcnt,popcnt"))), apply_to = function)
 #elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
-#pragma clang attribute push(__attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi,bmi2,lzcnt,popcnt"))), apply_to = function)
+#pragma clang attribute push(__attribute__((target("avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi,bmi2,lzcnt,popcnt"))), \
+                             apply_to = function)
 #endif
 #else
 #pragma GCC push_options

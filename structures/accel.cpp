@@ -25,7 +25,8 @@ std::span<const StructureEntry> all_structures() {
       for (const StructureEntry& below : list) {
         if (!why_not_below(below.info).empty()) continue;
         for (std::string_view builder : below.info.builders) {
-          if (std::ranges::find(above.info.builders, builder) == above.info.builders.end()) above.info.builders.push_back(builder);
+          if (std::ranges::find(above.info.builders, builder) == above.info.builders.end())
+            above.info.builders.push_back(builder);
         }
       }
     }
@@ -36,8 +37,10 @@ std::span<const StructureEntry> all_structures() {
 
 std::string why_not_below(const StructureInfo& below) {
   if (below.takes_below) return std::string(below.name) + " stands above other structures, not below one";
-  if (below.build_depends_on_isa) return std::string(below.name) + " is a library with a scene of its own, and cannot stand below";
-  if (below.needs_motion) return std::string(below.name) + " is for moving scenes, and instances are held at one moment";
+  if (below.build_depends_on_isa)
+    return std::string(below.name) + " is a library with a scene of its own, and cannot stand below";
+  if (below.needs_motion)
+    return std::string(below.name) + " is for moving scenes, and instances are held at one moment";
   return {};
 }
 
@@ -53,7 +56,8 @@ void require_finite(const TriangleMesh& mesh) {
     for (std::size_t k = 0; k < mesh.frames(); ++k) {
       const std::vector<Vec3f>& frame = mesh.frame(k);
       if (is_finite(frame[t.a]) && is_finite(frame[t.b]) && is_finite(frame[t.c])) continue;
-      throw UserError("triangle " + std::to_string(i) + " has a vertex that is not finite; drop such triangles first, as load_scene() does");
+      throw UserError("triangle " + std::to_string(i) +
+                      " has a vertex that is not finite; drop such triangles first, as load_scene() does");
     }
   }
 }

@@ -8,11 +8,14 @@
 namespace arboretum {
 namespace {
 
-constexpr const char* kOtherLayout = "was saved by a build of arboretum that lays this structure out differently; build and save it again";
+constexpr const char* kOtherLayout =
+    "was saved by a build of arboretum that lays this structure out differently; build and save it again";
 
 }  // namespace
 
-void Accel::refit(const TriangleMesh&) { throw UserError(std::string(info().name) + " cannot be refitted; build it anew"); }
+void Accel::refit(const TriangleMesh&) {
+  throw UserError(std::string(info().name) + " cannot be refitted; build it anew");
+}
 
 void Accel::archive(Archive&) {
   throw UserError(std::string(info().name) + " cannot be saved to a file; build it anew");

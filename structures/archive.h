@@ -1,6 +1,6 @@
 // Archive: what a structure hands its members to, one function for both directions: a saving archive writes them, a
-// loading one reads them back. Nothing in an archive is a pointer: arenas hold offsets, and what points into the mesh is
-// taken from mesh() again.
+// loading one reads them back. Nothing in an archive is a pointer: arenas hold offsets, and what points into the mesh
+// is taken from mesh() again.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,8 @@
 
 namespace arboretum {
 
-/// Used as `archive(arena_, root_, bounds_, leaf_)`, in the same order in both directions. Takes trivially copyable values,
-/// strings, Arena, and vectors (any allocator) of trivially copyable values.
+/// Used as `archive(arena_, root_, bounds_, leaf_)`, in the same order in both directions. Takes trivially copyable
+/// values, strings, Arena, and vectors (any allocator) of trivially copyable values.
 class Archive {
  public:
   /// Saves to `out`, whose errors the caller looks at.
@@ -43,8 +43,8 @@ class Archive {
     (value(values), ...);
   }
 
-  /// Stands for what the saved bytes mean and C++ does not say: the size of a node, a number that goes up when its layout
-  /// changes. Throws UserError when the file has another.
+  /// Stands for what the saved bytes mean and C++ does not say: the size of a node, a number that goes up when its
+  /// layout changes. Throws UserError when the file has another.
   void expect(std::uint64_t meaning);
   /// Bytes of the archive that were not read yet.
   [[nodiscard]] std::size_t rest() const noexcept { return rest_.size(); }

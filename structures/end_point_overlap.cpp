@@ -60,21 +60,19 @@ double area_of(const Polygon& polygon) {
       a[k] = polygon.points[static_cast<std::size_t>(i)][k] - o[k];
       b[k] = polygon.points[static_cast<std::size_t>(i + 1)][k] - o[k];
     }
-    for (std::size_t k = 0; k < 3; ++k)
-      sum[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    for (std::size_t k = 0; k < 3; ++k) sum[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
   }
   return 0.5 * std::hypot(sum[0], sum[1], sum[2]);
 }
 
 bool overlap(const Bounds3f& a, const Bounds3f& b) {
-  return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y &&
-         b.lower.y <= a.upper.y && a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
+  return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
+         a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
 }
 
 class Measure {
  public:
-  Measure(const TriangleMesh& mesh, std::span<const TreeRecord> records,
-          std::span<const std::uint32_t> references)
+  Measure(const TriangleMesh& mesh, std::span<const TreeRecord> records, std::span<const std::uint32_t> references)
       : mesh_(mesh), records_(records), references_(references), areas_(mesh.size()), bounds_(mesh.size()) {
     tbb::parallel_for(std::size_t{0}, mesh.size(), [&](std::size_t i) {
       const auto corners = mesh.corners(i);
@@ -96,12 +94,10 @@ class Measure {
   [[nodiscard]] double total_area() const { return total_area_; }
 
   /// Adds to `work` what was done. `stamps` has one entry a triangle, below any record's index + 1 at first.
-  [[nodiscard]] double foreign_area(std::uint32_t index, std::vector<std::uint32_t>& stamps,
-                                    double& work) const {
+  [[nodiscard]] double foreign_area(std::uint32_t index, std::vector<std::uint32_t>& stamps, double& work) const {
     const TreeRecord& own = records_[index];
     if (repeated_) {
-      for (std::uint32_t r = own.first_reference; r < own.end_reference; ++r)
-        stamps[references_[r]] = index + 1;
+      for (std::uint32_t r = own.first_reference; r < own.end_reference; ++r) stamps[references_[r]] = index + 1;
     }
     double area = 0.0;
     for (std::uint32_t i = 0; i < records_.size();) {
@@ -156,17 +152,15 @@ struct Sample {
   std::vector<double> weight;
 };
 
-Sample choose(std::span<const TreeRecord> records, const Measure& measure, std::size_t triangles,
-              double work) {
+Sample choose(std::span<const TreeRecord> records, const Measure& measure, std::size_t triangles, double work) {
   std::vector<std::uint32_t> order(records.size());
   std::iota(order.begin(), order.end(), 0u);
   Sample sample;
   if (records.size() > kLargest + kPilot) {
-    std::nth_element(order.begin(), order.begin() + kLargest, order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) {
-                       const double p = records[a].bounds.area(), q = records[b].bounds.area();
-                       return p != q ? p > q : a < b;
-                     });
+    std::nth_element(order.begin(), order.begin() + kLargest, order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      const double p = records[a].bounds.area(), q = records[b].bounds.area();
+      return p != q ? p > q : a < b;
+    });
     std::sort(order.begin() + kLargest, order.end());
     const std::size_t others = order.size() - kLargest;
     std::vector<std::uint32_t> stamps(triangles, 0);

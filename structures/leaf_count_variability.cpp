@@ -23,7 +23,8 @@ struct Line {
   [[nodiscard]] bool meets(const Bounds3f& box) const {
     double enter = -std::numeric_limits<double>::infinity(), leave = -enter;
     for (std::size_t k = 0; k < 3; ++k) {
-      const double a = (double(box.lower[k]) - origin[k]) * reciprocal[k], b = (double(box.upper[k]) - origin[k]) * reciprocal[k];
+      const double a = (double(box.lower[k]) - origin[k]) * reciprocal[k],
+                   b = (double(box.upper[k]) - origin[k]) * reciprocal[k];
       enter = std::max(enter, std::min(a, b)), leave = std::min(leave, std::max(a, b));
     }
     return enter <= leave;
@@ -47,7 +48,8 @@ Line random_line(const Bounds3f& box, std::uint64_t index) {
   std::array<double, 3> direction;
   direction[axis] = std::sqrt(std::max(0.0, 1.0 - radius * radius));
   direction[(axis + 1) % 3] = radius * std::cos(angle), direction[(axis + 2) % 3] = radius * std::sin(angle);
-  for (std::size_t k = 0; k < 3; ++k) line.reciprocal[k] = 1.0 / (std::abs(direction[k]) < 1e-30 ? 1e-30 : direction[k]);
+  for (std::size_t k = 0; k < 3; ++k)
+    line.reciprocal[k] = 1.0 / (std::abs(direction[k]) < 1e-30 ? 1e-30 : direction[k]);
   return line;
 }
 

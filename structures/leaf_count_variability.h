@@ -17,8 +17,8 @@ struct LeafCounts {
 };
 
 /// Lines are whole (no hit ends them) and distributed as SAH takes them: isotropic and uniform over those that meet the
-/// root's box, made as a uniform point of the box's surface and a cosine-distributed direction from there. Up to 4096 of
-/// a fixed seed, fewer where `work` box tests are spent before. A root without area gives {leaves, 0, 0}.
+/// root's box, made as a uniform point of the box's surface and a cosine-distributed direction from there. Up to 4096
+/// of a fixed seed, fewer where `work` box tests are spent before. A root without area gives {leaves, 0, 0}.
 [[nodiscard]] LeafCounts leaf_counts(std::span<const TreeRecord> records, double work = 1e8);
 
 }  // namespace arboretum

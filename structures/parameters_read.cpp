@@ -6,7 +6,8 @@
 
 namespace arboretum {
 
-std::optional<std::vector<std::string_view>> parameters_read(std::string_view structure, std::string_view builder, std::string_view below) {
+std::optional<std::vector<std::string_view>> parameters_read(std::string_view structure, std::string_view builder,
+                                                             std::string_view below) {
   // Of registered_structures(), which all_structures() begins with.
   static const std::vector<BuilderParametersOf> declared = registered_parameters();
   const std::span<const StructureEntry> all = all_structures();

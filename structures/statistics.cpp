@@ -47,10 +47,8 @@ class Recorder final : public StructureVisitor {
     statistics.references = references.size();
     statistics.sah_cost = cost_;
     statistics.sah_child_cost = child_cost_;
-    if (lanes_ > 0)
-      statistics.leaf_fill = static_cast<double>(references.size()) / static_cast<double>(lanes_);
-    if (triangles > 0)
-      statistics.duplication = static_cast<double>(references.size()) / static_cast<double>(triangles);
+    if (lanes_ > 0) statistics.leaf_fill = static_cast<double>(references.size()) / static_cast<double>(lanes_);
+    if (triangles > 0) statistics.duplication = static_cast<double>(references.size()) / static_cast<double>(triangles);
     if (statistics.nodes > 0) {
       statistics.children_per_node = static_cast<double>(children_) / static_cast<double>(statistics.nodes);
     }
@@ -96,8 +94,8 @@ class Recorder final : public StructureVisitor {
 
 }  // namespace
 
-StructureStatistics compute_statistics(const Accel& accel, const TriangleMesh& mesh,
-                                       const BuilderParameters& costs, bool slow_ones) {
+StructureStatistics compute_statistics(const Accel& accel, const TriangleMesh& mesh, const BuilderParameters& costs,
+                                       bool slow_ones) {
   Recorder recorder(costs);
   StructureStatistics none;
   none.bytes = accel.bytes();

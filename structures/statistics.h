@@ -19,14 +19,14 @@ struct StructureStatistics {
   /// that are not of its subtree) / (area of all triangles).
   double epo = 0.0;
   double epo_sampled = 0.0;  ///< share of the nodes and leaves that went into epo: 1 is all, less an estimate
-  /// Leaf-count variability: the standard deviation of the number of leaf boxes that a random line through the root's box
-  /// meets (leaf_count_variability.h), and the mean of that number; `lcv_lines` lines were drawn.
+  /// Leaf-count variability: the standard deviation of the number of leaf boxes that a random line through the root's
+  /// box meets (leaf_count_variability.h), and the mean of that number; `lcv_lines` lines were drawn.
   double lcv = 0.0, leaves_per_line = 0.0;
   std::size_t lcv_lines = 0;
   std::size_t nodes = 0, leaves = 0, references = 0, blocks = 0;
-  unsigned depth = 0;  ///< of the deepest leaf; a root that is a leaf has 0
+  unsigned depth = 0;                                     ///< of the deepest leaf; a root that is a leaf has 0
   std::size_t bytes = 0, node_bytes = 0, leaf_bytes = 0;  ///< what is neither node nor leaf is bytes less the two
-  double leaf_fill = 0.0;    ///< references / (blocks * block width)
+  double leaf_fill = 0.0;                                 ///< references / (blocks * block width)
   double duplication = 0.0;  ///< references / triangles of the mesh: above 1 where leaves share triangles
   double children_per_node = 0.0;
   std::vector<std::size_t> depth_histogram;  ///< leaves at each depth

@@ -61,7 +61,8 @@ std::uint64_t crc_of_pieces(Bytes bytes) {
 
 std::uint64_t checksum_of(StructureFileHeader header, Bytes file) {
   header.checksum = 0;
-  const std::uint64_t sums[] = {crc_of_pieces(std::as_bytes(std::span(&header, 1))), crc_of_pieces(file.subspan(sizeof header))};
+  const std::uint64_t sums[] = {crc_of_pieces(std::as_bytes(std::span(&header, 1))),
+                                crc_of_pieces(file.subspan(sizeof header))};
   return crc_of_pieces(std::as_bytes(std::span(sums)));
 }
 
@@ -69,8 +70,11 @@ std::uint64_t checksum_of(StructureFileHeader header, Bytes file) {
 class MappedFile {
  public:
   explicit MappedFile(const std::filesystem::path& file)
-      : region_(boost::interprocess::file_mapping(file.c_str(), boost::interprocess::read_only), boost::interprocess::read_only) {}
-  [[nodiscard]] Bytes bytes() const { return {static_cast<const std::byte*>(region_.get_address()), region_.get_size()}; }
+      : region_(boost::interprocess::file_mapping(file.c_str(), boost::interprocess::read_only),
+                boost::interprocess::read_only) {}
+  [[nodiscard]] Bytes bytes() const {
+    return {static_cast<const std::byte*>(region_.get_address()), region_.get_size()};
+  }
 
  private:
   boost::interprocess::mapped_region region_;
@@ -78,16 +82,19 @@ class MappedFile {
 
 StructureFileHeader header_of(const TriangleMesh& mesh) {
   StructureFileHeader header;
-  header.mesh_hash = hash_of(mesh), header.mesh_vertices = mesh.vertices.size(), header.mesh_triangles = mesh.triangles.size();
+  header.mesh_hash = hash_of(mesh), header.mesh_vertices = mesh.vertices.size(),
+  header.mesh_triangles = mesh.triangles.size();
   return header;
 }
 
 /// f(name, value) for every parameter. The compiler refuses it when BuilderParameters has one that is not named here.
 template <class F>
 void for_each_parameter(const BuilderParameters& parameters, F&& f) {
-  const auto& [bins, traversal_cost, intersection_cost, max_leaf_blocks, morton_bits, ploc_radius, duplication_budget, spatial_overlap,
-               spatial_gain, reinsertion_rounds, reinsertion_top, empty_bonus, max_depth, grid_density, below, collapse] = parameters;
-  f("bins", bins), f("traversal_cost", traversal_cost), f("intersection_cost", intersection_cost), f("max_leaf_blocks", max_leaf_blocks);
+  const auto& [bins, traversal_cost, intersection_cost, max_leaf_blocks, morton_bits, ploc_radius, duplication_budget,
+               spatial_overlap, spatial_gain, reinsertion_rounds, reinsertion_top, empty_bonus, max_depth, grid_density,
+               below, collapse] = parameters;
+  f("bins", bins), f("traversal_cost", traversal_cost), f("intersection_cost", intersection_cost),
+      f("max_leaf_blocks", max_leaf_blocks);
   f("morton_bits", morton_bits), f("ploc_radius", ploc_radius), f("duplication_budget", duplication_budget);
   f("spatial_overlap", spatial_overlap), f("spatial_gain", spatial_gain), f("reinsertion_rounds", reinsertion_rounds);
   f("reinsertion_top", reinsertion_top), f("empty_bonus", empty_bonus), f("max_depth", max_depth);
@@ -106,13 +113,15 @@ std::string parameters_of(const StructureInfo& info, const BuildSettings& settin
 /// What a header is wrong in, before anything behind it is looked at.
 void check_header(const std::filesystem::path& file, const StructureFileHeader& header, std::uint64_t bytes) {
   if (header.magic != kMagic) refuse(file, "is no saved structure; give a file that arboretum saved");
-  if (header.byte_order != kByteOrder) refuse(file, "was saved on a machine of the other byte order, or is damaged; build and save it again");
+  if (header.byte_order != kByteOrder)
+    refuse(file, "was saved on a machine of the other byte order, or is damaged; build and save it again");
   if (header.version != kVersion) {
-    refuse(file, "is of format version " + std::to_string(header.version) + ", this build reads version " + std::to_string(kVersion) +
-                     "; build and save it again");
+    refuse(file, "is of format version " + std::to_string(header.version) + ", this build reads version " +
+                     std::to_string(kVersion) + "; build and save it again");
   }
   if (bytes < header.file_bytes) {
-    refuse(file, "is truncated: " + std::to_string(bytes) + " of " + std::to_string(header.file_bytes) + " bytes; build and save it again");
+    refuse(file, "is truncated: " + std::to_string(bytes) + " of " + std::to_string(header.file_bytes) +
+                     " bytes; build and save it again");
   }
 }
 
@@ -121,17 +130,20 @@ void check_name(const std::filesystem::path& file, Archive& archive, const char*
   std::string saved;
   archive(saved);
   if (saved != wanted) {
-    refuse(file, std::string("holds ") + what + " '" + saved + "', not '" + std::string(wanted) + "'; ask for what it holds, or build anew");
+    refuse(file, std::string("holds ") + what + " '" + saved + "', not '" + std::string(wanted) +
+                     "'; ask for what it holds, or build anew");
   }
 }
 
-void write_whole(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings, const std::filesystem::path& file) {
+void write_whole(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings,
+                 const std::filesystem::path& file) {
   StructureFileHeader header = header_of(mesh);
   header.program = program_digest();
   std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
   stream.write(reinterpret_cast<const char*>(&header), sizeof header);
   Archive archive(stream, mesh);
-  std::string name(accel.info().name), builder = settings.builder, leaf = settings.leaf, parameters = parameters_of(accel.info(), settings);
+  std::string name(accel.info().name), builder = settings.builder, leaf = settings.leaf,
+                                       parameters = parameters_of(accel.info(), settings);
   archive(name, builder, leaf, parameters);
   accel.archive(archive);
   header.file_bytes = static_cast<std::uint64_t>(stream.tellp());
@@ -162,9 +174,11 @@ std::string text_of(const BuilderParameters& parameters) {
 }
 
 std::uint64_t hash_of(const TriangleMesh& mesh) {
-  std::vector<std::uint64_t> parts{mesh.vertices.size(), mesh.triangles.size(), crc_of_pieces(std::as_bytes(std::span(mesh.vertices))),
+  std::vector<std::uint64_t> parts{mesh.vertices.size(), mesh.triangles.size(),
+                                   crc_of_pieces(std::as_bytes(std::span(mesh.vertices))),
                                    crc_of_pieces(std::as_bytes(std::span(mesh.triangles)))};
-  for (const std::vector<Vec3f>& frame : mesh.later_frames) parts.push_back(crc_of_pieces(std::as_bytes(std::span(frame))));
+  for (const std::vector<Vec3f>& frame : mesh.later_frames)
+    parts.push_back(crc_of_pieces(std::as_bytes(std::span(frame))));
   if (mesh.instancing) {
     parts.push_back(crc_of_pieces(std::as_bytes(std::span(mesh.instancing->instances))));
     for (const TriangleMesh& prototype : mesh.instancing->prototypes) parts.push_back(hash_of(prototype));
@@ -203,7 +217,8 @@ std::string structure_file_name(std::string_view name, const TriangleMesh& mesh,
   return std::string(name) + "-" + settings.builder + "-" + settings.leaf + hashes;
 }
 
-void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings, const std::filesystem::path& file) {
+void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings,
+                    const std::filesystem::path& file) {
   const std::filesystem::path unfinished = file.string() + "." + std::to_string(::getpid()) + ".unfinished";
   try {
     write_whole(accel, mesh, settings, unfinished);
@@ -221,9 +236,12 @@ std::unique_ptr<Accel> load_structure(std::string_view name, const TriangleMesh&
   const StructureEntry* entry = find_structure(name);
   if (!entry) throw UserError("there is no structure '" + std::string(name) + "'; see `arboretum list structures`");
   std::error_code error;
-  const std::uint64_t size = std::filesystem::is_regular_file(file, error) ? std::filesystem::file_size(file, error) : 0;
-  if (error || !std::filesystem::is_regular_file(file, error)) refuse(file, "is no file; build and save the structure first");
-  if (size < sizeof(StructureFileHeader)) refuse(file, "is no saved structure: too short; give a file that arboretum saved");
+  const std::uint64_t size =
+      std::filesystem::is_regular_file(file, error) ? std::filesystem::file_size(file, error) : 0;
+  if (error || !std::filesystem::is_regular_file(file, error))
+    refuse(file, "is no file; build and save the structure first");
+  if (size < sizeof(StructureFileHeader))
+    refuse(file, "is no saved structure: too short; give a file that arboretum saved");
   std::unique_ptr<MappedFile> mapped;
   try {
     mapped = std::make_unique<MappedFile>(file);
@@ -245,14 +263,17 @@ std::unique_ptr<Accel> load_structure(std::string_view name, const TriangleMesh&
   check_name(file, archive, "leaf", settings.leaf);
   check_name(file, archive, "parameters", parameters_of(entry->info, settings));
   const StructureFileHeader wanted = header_of(mesh);
-  if (header.mesh_hash != wanted.mesh_hash || header.mesh_vertices != wanted.mesh_vertices || header.mesh_triangles != wanted.mesh_triangles) {
+  if (header.mesh_hash != wanted.mesh_hash || header.mesh_vertices != wanted.mesh_vertices ||
+      header.mesh_triangles != wanted.mesh_triangles) {
     refuse(file, "was built from another mesh (" + std::to_string(header.mesh_triangles) + " triangles, this one has " +
                      std::to_string(mesh.size()) + "); load it with the mesh that it was built from");
   }
   std::unique_ptr<Accel> accel = entry->create();
   try {
     accel->archive(archive);
-    if (archive.rest() > 0) throw UserError("was saved by another build of arboretum: it holds more than this structure reads; build and save it again");
+    if (archive.rest() > 0)
+      throw UserError(
+          "was saved by another build of arboretum: it holds more than this structure reads; build and save it again");
   } catch (const UserError& e) {
     refuse(file, e.what());
   }

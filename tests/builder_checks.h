@@ -23,10 +23,12 @@ namespace arboretum::test {
 inline constexpr std::string_view kReinsertion = "_reinsertion";
 
 /// Builders that may refer to a triangle more than once, from boxes that hold parts of it.
-inline bool splits_triangles(std::string_view builder) { return builder.starts_with("spatial") || builder.starts_with("embree_high"); }
+inline bool splits_triangles(std::string_view builder) {
+  return builder.starts_with("spatial") || builder.starts_with("embree_high");
+}
 
-inline BinaryTree build(std::string_view builder, const TriangleMesh& mesh, unsigned leaf_width, unsigned threads = 1, Isa isa = best_isa(),
-                        const BuilderParameters& parameters = {}) {
+inline BinaryTree build(std::string_view builder, const TriangleMesh& mesh, unsigned leaf_width, unsigned threads = 1,
+                        Isa isa = best_isa(), const BuilderParameters& parameters = {}) {
   BuildSettings settings;
   settings.builder = builder, settings.isa = isa, settings.threads = threads, settings.parameters = parameters;
   BinaryTree tree;
@@ -47,7 +49,9 @@ inline bool covers(const std::vector<Bounds3f>& boxes, const std::array<Vec3f, 3
       const Vec3f p = corner[0] * (1 - u - v) + corner[1] * u + corner[2] * v;  // rounded: allow for that
       const float slack = 1e-5f * std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
       const Vec3f s{slack, slack, slack};
-      const bool inside = std::ranges::any_of(boxes, [&](const Bounds3f& b) { return Bounds3f{b.lower - s, b.upper + s}.contains({p, p}); });
+      const bool inside = std::ranges::any_of(boxes, [&](const Bounds3f& b) {
+        return Bounds3f{b.lower - s, b.upper + s}.contains({p, p});
+      });
       if (!inside) return false;
     }
   }
@@ -80,7 +84,8 @@ inline Facts check_tree(const BinaryTree& tree, const TriangleMesh& mesh, unsign
     stack.pop_back();
     const BinaryNode& node = tree.nodes[index];
     put(depth), put(node.count);
-    for (int axis = 0; axis < 3; ++axis) put(std::bit_cast<std::uint32_t>(node.lower[axis])), put(std::bit_cast<std::uint32_t>(node.upper[axis]));
+    for (int axis = 0; axis < 3; ++axis)
+      put(std::bit_cast<std::uint32_t>(node.lower[axis])), put(std::bit_cast<std::uint32_t>(node.upper[axis]));
     if (!node.is_leaf()) {
       if (node.left + 1 >= tree.node_count) FAIL("a child beyond the last node");
       const BinaryNode &left = tree.nodes[node.left], &right = tree.nodes[node.left + 1];
@@ -125,7 +130,8 @@ inline TriangleMesh copies(const std::vector<Vec3f>& centres, const std::vector<
   for (std::size_t i = 0; i < centres.size(); ++i) {
     const auto first = std::uint32_t(mesh.vertices.size());
     const float h = 0.5f * sizes[i];
-    for (const Vec3f corner : {Vec3f{-h, -h, 0}, Vec3f{h, -h, 0}, Vec3f{-h, h, 0}}) mesh.vertices.push_back(centres[i] + corner);
+    for (const Vec3f corner : {Vec3f{-h, -h, 0}, Vec3f{h, -h, 0}, Vec3f{-h, h, 0}})
+      mesh.vertices.push_back(centres[i] + corner);
     mesh.triangles.push_back({first, first + 1, first + 2});
   }
   return mesh;

@@ -10,8 +10,8 @@
 
 namespace arboretum::test {
 
-/// Requires ok(i) for each i below `count`, as one assertion; describe(i) is text that is only asked for where one fails. Catch
-/// takes a microsecond for an assertion with its messages, more than a ray takes.
+/// Requires ok(i) for each i below `count`, as one assertion; describe(i) is text that is only asked for where one
+/// fails. Catch takes a microsecond for an assertion with its messages, more than a ray takes.
 template <class Ok, class Describe>
 void require_each(std::size_t count, const Ok& ok, const Describe& describe) {
   std::size_t first = 0;

@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 /// A folder of its own that goes away with the test.
 struct TemporaryFolder {
   inline static int made = 0;
-  fs::path path = fs::temp_directory_path() / ("arboretum-test-" + std::to_string(::getpid()) + "-" + std::to_string(++made));
+  fs::path path =
+      fs::temp_directory_path() / ("arboretum-test-" + std::to_string(::getpid()) + "-" + std::to_string(++made));
   TemporaryFolder() { fs::remove_all(path), fs::create_directories(path); }
   ~TemporaryFolder() { fs::remove_all(path); }
   fs::path write(const std::string& name, const std::string& text) const {
@@ -30,16 +31,9 @@ struct TemporaryFolder {
 
 // Two structures and a handful of kernels that exist on paper alone: what a plan needs.
 inline const StructureEntry kStructures[] = {
-    {{.name = "tree",
-      .summary = "a tree",
-      .builders = {"binned_sah", "morton"},
-      .leaves = {"triangle4", "triangle8"}},
+    {{.name = "tree", .summary = "a tree", .builders = {"binned_sah", "morton"}, .leaves = {"triangle4", "triangle8"}},
      nullptr},
-    {{.name = "list",
-      .summary = "a list",
-      .builders = {"none"},
-      .leaves = {"triangle4"},
-      .uses_parameters = false},
+    {{.name = "list", .summary = "a list", .builders = {"none"}, .leaves = {"triangle4"}, .uses_parameters = false},
      nullptr},
 };
 
@@ -50,8 +44,18 @@ inline std::vector<KernelRow> paper_kernels() {
       for (std::string_view box : {"fast", "padded"})
         for (std::string_view leaf : {"triangle4", "triangle8"})
           for (std::string_view traversal : {"single", "packet4", "packet8", "packet16"})
-            rows.push_back({.structure = "tree", .leaf = leaf, .intersector = intersector, .box = box, .traversal = traversal, .isa = isa});
-    rows.push_back({.structure = "list", .leaf = "triangle4", .intersector = "moller_trumbore", .box = "fast", .traversal = "single", .isa = isa});
+            rows.push_back({.structure = "tree",
+                            .leaf = leaf,
+                            .intersector = intersector,
+                            .box = box,
+                            .traversal = traversal,
+                            .isa = isa});
+    rows.push_back({.structure = "list",
+                    .leaf = "triangle4",
+                    .intersector = "moller_trumbore",
+                    .box = "fast",
+                    .traversal = "single",
+                    .isa = isa});
   }
   return rows;
 }
@@ -65,8 +69,9 @@ inline Registry paper_registry(std::vector<Isa> isas = {Isa::scalar, Isa::sse, I
   registry.default_leaf = [](std::string_view structure, std::string_view, Isa isa) -> std::string_view {
     return structure == "tree" && isa >= Isa::avx2 ? "triangle8" : "triangle4";
   };
-  registry.why_no_kernel = [](std::string_view structure, auto, std::string_view intersector, auto, auto,
-                              Isa) { return std::string(structure) + " has no " + std::string(intersector); };
+  registry.why_no_kernel = [](std::string_view structure, auto, std::string_view intersector, auto, auto, Isa) {
+    return std::string(structure) + " has no " + std::string(intersector);
+  };
   return registry;
 }
 

@@ -15,8 +15,8 @@ namespace arboretum::test::kd {
 
 inline const char* const kBuilders[] = {"binned_sah", "sweep_sah"};
 
-inline std::unique_ptr<Accel> build(const TriangleMesh& mesh, const char* builder, std::string_view leaf = "triangle4v", unsigned threads = 1,
-                             const BuilderParameters& parameters = {}) {
+inline std::unique_ptr<Accel> build(const TriangleMesh& mesh, const char* builder, std::string_view leaf = "triangle4v",
+                                    unsigned threads = 1, const BuilderParameters& parameters = {}) {
   BuildSettings settings;
   settings.builder = builder, settings.leaf = leaf, settings.threads = threads, settings.parameters = parameters;
   BuildReport report;
@@ -69,7 +69,8 @@ inline TriangleMesh powers_of_two() {
   TriangleMesh mesh;
   for (int i = -38; i <= 38; ++i) {
     const float x = std::ldexp(1.0f, i), s = std::ldexp(1.0f, i - 2);
-    for (int k = 0; k < 5; ++k) add_triangle(mesh, {x, 0, 0.01f * float(k) * s}, {x + s, 0, 0.01f * float(k) * s}, {x, s, 0.01f * float(k) * s});
+    for (int k = 0; k < 5; ++k)
+      add_triangle(mesh, {x, 0, 0.01f * float(k) * s}, {x + s, 0, 0.01f * float(k) * s}, {x, s, 0.01f * float(k) * s});
   }
   return mesh;
 }

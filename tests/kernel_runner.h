@@ -27,22 +27,28 @@ namespace arboretum::test {
   return name;
 }
 
-/// The rows of the ISAs that are available here, without most that are other rows' code put together anew: an intersector is compiled once and called
-/// by every structure and traversal through the same pointers. The two that most kernels are run with are there everywhere; `pluecker` and
-/// `exact` for single rays everywhere and in one mode of each kind; the others with a BVH, a kd-tree and the reference. Leaves that are
-/// called by the same functions are all there for single rays in bvh8, elsewhere once. Scalar ways of traversal are there with bvh8.
+/// The rows of the ISAs that are available here, without most that are other rows' code put together anew: an
+/// intersector is compiled once and called by every structure and traversal through the same pointers. The two that
+/// most kernels are run with are there everywhere; `pluecker` and `exact` for single rays everywhere and in one mode of
+/// each kind; the others with a BVH, a kd-tree and the reference. Leaves that are called by the same functions are all
+/// there for single rays in bvh8, elsewhere once. Scalar ways of traversal are there with bvh8.
 [[nodiscard]] inline std::vector<KernelRow> runnable_rows() {
   std::vector<KernelRow> rows;
-  std::set<std::tuple<std::string_view, std::string_view, std::string_view, std::string_view, Isa, ClosestHitFunction>> seen;
+  std::set<std::tuple<std::string_view, std::string_view, std::string_view, std::string_view, Isa, ClosestHitFunction>>
+      seen;
   for (const KernelRow& row : kernel_table()) {
     if (!is_available(row.isa)) continue;
-    const bool single = row.traversal == "single", reference = row.structure == "bvh8" || row.structure == "brute_force";
+    const bool single = row.traversal == "single",
+               reference = row.structure == "bvh8" || row.structure == "brute_force";
     const bool common = row.intersector == "moller_trumbore" || row.intersector == "watertight";
     if (row.isa == Isa::scalar && !single && !reference) continue;
     const bool mode = single || (row.structure == "bvh8" && (row.traversal == "packet64" || row.traversal == "queued"));
     if (!common && !mode) continue;
-    if (!common && row.intersector != "pluecker" && row.intersector != "exact" && !reference && row.structure != "kdtree") continue;
-    const bool first = seen.insert({row.structure, row.intersector, row.box, row.traversal, row.isa, row.timed.closest_hit}).second;
+    if (!common && row.intersector != "pluecker" && row.intersector != "exact" && !reference &&
+        row.structure != "kdtree")
+      continue;
+    const bool first =
+        seen.insert({row.structure, row.intersector, row.box, row.traversal, row.isa, row.timed.closest_hit}).second;
     if (first || (single && row.structure == "bvh8")) rows.push_back(row);
   }
   return rows;
@@ -71,16 +77,15 @@ class Structures {
 
 /// With `counters`, the counting kernel. Answers that the kernel leaves unwritten are marked: t is NaN, an id
 /// 0xdeadbeef.
-[[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel,
-                                                  std::span<const Ray> rays, Counters* counters = nullptr) {
+[[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays,
+                                                  Counters* counters = nullptr) {
   std::vector<Hit> hits(rays.size(), Hit{std::numeric_limits<float>::quiet_NaN(), 0, 0, 0xdeadbeefu});
   row.closest_hit(accel, rays, hits, counters);
   return hits;
 }
 
 [[nodiscard]] inline std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel,
-                                                       std::span<const Ray> rays,
-                                                       Counters* counters = nullptr) {
+                                                       std::span<const Ray> rays, Counters* counters = nullptr) {
   std::vector<std::uint8_t> occluded(rays.size(), 0xee);
   row.any_hit(accel, rays, occluded, counters);
   return occluded;
@@ -99,7 +104,8 @@ class Answers {
   /// `row`: a row of kernel_table() itself.
   [[nodiscard]] const Both& of(const KernelRow& row) {
     const auto [entry, is_new] = known_.try_emplace(&row);
-    if (is_new) entry->second = {closest_hit(row, structures_.get(row), rays_), any_hit(row, structures_.get(row), rays_)};
+    if (is_new)
+      entry->second = {closest_hit(row, structures_.get(row), rays_), any_hit(row, structures_.get(row), rays_)};
     return entry->second;
   }
 

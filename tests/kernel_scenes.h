@@ -20,8 +20,8 @@ struct KernelScene {
   TriangleMesh mesh;
 };
 
-[[nodiscard]] inline float uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension,
-                                   float low, float high) {
+[[nodiscard]] inline float uniform(std::uint64_t seed, std::uint64_t index, std::uint64_t dimension, float low,
+                                   float high) {
   return low + (high - low) * random_float(seed, index, dimension);
 }
 
@@ -71,8 +71,8 @@ struct KernelScene {
   for (std::uint32_t r = 1; r < rings; ++r) {
     for (std::uint32_t k = 0; k < around; ++k) {
       const double theta = pi * r / rings, phi = 2 * pi * k / around;
-      mesh.vertices.push_back({float(std::sin(theta) * std::cos(phi)), float(std::sin(theta) * std::sin(phi)),
-                               float(std::cos(theta))});
+      mesh.vertices.push_back(
+          {float(std::sin(theta) * std::cos(phi)), float(std::sin(theta) * std::sin(phi)), float(std::cos(theta))});
     }
   }
   mesh.vertices.push_back({0, 0, -1});
@@ -124,13 +124,11 @@ struct KernelScene {
 
 /// Rays that meet nothing special: from around the scene through its inside, some short, some starting late,
 /// some along an axis.
-[[nodiscard]] inline std::vector<Ray> generic_rays(const TriangleMesh& mesh, std::size_t count,
-                                                   std::uint64_t seed) {
+[[nodiscard]] inline std::vector<Ray> generic_rays(const TriangleMesh& mesh, std::size_t count, std::uint64_t seed) {
   const Bounds3f box = mesh.bounds();
   const Vec3f extent = box.extent();
   const float largest = std::max({extent.x, extent.y, extent.z});
-  const Bounds3f around{box.lower - Vec3f{largest, largest, largest},
-                        box.upper + Vec3f{largest, largest, largest}};
+  const Bounds3f around{box.lower - Vec3f{largest, largest, largest}, box.upper + Vec3f{largest, largest, largest}};
   std::vector<Ray> rays;
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3f from = uniform_point(seed, i, 0, around), to = uniform_point(seed, i, 3, box);

@@ -26,19 +26,13 @@ inline Number number(float x) {
   const boost::multiprecision::cpp_int power = boost::multiprecision::cpp_int(1) << std::abs(exponent);
   return exponent >= 0 ? Number(mantissa * power) : Number(mantissa) / Number(power);
 }
-inline Point point(Vec3f p) {
-  return {number(p.x), number(p.y), number(p.z)};
-}
-inline Point sub(const Point& a, const Point& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-inline Number dot(const Point& a, const Point& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+inline Point point(Vec3f p) { return {number(p.x), number(p.y), number(p.z)}; }
+inline Point sub(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+inline Number dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 /// det[a, b, c] by the rule of Sarrus.
 inline Number det(const Point& a, const Point& b, const Point& c) {
-  return a[0] * b[1] * c[2] + a[1] * b[2] * c[0] + a[2] * b[0] * c[1] - a[2] * b[1] * c[0] -
-         a[1] * b[0] * c[2] - a[0] * b[2] * c[1];
+  return a[0] * b[1] * c[2] + a[1] * b[2] * c[0] + a[2] * b[0] * c[1] - a[2] * b[1] * c[0] - a[1] * b[0] * c[2] -
+         a[0] * b[2] * c[1];
 }
 
 struct Answer {

@@ -45,7 +45,8 @@ struct Trace {
 };
 
 /// Renders with a structure of the default builder; fails the test where there is no such row.
-inline Picture picture_of(const Scene& scene, EffectSet effects, RenderSettings settings, Trace trace = {}, RenderStatistics* statistics = nullptr) {
+inline Picture picture_of(const Scene& scene, EffectSet effects, RenderSettings settings, Trace trace = {},
+                          RenderStatistics* statistics = nullptr) {
   const RenderScene ready(scene, effects);
   if (ready.mesh().moves()) trace.structure = "bvh4_motion";
   const std::string_view below = trace.structure == "two_level" ? "bvh8" : trace.structure;

@@ -74,8 +74,7 @@ inline std::string obj_text() {
   for (const auto& v : kCorners)
     s += "v " + std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + "\n";
   for (const auto& f : kFaces)
-    s += "f " + std::to_string(f[0] + 1) + " " + std::to_string(f[1] + 1) + " " + std::to_string(f[2] + 1) +
-         "\n";
+    s += "f " + std::to_string(f[0] + 1) + " " + std::to_string(f[1] + 1) + " " + std::to_string(f[2] + 1) + "\n";
   return s;
 }
 

@@ -14,12 +14,8 @@ namespace arboretum {
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : seed_(seed) {}
-  float uniform(float low = -1.0f, float high = 1.0f) {
-    return low + (high - low) * random_float(seed_, next_++, 0);
-  }
-  int integer(int count) {
-    return static_cast<int>(random_bits(seed_, next_++, 1) % static_cast<unsigned>(count));
-  }
+  float uniform(float low = -1.0f, float high = 1.0f) { return low + (high - low) * random_float(seed_, next_++, 0); }
+  int integer(int count) { return static_cast<int>(random_bits(seed_, next_++, 1) % static_cast<unsigned>(count)); }
   /// Signed, the logarithm uniform in base 2: from 2^low to 2^high.
   float exponential(float low, float high) {
     const float size = std::exp2(uniform(low, high));

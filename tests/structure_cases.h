@@ -1,7 +1,8 @@
-// What the structure-level cases B01 to B30 share: every structure x every builder that it takes, with the default leaf on the
-// best ISA that runs here, and the comparison of its answers with brute_force's and with exact arithmetic.
+// What the structure-level cases B01 to B30 share: every structure x every builder that it takes, with the default leaf
+// on the best ISA that runs here, and the comparison of its answers with brute_force's and with exact arithmetic.
 //
-// Embree is left out: it promises none of this (ties, padded boxes), and Debian's build aborts by assertion on some of it.
+// Embree is left out: it promises none of this (ties, padded boxes), and Debian's build aborts by assertion on some of
+// it.
 #pragma once
 
 #include <iostream>
@@ -50,14 +51,16 @@ struct Combination {
   }
 };
 
-/// Single rays with four intersectors; with `modes` the other ways of traversal, too, with `watertight`. A tree is at stake here, not an
-/// intersector: those are called by all structures through the same pointers.
-[[nodiscard]] inline std::vector<const KernelRow*> rows_of(std::string_view structure, std::string_view leaf, bool modes) {
+/// Single rays with four intersectors; with `modes` the other ways of traversal, too, with `watertight`. A tree is at
+/// stake here, not an intersector: those are called by all structures through the same pointers.
+[[nodiscard]] inline std::vector<const KernelRow*> rows_of(std::string_view structure, std::string_view leaf,
+                                                           bool modes) {
   std::vector<const KernelRow*> rows;
   for (const KernelRow& row : kernel_table()) {
     if (row.structure != structure || row.leaf != leaf || row.isa != tested_isa()) continue;
     const bool single = row.traversal == "single", crack_free = row.intersector == "watertight";
-    const bool common = crack_free || row.intersector == "moller_trumbore" || row.intersector == "pluecker" || row.intersector == "exact";
+    const bool common = crack_free || row.intersector == "moller_trumbore" || row.intersector == "pluecker" ||
+                        row.intersector == "exact";
     if (single ? common : modes && crack_free) rows.push_back(&row);
   }
   return rows;
@@ -72,8 +75,9 @@ struct Combination {
       const std::string leaf(default_leaf(entry.info.name, "watertight", tested_isa()));
       for (std::string_view builder : entry.info.builders)
         // What stands above others hands the builder on: one stands for all, with the default structure below.
-        if (!entry.info.takes_below || builder == entry.info.builders.front()) 
-          list.push_back({&entry, std::string(builder), leaf, rows_of(entry.info.name, leaf, builder == entry.info.builders.front())});
+        if (!entry.info.takes_below || builder == entry.info.builders.front())
+          list.push_back({&entry, std::string(builder), leaf,
+                          rows_of(entry.info.name, leaf, builder == entry.info.builders.front())});
     }
     return list;
   }();
@@ -104,18 +108,22 @@ inline StructureStatistics statistics_of(const Accel& accel, const TriangleMesh&
   return compute_statistics(accel, mesh, {}, false);
 }
 
-/// Where a structure is known to differ from brute_force with padded boxes, and why. It must then be right to 2^-12 of t.
+/// Where a structure is known to differ from brute_force with padded boxes, and why. It must then be right to 2^-12 of
+/// t.
 struct KnownLimit {
   std::string_view test, structure, reason;
 };
 inline constexpr KnownLimit kKnownLimits[] = {
     {"B14", "kdtree",
-     "watertight takes a neighbour that the exact ray passes by: among vertices a thousand times farther apart than that neighbour is "
-     "large, its sheared vertices are off by more than the kd-tree's pad, and the cells of a clipped triangle are no larger than it"},
+     "watertight takes a neighbour that the exact ray passes by: among vertices a thousand times farther apart than "
+     "that neighbour is "
+     "large, its sheared vertices are off by more than the kd-tree's pad, and the cells of a clipped triangle are no "
+     "larger than it"},
 };
 [[nodiscard]] inline bool has_known_limit(std::string_view structure) {
   const std::string test = Catch::getResultCapture().getCurrentTestName();
-  return std::ranges::any_of(kKnownLimits, [&](const KnownLimit& l) { return test.starts_with(l.test) && l.structure == structure; });
+  return std::ranges::any_of(kKnownLimits,
+                             [&](const KnownLimit& l) { return test.starts_with(l.test) && l.structure == structure; });
 }
 
 /// Exact answers and brute_force's to the same rays; one set of the latter for each intersector.
@@ -139,11 +147,13 @@ class Reference {
     const auto accel = build_structure("brute_force", mesh_, settings, report);
     return entry->second = closest_hit(*row, *accel, rays_);
   }
-  [[nodiscard]] AnswerCheck check(std::span<const Hit> hits) const { return oracle_.check_closest_hit(rays_, truth_, hits); }
+  [[nodiscard]] AnswerCheck check(std::span<const Hit> hits) const {
+    return oracle_.check_closest_hit(rays_, truth_, hits);
+  }
 
   /// With padded boxes: brute_force's hits, bit for bit, and any hit as closest hit. With `watertight` that holds for
-  /// every ray; other intersectors may take a triangle that the exact ray passes by, which a structure need not find, so
-  /// they are compared where brute_force has the exact primitive. other boxes may lose hits, but give no other ids.
+  /// every ray; other intersectors may take a triangle that the exact ray passes by, which a structure need not find,
+  /// so they are compared where brute_force has the exact primitive. other boxes may lose hits, but give no other ids.
   void check(const Combination& combination, const Accel& accel) {
     const bool limited = has_known_limit(combination.entry->info.name);
     for (const KernelRow* row : combination.rows) {
@@ -152,14 +162,18 @@ class Reference {
       const std::vector<std::uint8_t> any = test::any_hit(*row, accel, rays_);
       const std::vector<Hit>& expected = brute_force(row->intersector);
       const auto agrees = [&](std::size_t i) {
-        const bool right = expected[i].is_hit() == truth_[i].hit.is_hit() && expected[i].primitive == truth_[i].hit.primitive;
+        const bool right =
+            expected[i].is_hit() == truth_[i].hit.is_hit() && expected[i].primitive == truth_[i].hit.primitive;
         if (row->intersector != "watertight" && !right) return true;
         if (row->box != "padded") return !hits[i].is_hit() || hits[i].primitive < mesh_.size();
-        if (limited && hits[i].is_hit() && std::abs(hits[i].t - expected[i].t) <= 0x1p-12f * std::abs(expected[i].t)) return true;
-        return same_bits(std::span(&hits[i], 1), std::span(&expected[i], 1)) && any[i] == std::uint8_t(expected[i].is_hit());
+        if (limited && hits[i].is_hit() && std::abs(hits[i].t - expected[i].t) <= 0x1p-12f * std::abs(expected[i].t))
+          return true;
+        return same_bits(std::span(&hits[i], 1), std::span(&expected[i], 1)) &&
+               any[i] == std::uint8_t(expected[i].is_hit());
       };
-      require_each(rays_.size(), agrees,
-                   [&](std::size_t i) { return text(hits[i]) + ", any hit " + std::to_string(any[i]) + "; brute_force: " + text(expected[i]); });
+      require_each(rays_.size(), agrees, [&](std::size_t i) {
+        return text(hits[i]) + ", any hit " + std::to_string(any[i]) + "; brute_force: " + text(expected[i]);
+      });
     }
   }
 
@@ -174,10 +188,11 @@ class Reference {
 /// Where rays are aimed at edges that bound the surface, a float test may take the other side of what is exact.
 enum class Silhouettes { none, aimed_at };
 
-/// Every combination on the mesh: complete, and with brute_force's answers, whose `watertight` must be right on every ray
-/// that is not aimed at a silhouette. `f(combination, accel, statistics)` may look closer.
+/// Every combination on the mesh: complete, and with brute_force's answers, whose `watertight` must be right on every
+/// ray that is not aimed at a silhouette. `f(combination, accel, statistics)` may look closer.
 template <class F>
-void for_each_combination(const TriangleMesh& mesh, std::vector<Ray> rays, F&& f, Silhouettes silhouettes = Silhouettes::none) {
+void for_each_combination(const TriangleMesh& mesh, std::vector<Ray> rays, F&& f,
+                          Silhouettes silhouettes = Silhouettes::none) {
   Reference reference(mesh, std::move(rays));
   const AnswerCheck brute = reference.check(reference.brute_force("watertight"));
   CAPTURE(brute.missed_hits, brute.false_hits, brute.wrong_surface);
@@ -190,8 +205,10 @@ void for_each_combination(const TriangleMesh& mesh, std::vector<Ray> rays, F&& f
     f(combination, *accel, statistics);
   }
 }
-inline void for_each_combination(const TriangleMesh& mesh, std::vector<Ray> rays, Silhouettes silhouettes = Silhouettes::none) {
-  for_each_combination(mesh, std::move(rays), [](const Combination&, const Accel&, const StructureStatistics&) {}, silhouettes);
+inline void for_each_combination(const TriangleMesh& mesh, std::vector<Ray> rays,
+                                 Silhouettes silhouettes = Silhouettes::none) {
+  for_each_combination(
+      mesh, std::move(rays), [](const Combination&, const Accel&, const StructureStatistics&) {}, silhouettes);
 }
 
 /// A ray from `from` through `to`.

@@ -52,8 +52,14 @@ TEST_CASE("a t that is no normal number may be off by its rounding, not by two d
     float z;  ///< of a wall that a ray of direction (0, 0, 2) meets at half of it
     float answer;
     bool wrong;
-  } cases[] = {{3 * least, 2 * least, false}, {3 * least, least, false},     {3 * least, 3 * least, true}, {3 * least, 0, true},
-               {2 * least, least, false},     {2 * least, 2 * least, false}, {2 * least, 3 * least, true}, {0x1p-125f, 0x1p-126f + 0x1p-139f, false},
+  } cases[] = {{3 * least, 2 * least, false},
+               {3 * least, least, false},
+               {3 * least, 3 * least, true},
+               {3 * least, 0, true},
+               {2 * least, least, false},
+               {2 * least, 2 * least, false},
+               {2 * least, 3 * least, true},
+               {0x1p-125f, 0x1p-126f + 0x1p-139f, false},
                {0x1p-125f, 0x1p-126f + 0x1p-137f, true}};
   for (const auto& c : cases) {
     INFO("z " << c.z / least << ", answer " << c.answer / least << " denormals");
@@ -100,8 +106,7 @@ TEST_CASE("each wrong answer is counted for what it is") {
   };
   for (const Case& c : cases) {
     INFO(c.name);
-    const AnswerCheck check =
-        oracle.check_closest_hit({&c.ray, 1}, oracle.closest_hit({&c.ray, 1}), {&c.answer, 1});
+    const AnswerCheck check = oracle.check_closest_hit({&c.ray, 1}, oracle.closest_hit({&c.ray, 1}), {&c.answer, 1});
     CHECK(check.rays == 1);
     CHECK(check.hits == (c.answer.is_hit() ? 1u : 0u));
     CHECK(check.missed_hits == c.missed);
@@ -158,10 +163,10 @@ TEST_CASE("a miss is a crack where the surface is closed and not at its silhouet
     cases.push_back({"vertex of a ball from within", *mesh, {{0, 0, 0}, 0, vertex, kInf}, true});
     cases.push_back({"vertex of a ball from outside", *mesh, {vertex * 4.0f, 0, -vertex, kInf}, true});
     cases.push_back({"pole", *mesh, {{0, 0, 3}, 0, {0, 0, -1}, kInf}, true});
-    cases.push_back(
-        {"vertex at the silhouette", *mesh, {widest - Vec3f{0, 3, 0}, 0, {0, 3, 0}, kInf}, false});
+    cases.push_back({"vertex at the silhouette", *mesh, {widest - Vec3f{0, 3, 0}, 0, {0, 3, 0}, kInf}, false});
   }
-  TriangleMesh cone;  // so many triangles about its tip that a search which gave up would take its silhouette for a crack
+  // So many triangles about its tip that a search which gave up would take its silhouette for a crack
+  TriangleMesh cone;
   constexpr int kSides = 40000;
   const auto on_rim = [](int i) {
     const double angle = 2 * std::numbers::pi * (i % kSides) / kSides;

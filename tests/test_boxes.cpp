@@ -1,4 +1,5 @@
-// Every box test on every instruction set against rational arithmetic: which touched boxes it may miss, and which it may not.
+// Every box test on every instruction set against rational arithmetic: which touched boxes it may miss, and which it
+// may not.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -39,12 +40,15 @@ std::optional<Inside> inside(const Boxes& boxes, int lane, const Ray& ray) {
   Inside in{rational::number(std::max(ray.tnear, 0.0f)), {}};
   if (ray.tfar < kInfinity) in.last = rational::number(ray.tfar);
   for (int axis = 0; axis < 3; ++axis) {
-    const float lower = boxes.planes[2 * axis][lane], upper = boxes.planes[2 * axis + 1][lane], o = ray.origin[axis], d = ray.direction[axis];
+    const float lower = boxes.planes[2 * axis][lane], upper = boxes.planes[2 * axis + 1][lane], o = ray.origin[axis],
+                d = ray.direction[axis];
     if (d == 0.0f) {
       if (o < lower || o > upper) return {};
       continue;
     }
-    const auto at = [&](float plane) { return Number((rational::number(plane) - rational::number(o)) / rational::number(d)); };
+    const auto at = [&](float plane) {
+      return Number((rational::number(plane) - rational::number(o)) / rational::number(d));
+    };
     in.first = std::max(in.first, at(d > 0 ? lower : upper));
     const Number leaves = at(d > 0 ? upper : lower);
     in.last = in.last ? std::min(*in.last, leaves) : leaves;
@@ -53,8 +57,8 @@ std::optional<Inside> inside(const Boxes& boxes, int lane, const Ray& ray) {
   return in;
 }
 
-/// Eight boxes and a ray at one of their corners, edges or faces, along an axis or in a face; of sizes from 2^-20 to 2^20, up to 2^14 of it from the origin. Some rays come from up to 2^20
-/// boxes away.
+/// Eight boxes and a ray at one of their corners, edges or faces, along an axis or in a face; of sizes from 2^-20 to
+/// 2^20, up to 2^14 of it from the origin. Some rays come from up to 2^20 boxes away.
 struct Draw {
   std::uint64_t number, next = 0;
   float in(float low, float high) { return low + (high - low) * random_float(77, number, next++); }
@@ -65,7 +69,8 @@ struct Draw {
   float max_coordinate = 0.0f;
 
   explicit Draw(std::uint64_t i) : number(i) {
-    const float size = std::ldexp(1.0f, int(below(41)) - 20), offset = below(2) ? 0.0f : size * std::ldexp(1.0f, int(below(15)));
+    const float size = std::ldexp(1.0f, int(below(41)) - 20),
+                offset = below(2) ? 0.0f : size * std::ldexp(1.0f, int(below(15)));
     for (int lane = 0; lane < 8; ++lane) {
       for (int axis = 0; axis < 3; ++axis) {
         const float a = offset + size * in(-1, 1), b = below(6) ? offset + size * in(-1, 1) : a;
@@ -109,7 +114,8 @@ TEST_CASE("padded boxes are never missed, Ize's not where a ray is in them for 2
     for (int lane = 0; lane < 8; ++lane) {
       if (const auto in = inside(draw.boxes, lane, draw.ray)) {
         touch |= 1u << lane, ++touched;
-        if (!in->last || (*in->last > 0 && *in->last >= in->first * (1 + Number(1) / (1 << 22)))) must |= 1u << lane, ++long_enough;
+        if (!in->last || (*in->last > 0 && *in->last >= in->first * (1 + Number(1) / (1 << 22))))
+          must |= 1u << lane, ++long_enough;
       } else {
         clear |= 1u << lane;
       }
@@ -122,7 +128,8 @@ TEST_CASE("padded boxes are never missed, Ize's not where a ray is in them for 2
       REQUIRE((touch & ~tight) == 0);
       REQUIRE((must & ~ize) == 0);
       Counts& c = counts[isa];
-      c.missed_by_fast += std::size_t(std::popcount(touch & ~fast)), c.missed_by_ize += std::size_t(std::popcount(touch & ~ize));
+      c.missed_by_fast += std::size_t(std::popcount(touch & ~fast)),
+          c.missed_by_ize += std::size_t(std::popcount(touch & ~ize));
       // A box test that lets every ray into every box would pass what is above as well.
       c.left_out_by_padded += std::size_t(std::popcount(clear & ~padded));
     }
@@ -139,8 +146,8 @@ TEST_CASE("padded boxes are never missed, Ize's not where a ray is in them for 2
 }
 
 TEST_CASE("two ulp are not enough for every box that a ray touches at an edge") {
-  // Found by a search through 2 * 10^8 edges, of which it missed 874: three roundings for the plane where the ray enters add up against three
-  // for the one where it leaves.
+  // Found by a search through 2 * 10^8 edges, of which it missed 874: three roundings for the plane where the ray
+  // enters add up against three for the one where it leaves.
   Boxes boxes{};
   for (int lane = 0; lane < 8; ++lane) {
     const float planes[6] = {0x1.de5374p+0f, 3.0f, 1.0f, 0x1.fb7074p+0f, -1.0f, 1.0f};
@@ -155,7 +162,9 @@ TEST_CASE("two ulp are not enough for every box that a ray touches at an edge") 
   }
 }
 
-TEST_CASE("boxes that are tight along the ray leave out what a ray has left by a step of eight ulp, in a large scene too; wide ones do not") {
+TEST_CASE(
+    "boxes that are tight along the ray leave out what a ray has left by a step of eight ulp, in a large scene too; "
+    "wide ones do not") {
   Boxes wall{};
   for (int lane = 0; lane < 8; ++lane) {
     const float planes[6] = {-100.0f, 100.0f, -100.0f, 100.0f, 3.0f, 3.0f};
@@ -163,7 +172,8 @@ TEST_CASE("boxes that are tight along the ray leave out what a ray has left by a
   }
   const float step = 8 * 0x1p-22f;
   for (float towards : {1.0f, -1.0f}) {
-    const Ray leaving{{1.0f, 2.0f, 3.0f + towards * step}, 0.0f, {0.5f, 0.25f, towards}, kInfinity}, returning{leaving.origin, 0.0f, leaving.direction * -1.0f, kInfinity};
+    const Ray leaving{{1.0f, 2.0f, 3.0f + towards * step}, 0.0f, {0.5f, 0.25f, towards}, kInfinity},
+        returning{leaving.origin, 0.0f, leaving.direction * -1.0f, kInfinity};
     const Ray along{leaving.origin, 0.0f, {4.0f, 0.25f, towards}, kInfinity};
     for (Isa isa : available_isas()) {
       INFO(to_string(isa) << ", towards " << towards);

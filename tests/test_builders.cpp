@@ -1,5 +1,5 @@
-// Every builder of binary trees (binary_builder_names()): what a tree must be, on ordinary and on degenerate meshes, for any
-// number of threads. A new builder is tested because it is in the table.
+// Every builder of binary trees (binary_builder_names()): what a tree must be, on ordinary and on degenerate meshes,
+// for any number of threads. A new builder is tested because it is in the table.
 #include <tbb/global_control.h>
 
 #include "structures/builders/reinsertion.h"
@@ -58,9 +58,13 @@ TEST_CASE("every builder: references, boxes, the same tree for any number of thr
         const Facts one = check_tree(build(builder, scene.mesh, leaf_width), scene.mesh, leaf_width, splits);
         for (const unsigned threads : {2u, 7u}) {
           INFO(threads << " threads");
-          CHECK(check_tree(build(builder, scene.mesh, leaf_width, threads), scene.mesh, leaf_width, splits).hash == one.hash);
+          CHECK(check_tree(build(builder, scene.mesh, leaf_width, threads), scene.mesh, leaf_width, splits).hash ==
+                one.hash);
         }
-        if (scene.mesh.size() < 10000) CHECK(check_tree(build(builder, scene.mesh, leaf_width, 1, Isa::scalar), scene.mesh, leaf_width, splits).hash == one.hash);
+        if (scene.mesh.size() < 10000)
+          CHECK(
+              check_tree(build(builder, scene.mesh, leaf_width, 1, Isa::scalar), scene.mesh, leaf_width, splits).hash ==
+              one.hash);
       }
     }
   }
@@ -87,13 +91,15 @@ TEST_CASE("every builder: a million equal triangles end in a shallow tree") {
 
 namespace {
 
-/// Triangles about one point, each `ratio` times the size of the one before: reinsertion, left alone, makes a chain of every third.
+/// Triangles about one point, each `ratio` times the size of the one before: reinsertion, left alone, makes a chain of
+/// every third.
 TriangleMesh nested(std::size_t count, double ratio) {
   TriangleMesh mesh;
   for (std::size_t i = 0; i < count; ++i) {
     const auto first = std::uint32_t(mesh.vertices.size());
     const auto size = float(std::pow(ratio, double(i)));
-    for (const Vec3f corner : {Vec3f{-1, -1, -1}, Vec3f{1, -1, 1}, Vec3f{0, 1, 0}}) mesh.vertices.push_back(corner * size);
+    for (const Vec3f corner : {Vec3f{-1, -1, -1}, Vec3f{1, -1, 1}, Vec3f{0, 1, 0}})
+      mesh.vertices.push_back(corner * size);
     mesh.triangles.push_back({first, first + 1, first + 2});
   }
   return mesh;
@@ -127,9 +133,11 @@ TEST_CASE("every builder: triangles within each other end in a tree of bounded d
     if (!builder.ends_with(kReinsertion)) continue;
     BuilderParameters none;
     none.reinsertion_top = 0;
-    const BinaryTree before = build(builder.substr(0, builder.size() - kReinsertion.size()), mesh, 1, 1, best_isa(), none);
+    const BinaryTree before =
+        build(builder.substr(0, builder.size() - kReinsertion.size()), mesh, 1, 1, best_isa(), none);
     CHECK(facts.depth <= std::max(kMaxReinsertedDepth, check_tree(before, mesh, 1, splits_triangles(builder)).depth));
-    CHECK(inner_area(build(builder, mesh, 1)) < inner_area(before));  // what it promises; SAH cost weighs whole leaf blocks, too
+    // What it promises; SAH cost weighs whole leaf blocks, too
+    CHECK(inner_area(build(builder, mesh, 1)) < inner_area(before));
   }
 }
 
@@ -137,7 +145,8 @@ TEST_CASE("reinsertion of the top: triangles within each other end in a tree of 
   const TriangleMesh mesh = nested(600000, 1.00002);
   BuilderParameters with, without;
   with.reinsertion_top = 65536, without.reinsertion_top = 0;
-  const BinaryTree before = build("morton", mesh, 1, 1, best_isa(), without), after = build("morton", mesh, 1, 1, best_isa(), with);
+  const BinaryTree before = build("morton", mesh, 1, 1, best_isa(), without),
+                   after = build("morton", mesh, 1, 1, best_isa(), with);
   CHECK(check_tree(after, mesh, 1, false).depth <= kMaxReinsertedDepth + check_tree(before, mesh, 1, false).depth);
   CHECK(inner_area(after) < inner_area(before));
 }

@@ -39,7 +39,9 @@ class Recorder final : public StructureVisitor {
     filled_ &= l.primitives.size() <= std::size_t{l.blocks} * l.block_width;
     ++leaves;
   }
-  [[nodiscard]] bool every_triangle_once() const { return std::ranges::all_of(seen_, [](unsigned n) { return n == 1; }); }
+  [[nodiscard]] bool every_triangle_once() const {
+    return std::ranges::all_of(seen_, [](unsigned n) { return n == 1; });
+  }
   [[nodiscard]] bool boxes_hold() const { return inside_ && filled_; }
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
   std::size_t nodes = 0, leaves = 0, largest_leaf = 0;
@@ -48,7 +50,8 @@ class Recorder final : public StructureVisitor {
  private:
   void put(std::uint64_t x) { hash_ = mix64(hash_ ^ x); }
   void put(const Bounds3f& b) {
-    for (int axis = 0; axis < 3; ++axis) put(std::bit_cast<std::uint32_t>(b.lower[axis])), put(std::bit_cast<std::uint32_t>(b.upper[axis]));
+    for (int axis = 0; axis < 3; ++axis)
+      put(std::bit_cast<std::uint32_t>(b.lower[axis])), put(std::bit_cast<std::uint32_t>(b.upper[axis]));
   }
   const TriangleMesh& mesh_;
   std::vector<unsigned> seen_;
@@ -141,21 +144,21 @@ TEST_CASE("the tree is the same for any number of threads and on any ISA") {
 TEST_CASE("optimal collapse costs no more than greedy collapse") {
   // On the sphere a collapse that cannot open a leaf again loses to greedy collapse.
   for (const TriangleMesh& mesh : {random_triangles(5000, 0.03f, 3), sphere(80)}) {
-  for (const char* structure : kBvhs) {
-    const auto cost = [&](const char* collapse) {
-      struct Cost final : StructureVisitor {
-        double sum = 0;
-        void node(const NodeView& n) override { sum += n.bounds.area(); }
-        void leaf(const LeafView& l) override { sum += l.bounds.area() * l.blocks; }
-      } visitor;
-      BuilderParameters p;
-      p.collapse = collapse;
-      REQUIRE(build(structure, mesh, "triangle4", 1, Isa::scalar, p)->visit(visitor));
-      return visitor.sum;
-    };
-    INFO(structure);
-    CHECK(cost("optimal") <= cost("greedy") * 1.000001);
-  }
+    for (const char* structure : kBvhs) {
+      const auto cost = [&](const char* collapse) {
+        struct Cost final : StructureVisitor {
+          double sum = 0;
+          void node(const NodeView& n) override { sum += n.bounds.area(); }
+          void leaf(const LeafView& l) override { sum += l.bounds.area() * l.blocks; }
+        } visitor;
+        BuilderParameters p;
+        p.collapse = collapse;
+        REQUIRE(build(structure, mesh, "triangle4", 1, Isa::scalar, p)->visit(visitor));
+        return visitor.sum;
+      };
+      INFO(structure);
+      CHECK(cost("optimal") <= cost("greedy") * 1.000001);
+    }
   }
 }
 
@@ -172,7 +175,8 @@ TEST_CASE("leaves filled by fours are the blocks that are filled one by one") {
   for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) {
     if constexpr (Block::kForm == TriangleForm::edges || Block::kForm == TriangleForm::vertices) {
       std::vector<std::uint32_t> ids;
-      for (std::uint32_t last = std::uint32_t(mesh.size()); last-- > 0;) {  // whole and partly filled blocks, special triangles in every lane
+      // Whole and partly filled blocks, special triangles in every lane
+      for (std::uint32_t last = std::uint32_t(mesh.size()); last-- > 0;) {
         ids.push_back(last);
         if (ids.size() > 33) ids.erase(ids.begin());
         alignas(64) std::byte a[34 * sizeof(Block)], b[34 * sizeof(Block)];
@@ -243,7 +247,8 @@ TEST_CASE("triangles at powers of two: a tree too deep for a small fixed stack")
   TriangleMesh mesh;
   for (int i = -38; i <= 38; ++i) {
     const float x = std::ldexp(1.0f, i), s = std::ldexp(1.0f, i - 2);
-    for (int k = 0; k < 9; ++k) add_triangle(mesh, {x, 0, 0.01f * k * s}, {x + s, 0, 0.01f * k * s}, {x, s, 0.01f * k * s});
+    for (int k = 0; k < 9; ++k)
+      add_triangle(mesh, {x, 0, 0.01f * k * s}, {x + s, 0, 0.01f * k * s}, {x, s, 0.01f * k * s});
   }
   BuilderParameters p;
   p.bins = 4, p.max_leaf_blocks = 1;

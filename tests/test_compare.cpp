@@ -1,4 +1,5 @@
-// The rank test against known values; two runs compared: nothing where nothing changed, a regression where there is one.
+// The rank test against known values; two runs compared: nothing where nothing changed, a regression where there is
+// one.
 #include "experiments/comparison.h"
 #include "experiments/comparison_files.h"
 #include "experiments/comparison_text.h"
@@ -13,7 +14,8 @@ using namespace arboretum::test;
 TEST_CASE("Mann-Whitney: exact p-values, with ties, and the normal distribution beyond") {
   // 2 / C(6, 3), 2 / C(14, 7): samples that do not overlap.
   CHECK(mann_whitney_p(std::vector{1.0, 2.0, 3.0}, std::vector{4.0, 5.0, 6.0}) == Approx(0.1));
-  CHECK(mann_whitney_p(std::vector{1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0}, std::vector{8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0}) == Approx(2.0 / 3432.0));
+  CHECK(mann_whitney_p(std::vector{1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0},
+                       std::vector{8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0}) == Approx(2.0 / 3432.0));
   CHECK(smallest_p(7, 7) == Approx(2.0 / 3432.0));
   CHECK(smallest_p(1, 1) == 1.0);
   // By hand: of the C(4, 2) = 6 pairs of ranks, sums 3 4 5 5 6 7; {1, 3} is 4, one from the mean 5, as are 3, 6 and 7.
@@ -38,7 +40,8 @@ TEST_CASE("Mann-Whitney finds a difference where there is none as often as it sa
   constexpr int kTrials = 2000;
   for (int trial = 0; trial < kTrials; ++trial) {
     std::vector<double> a, b;
-    for (std::uint64_t i = 0; i < 7; ++i) a.push_back(random_double(7, i, 2 * trial)), b.push_back(random_double(7, i, 2 * trial + 1));
+    for (std::uint64_t i = 0; i < 7; ++i)
+      a.push_back(random_double(7, i, 2 * trial)), b.push_back(random_double(7, i, 2 * trial + 1));
     found += mann_whitney_p(a, b) <= 0.05;
   }
   CHECK(found < 0.065 * kTrials);
@@ -59,8 +62,8 @@ TEST_CASE("Welch: known p-values, and none without spread or with one value") {
 TEST_CASE("Benjamini-Hochberg") {
   CHECK(benjamini_hochberg({}).empty());
   const std::vector<double> adjusted = benjamini_hochberg(std::vector{0.04, 0.01, 0.03, 0.5});
-  CHECK(adjusted[1] == Approx(0.04));                  // 0.01 * 4
-  CHECK(adjusted[2] == Approx(0.04 * 4.0 / 3.0));      // 0.03 * 4 / 2 = 0.06, but no more than the next
+  CHECK(adjusted[1] == Approx(0.04));              // 0.01 * 4
+  CHECK(adjusted[2] == Approx(0.04 * 4.0 / 3.0));  // 0.03 * 4 / 2 = 0.06, but no more than the next
   CHECK(adjusted[0] == Approx(0.04 * 4.0 / 3.0));
   CHECK(adjusted[3] == Approx(0.5));
 }
@@ -71,17 +74,23 @@ Cell cell_named(const std::string& structure, Cell::Metric metric = Cell::Metric
   const bool build = metric == Cell::Metric::build;
   Cell cell;
   cell.metric = metric;
-  cell.scene = "bunny", cell.structure = structure, cell.builder = "binned_sah", cell.leaf = "triangle4", cell.isa = Isa::sse;
-  cell.intersector = build ? "-" : "watertight", cell.box = build ? "-" : "padded", cell.traversal = build ? "-" : "single", cell.workload = build ? "-" : "primary";
+  cell.scene = "bunny", cell.structure = structure, cell.builder = "binned_sah", cell.leaf = "triangle4",
+  cell.isa = Isa::sse;
+  cell.intersector = build ? "-" : "watertight", cell.box = build ? "-" : "padded",
+  cell.traversal = build ? "-" : "single", cell.workload = build ? "-" : "primary";
   return cell;
 }
 
 /// A result of repetitions about `seconds`, each off by up to `noise`.
 CellResult measured(const Cell& cell, double seconds, double noise, std::uint64_t seed, unsigned repetitions = 9) {
-  CellResult result{.cell = cell, .repetitions = {}, .facts = {{"rays", 1000}, {"triangles", 500}, {"wrong_answers", 0}, {"sah_cost", 20.0}, {"bytes", 64000}}};
+  CellResult result{
+      .cell = cell,
+      .repetitions = {},
+      .facts = {{"rays", 1000}, {"triangles", 500}, {"wrong_answers", 0}, {"sah_cost", 20.0}, {"bytes", 64000}}};
   for (unsigned i = 0; i < repetitions; ++i) {
     const double s = seconds * (1.0 + noise * (2.0 * random_double(seed, i, 0) - 1.0));
-    result.repetitions.push_back({.index = i, .iterations = 3, .wall_seconds = 6.0 * s, .cpu_seconds = 3.0 * s, .phases = {}});
+    result.repetitions.push_back(
+        {.index = i, .iterations = 3, .wall_seconds = 6.0 * s, .cpu_seconds = 3.0 * s, .phases = {}});
   }
   return result;
 }
@@ -95,7 +104,8 @@ std::vector<CellResult> run(std::uint64_t seed, double noise = 0.02, unsigned re
   return results;
 }
 
-CellResult* find(std::vector<CellResult>& results, const std::string& structure, Cell::Metric metric = Cell::Metric::trace) {
+CellResult* find(std::vector<CellResult>& results, const std::string& structure,
+                 Cell::Metric metric = Cell::Metric::trace) {
   for (CellResult& r : results)
     if (r.cell.structure == structure && r.cell.metric == metric) return &r;
   return nullptr;
@@ -131,7 +141,8 @@ TEST_CASE("a run compared with itself is indistinguishable, and of ratio 1") {
 
 TEST_CASE("noise about equal medians is indistinguishable; however often it is tried, hardly ever a regression") {
   int regressions = 0;
-  for (std::uint64_t trial = 0; trial < 50; ++trial) regressions += compare_results(run(1000 * trial + 1, 0.15), run(1000 * trial + 500, 0.15), {}).is_regression();
+  for (std::uint64_t trial = 0; trial < 50; ++trial)
+    regressions += compare_results(run(1000 * trial + 1, 0.15), run(1000 * trial + 500, 0.15), {}).is_regression();
   CHECK(regressions <= 3);  // 50 comparisons of 8 cells, of which one in twenty may be false
 }
 
@@ -153,9 +164,11 @@ TEST_CASE("a slower structure is a regression, with the right ratio; the others 
   CHECK(find(back, "bvh8").verdict == Verdict::faster);
   CHECK(verdict(back).first == ExitStatus::kDone);
   // Of no concern where only more counts, nor where the interval reaches below what counts.
-  CHECK(find(compare_results(a, b, {.min_difference = 40.0, .control = {}}), "bvh8").verdict == Verdict::indistinguishable);
+  CHECK(find(compare_results(a, b, {.min_difference = 40.0, .control = {}}), "bvh8").verdict ==
+        Verdict::indistinguishable);
   const double nearly = 100.0 * (1.0 / slow.ratio.high - 1.0) + 0.1;
-  CHECK(find(compare_results(a, b, {.min_difference = nearly, .control = {}}), "bvh8").verdict == Verdict::indistinguishable);
+  CHECK(find(compare_results(a, b, {.min_difference = nearly, .control = {}}), "bvh8").verdict ==
+        Verdict::indistinguishable);
 
   slow_down(*find(b, "kdtree", Cell::Metric::build), 2.0);
   const Comparison builds = compare_results(a, b, {});
@@ -215,7 +228,9 @@ TEST_CASE("noise of few repetitions is hardly ever a regression either") {
   for (std::size_t repetitions : {2u, 3u, 5u}) {
     int regressions = 0;
     for (std::uint64_t trial = 0; trial < 50; ++trial)
-      regressions += compare_results(run(1000 * trial + 1, 0.15, repetitions), run(1000 * trial + 500, 0.15, repetitions), {}).is_regression();
+      regressions +=
+          compare_results(run(1000 * trial + 1, 0.15, repetitions), run(1000 * trial + 500, 0.15, repetitions), {})
+              .is_regression();
     INFO(repetitions << " repetitions: " << regressions << " of 50");
     CHECK(regressions <= 3);
   }
@@ -271,7 +286,8 @@ TEST_CASE("cells are matched by name; other work is not compared; nothing in com
 
 TEST_CASE("a machine that was slower as a whole: a control takes it out, and embree's cells tell it") {
   std::vector<CellResult> a = run(1), b = run(900);
-  a.push_back(measured(cell_named("embree"), 0.1, 0.02, 77)), b.push_back(measured(cell_named("embree"), 0.1, 0.02, 78));
+  a.push_back(measured(cell_named("embree"), 0.1, 0.02, 77)),
+      b.push_back(measured(cell_named("embree"), 0.1, 0.02, 78));
   for (CellResult& r : b) slow_down(r, 1.2);
   slow_down(*find(b, "bvh8"), 1.2);
   const Comparison plain = compare_results(a, b, {});
@@ -283,23 +299,28 @@ TEST_CASE("a machine that was slower as a whole: a control takes it out, and emb
   CHECK(find(relative, "bvh2").verdict == Verdict::indistinguishable);
   CHECK(find(relative, "bvh8").verdict == Verdict::slower);
   CHECK(find(relative, "bvh8").ratio.median == Approx(1.0 / 1.2).epsilon(0.04));
-  CHECK(error_of([&] { (void)compare_results(a, b, {.control = "nothing"}); }).find("finds no cell") != std::string::npos);
-  CHECK(error_of([&] { (void)compare_results(a, b, {.control = "("}); }).find("regular expression") != std::string::npos);
+  CHECK(error_of([&] { (void)compare_results(a, b, {.control = "nothing"}); }).find("finds no cell") !=
+        std::string::npos);
+  CHECK(error_of([&] { (void)compare_results(a, b, {.control = "("}); }).find("regular expression") !=
+        std::string::npos);
 }
 
 TEST_CASE("what speaks for a busy machine is told: loads that differ, a warning of noise, drift") {
   ResultFolder a, b;
   a.context = {{"load", "0.10 0.20 0.30 1/99 1234"}}, b.context = {{"load", "0.45 0.20 0.30 1/99 1234"}};
   CHECK(origins_text(a, b).find("load") == std::string::npos);
-  b.context = {{"load", "3.45 0.20 0.30 1/99 1234"}, {"warnings", {"noisy machine: the repetitions spread", "no avx512"}}};
+  b.context = {{"load", "3.45 0.20 0.30 1/99 1234"},
+               {"warnings", {"noisy machine: the repetitions spread", "no avx512"}}};
   const std::string text = origins_text(a, b);
   CHECK(text.find("differs: load average at the start: 0.10 against 3.45\n") != std::string::npos);
   CHECK(text.find("B warned: noisy machine: the repetitions spread\n") != std::string::npos);
   CHECK(text.find("no avx512") == std::string::npos);
   CHECK(origins_text({}, {}).find("load") == std::string::npos);
   const Comparison c = compare_results(run(1), run(900), {});
-  CHECK(comparison_text(c, false).find("Drift of the machine between the two runs is in neither the interval nor p") != std::string::npos);
-  CHECK(comparison_text(compare_results(run(1), run(900), {.control = "kdtree"}), false).find("Drift") == std::string::npos);
+  CHECK(comparison_text(c, false).find("Drift of the machine between the two runs is in neither the interval nor p") !=
+        std::string::npos);
+  CHECK(comparison_text(compare_results(run(1), run(900), {.control = "kdtree"}), false).find("Drift") ==
+        std::string::npos);
 }
 
 TEST_CASE("means are those of their cells, whatever the order they are summed in") {
@@ -322,7 +343,9 @@ TEST_CASE("means are those of their cells, whatever the order they are summed in
     CHECK(c.means.front().ratio.median == Approx(std::exp(logs)));
     CHECK(c.means.front().ratio.low < c.means.front().ratio.median);
     CHECK(c.means.front().cells == 4);
-    CHECK(c.means.front().slower == static_cast<std::size_t>(std::ranges::count_if(c.cells, [](const ComparedCell& cell) { return cell.is_trace() && cell.verdict == Verdict::slower; })));
+    CHECK(c.means.front().slower ==
+          static_cast<std::size_t>(std::ranges::count_if(
+              c.cells, [](const ComparedCell& cell) { return cell.is_trace() && cell.verdict == Verdict::slower; })));
   }
 }
 

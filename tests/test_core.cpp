@@ -132,7 +132,8 @@ TEST_CASE("the nearest name to a misspelt one") {
   CHECK(edit_distance("", "abc") == 3);
   CHECK_THAT(unknown_name_message("structure", "bhv8", names), Catch::Contains("did you mean 'bvh8'?"));
   // What is not spelt alike is not asked for: a third of the longer word, or its first three letters.
-  CHECK(unknown_name_message("scene", "kitchn", std::vector<std::string>{"city", "forest"}) == "unknown scene 'kitchn' (valid: city forest)");
+  CHECK(unknown_name_message("scene", "kitchn", std::vector<std::string>{"city", "forest"}) ==
+        "unknown scene 'kitchn' (valid: city forest)");
   CHECK(close_name("nosuch", std::vector<std::string>{"forest"}).empty());
   CHECK(close_name("nonexist", std::vector<std::string>{"A"}).empty());
   CHECK(close_name("rum", std::vector<std::string>{"run", "render"}) == "run");

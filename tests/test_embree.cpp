@@ -64,22 +64,18 @@ Truth brute_force(const TriangleMesh& mesh, const Ray& ray) {
   };
   const auto d3 = [](Vec3f p) { return D3{p.x, p.y, p.z}; };
   const auto sub = [](D3 a, D3 b) { return D3{a.x - b.x, a.y - b.y, a.z - b.z}; };
-  const auto cross = [](D3 a, D3 b) {
-    return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  };
+  const auto cross = [](D3 a, D3 b) { return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
   const auto dot = [](D3 a, D3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
   Truth truth;
   truth.t = ray.tfar;
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const auto [a, b, c] = mesh.corners(i);
-    const D3 e1 = sub(d3(b), d3(a)), e2 = sub(d3(c), d3(a)), d = d3(ray.direction),
-             s = sub(d3(ray.origin), d3(a));
+    const D3 e1 = sub(d3(b), d3(a)), e2 = sub(d3(c), d3(a)), d = d3(ray.direction), s = sub(d3(ray.origin), d3(a));
     const D3 p = cross(d, e2), q = cross(s, e1);
     const double det = dot(e1, p), u = dot(s, p) / det, v = dot(d, q) / det, t = dot(e2, q) / det;
     const double margin = std::min({u, v, 1 - u - v});
     const bool inside_interval = t >= ray.tnear - 1e-5 && t <= double(ray.tfar) + 1e-5;
-    if (inside_interval &&
-        (std::abs(margin) < 1e-5 || std::abs(t - ray.tnear) < 1e-5 || std::abs(t - ray.tfar) < 1e-5))
+    if (inside_interval && (std::abs(margin) < 1e-5 || std::abs(t - ray.tnear) < 1e-5 || std::abs(t - ray.tfar) < 1e-5))
       truth.near_edge = true;
     if (!(margin >= 0 && t >= ray.tnear && t <= truth.t)) continue;
     if (truth.hit && t == truth.t) continue;
@@ -267,7 +263,8 @@ TEST_CASE("packets and streams of embree answer as its single rays do, whatever 
             const std::vector<Hit> hits = closest(accel, std::span(rays).subspan(begin, count), way);
             const std::vector<std::uint8_t> occluded = any(accel, std::span(rays).subspan(begin, count), way);
             for (std::size_t i = 0; i < count; ++i) {
-              INFO(to_string(isa) << " " << leaf << " " << way.name << " of " << count << " from " << begin << ", ray " << i);
+              INFO(to_string(isa) << " " << leaf << " " << way.name << " of " << count << " from " << begin << ", ray "
+                                  << i);
               const Hit& single = want[begin + i];
               REQUIRE(hits[i].is_hit() == single.is_hit());
               REQUIRE(occluded[i] == want_any[begin + i]);
@@ -322,10 +319,8 @@ TEST_CASE("embree gives its memory back, and can build again") {
 TEST_CASE("embree says what it cannot do") {
   const TriangleMesh mesh = random_triangles(3, 1);
   EmbreeAccel accel;
-  CHECK_THROWS_WITH(build(accel, mesh, Isa::scalar, "medium", "triangle4"),
-                    Catch::Contains("no scalar kernels"));
-  CHECK_THROWS_WITH(build(accel, mesh, Isa::sse, "mediun", "triangle4"),
-                    Catch::Contains("did you mean 'medium'?"));
+  CHECK_THROWS_WITH(build(accel, mesh, Isa::scalar, "medium", "triangle4"), Catch::Contains("no scalar kernels"));
+  CHECK_THROWS_WITH(build(accel, mesh, Isa::sse, "mediun", "triangle4"), Catch::Contains("did you mean 'medium'?"));
   CHECK_THROWS_AS(build(accel, mesh, Isa::sse, "medium", "triangle8"), UserError);
   build(accel, mesh, Isa::sse, "medium", "triangle4");
   CHECK_NOTHROW(accel.expect(Isa::sse, Form::triangle4));

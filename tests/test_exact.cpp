@@ -1,9 +1,11 @@
-// The intersector `exact`: hit or miss, primitive and rounded t against rational arithmetic, on rays that are aimed to be hard.
+// The intersector `exact`: hit or miss, primitive and rounded t against rational arithmetic, on rays that are aimed to
+// be hard.
 //
 // ARBORETUM_EXACT_EFFORT=100 takes a hundred times as many rays.
 //
-// What these tests see, tried by breaking intersectors/exact.h: the bound's 12.5 (14.5) made 1 gives wrong answers; so do best.t left
-// at the low end of its interval, and equal distances given to the last that comes. 12.5 made 2 is not seen in the normal run.
+// What these tests see, tried by breaking intersectors/exact.h: the bound's 12.5 (14.5) made 1 gives wrong answers; so
+// do best.t left at the low end of its interval, and equal distances given to the last that comes. 12.5 made 2 is not
+// seen in the normal run.
 #include <cstdlib>
 #include <functional>
 #include <sstream>
@@ -40,7 +42,8 @@ std::vector<KernelRow> exact_rows() {
 std::vector<KernelRow> single_rows(std::initializer_list<std::string_view> structures) {
   std::vector<KernelRow> rows;
   for (const KernelRow& row : exact_rows())
-    if (row.traversal == "single" && std::ranges::find(structures, row.structure) != structures.end()) rows.push_back(row);
+    if (row.traversal == "single" && std::ranges::find(structures, row.structure) != structures.end())
+      rows.push_back(row);
   return rows;
 }
 
@@ -48,11 +51,14 @@ std::vector<KernelRow> single_rows(std::initializer_list<std::string_view> struc
 std::vector<KernelRow> rows_of_every_mode() {
   std::vector<KernelRow> rows;
   for (const KernelRow& row : kernel_table())
-    if ((row.structure == "bvh4" || row.structure == "bvh8") && row.intersector == "exact" && row.box == "padded" && row.leaf == "triangle4v" && is_available(row.isa)) rows.push_back(row);
+    if ((row.structure == "bvh4" || row.structure == "bvh8") && row.intersector == "exact" && row.box == "padded" &&
+        row.leaf == "triangle4v" && is_available(row.isa))
+      rows.push_back(row);
   return rows;
 }
 
-/// What a kernel must answer: the lowest id of those at the nearest t, and t as a float. u and v are near the oracle's, within an ulp.
+/// What a kernel must answer: the lowest id of those at the nearest t, and t as a float. u and v are near the oracle's,
+/// within an ulp.
 struct Truth {
   std::vector<Hit> hits;
 
@@ -68,7 +74,8 @@ struct Truth {
       const rational::Answer answer = rational::closest_hit(mesh, ray);
       Hit hit;
       if (!answer.nearest.empty()) {
-        hit = {nearest_float(answer.t), answer.u.convert_to<float>(), answer.v.convert_to<float>(), answer.nearest.front()};
+        hit = {nearest_float(answer.t), answer.u.convert_to<float>(), answer.v.convert_to<float>(),
+               answer.nearest.front()};
       }
       truth.hits.push_back(hit);
     }
@@ -85,24 +92,27 @@ struct Truth {
 
 std::string literal(const Ray& ray) {
   std::ostringstream s;
-  s << std::hexfloat << "{{" << ray.origin.x << ", " << ray.origin.y << ", " << ray.origin.z << "}, " << ray.tnear << ", {" << ray.direction.x
-    << ", " << ray.direction.y << ", " << ray.direction.z << "}, " << ray.tfar << "}";
+  s << std::hexfloat << "{{" << ray.origin.x << ", " << ray.origin.y << ", " << ray.origin.z << "}, " << ray.tnear
+    << ", {" << ray.direction.x << ", " << ray.direction.y << ", " << ray.direction.z << "}, " << ray.tfar << "}";
   return s.str();
 }
 
 std::string literal(const Hit& hit) {
   std::ostringstream s;
-  s << std::hexfloat << (hit.is_hit() ? std::to_string(hit.primitive) : "miss") << " at " << hit.t << ", " << hit.u << ", " << hit.v;
+  s << std::hexfloat << (hit.is_hit() ? std::to_string(hit.primitive) : "miss") << " at " << hit.t << ", " << hit.u
+    << ", " << hit.v;
   return s.str();
 }
 
 bool right(const Hit& answer, const Hit& truth) {
   if (answer.primitive != truth.primitive) return false;
-  return !truth.is_hit() || (answer.t == truth.t && std::abs(answer.u - truth.u) <= 0x1p-23f && std::abs(answer.v - truth.v) <= 0x1p-23f);
+  return !truth.is_hit() ||
+         (answer.t == truth.t && std::abs(answer.u - truth.u) <= 0x1p-23f && std::abs(answer.v - truth.v) <= 0x1p-23f);
 }
 
 /// Every row on all rays, closest hit and any hit.
-void check(const TriangleMesh& mesh, std::span<const Ray> rays, const Truth& truth, const std::vector<KernelRow>& rows) {
+void check(const TriangleMesh& mesh, std::span<const Ray> rays, const Truth& truth,
+           const std::vector<KernelRow>& rows) {
   Structures structures(mesh);
   for (const KernelRow& row : rows) {
     const std::vector<Hit> hits = closest_hit(row, structures.get(row), rays);
@@ -112,8 +122,8 @@ void check(const TriangleMesh& mesh, std::span<const Ray> rays, const Truth& tru
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (right(hits[i], truth.hits[i]) && (occluded[i] == 1) == truth.hits[i].is_hit()) continue;
       if (wrong++ == 0) {
-        first = "ray " + std::to_string(i) + " " + literal(rays[i]) + ": " + literal(hits[i]) + (occluded[i] ? ", occluded" : "") + " for " +
-                literal(truth.hits[i]);
+        first = "ray " + std::to_string(i) + " " + literal(rays[i]) + ": " + literal(hits[i]) +
+                (occluded[i] ? ", occluded" : "") + " for " + literal(truth.hits[i]);
       }
     }
     INFO(name_of(row) << ": " << first);
@@ -121,8 +131,8 @@ void check(const TriangleMesh& mesh, std::span<const Ray> rays, const Truth& tru
   }
 }
 
-/// A kind of mesh: where its points are. Triangles are any three of a few points, so that edges and vertices are shared, some
-/// triangles lie upon each other and some have no area.
+/// A kind of mesh: where its points are. Triangles are any three of a few points, so that edges and vertices are
+/// shared, some triangles lie upon each other and some have no area.
 struct Kind {
   std::string_view name;
   std::function<Vec3f(Dice&)> point;
@@ -132,13 +142,34 @@ struct Kind {
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all = {
       {"cube", [](Dice& d) { return d.point(); }},
-      {"slivers", [](Dice& d) { return d.point() * Vec3f{0x1p-12f, 1, 0x1p-6f}; }},
-      {"needles", [](Dice& d) { return Vec3f{1, 2, 3} * d.uniform() + d.point() * 0x1p-18f; }},
-      {"exponential", [](Dice& d) { return Vec3f{d.exponential(-20, 20), d.exponential(-20, 20), d.exponential(-20, 20)}; }},
-      {"lattice", [](Dice& d) { return Vec3f{float(d.integer(7) - 3), float(d.integer(7) - 3), float(d.integer(7) - 3)}; }},
-      {"layers", [](Dice& d) { return Vec3f{d.uniform(), d.uniform(), 1 + float(d.integer(3)) * 0x1p-23f}; }},
-      {"far", [](Dice& d) { return d.point() + Vec3f{100000, -30000, 4096}; }},
-      {"a wide floor", [](Dice& d) { return d.integer(3) ? d.point() : d.point() * Vec3f{4000, 4000, 0x1p-4f}; }},
+      {"slivers",
+       [](Dice& d) {
+         return d.point() * Vec3f{0x1p-12f, 1, 0x1p-6f};
+       }},
+      {"needles",
+       [](Dice& d) {
+         return Vec3f{1, 2, 3} * d.uniform() + d.point() * 0x1p-18f;
+       }},
+      {"exponential",
+       [](Dice& d) {
+         return Vec3f{d.exponential(-20, 20), d.exponential(-20, 20), d.exponential(-20, 20)};
+       }},
+      {"lattice",
+       [](Dice& d) {
+         return Vec3f{float(d.integer(7) - 3), float(d.integer(7) - 3), float(d.integer(7) - 3)};
+       }},
+      {"layers",
+       [](Dice& d) {
+         return Vec3f{d.uniform(), d.uniform(), 1 + float(d.integer(3)) * 0x1p-23f};
+       }},
+      {"far",
+       [](Dice& d) {
+         return d.point() + Vec3f{100000, -30000, 4096};
+       }},
+      {"a wide floor",
+       [](Dice& d) {
+         return d.integer(3) ? d.point() : d.point() * Vec3f{4000, 4000, 0x1p-4f};
+       }},
       {"small", [](Dice& d) { return d.point() * 0x1p-60f; }},
       {"large", [](Dice& d) { return d.point() * 0x1p30f; }},
       {"beyond range", [](Dice& d) { return d.point() * 0x1p60f; }, false},
@@ -151,11 +182,10 @@ struct Scene {
   std::vector<Ray> rays;
 };
 
-float largest_of(Vec3f p) {
-  return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-}
+float largest_of(Vec3f p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
-/// Rays at vertices, at edges, at interiors and anywhere; from near, from far, from a vertex; directions of all lengths.
+/// Rays at vertices, at edges, at interiors and anywhere; from near, from far, from a vertex; directions of all
+/// lengths.
 Scene make_scene(const Kind& kind, std::uint64_t seed, std::size_t rays) {
   Dice dice(seed);
   Scene scene;
@@ -164,8 +194,8 @@ Scene make_scene(const Kind& kind, std::uint64_t seed, std::size_t rays) {
   for (int i = 0; i < kPoints; ++i) p.push_back(kind.point(dice));
   const auto any = [&] { return p[std::size_t(dice.integer(kPoints))]; };
   for (int i = 0; i < 20; ++i) {
-    scene.mesh.triangles.push_back(
-        {std::uint32_t(dice.integer(kPoints)), std::uint32_t(dice.integer(kPoints)), std::uint32_t(dice.integer(kPoints))});
+    scene.mesh.triangles.push_back({std::uint32_t(dice.integer(kPoints)), std::uint32_t(dice.integer(kPoints)),
+                                    std::uint32_t(dice.integer(kPoints))});
   }
   while (scene.rays.size() < rays) {
     const Vec3f a = any(), b = any(), c = any();
@@ -175,7 +205,10 @@ Scene make_scene(const Kind& kind, std::uint64_t seed, std::size_t rays) {
     if (dice.integer(9) == 0) from = any();
     const float v = dice.uniform(0, 1), w = dice.uniform(0, 1);
     const int aim = dice.integer(4);
-    const Vec3f to = aim == 0 ? a : aim == 1 ? a * (1 - v) + b * v : aim == 2 ? (a * (1 - v) + b * v) * (1 - w) + c * w : kind.point(dice);
+    const Vec3f to = aim == 0   ? a
+                     : aim == 1 ? a * (1 - v) + b * v
+                     : aim == 2 ? (a * (1 - v) + b * v) * (1 - w) + c * w
+                                : kind.point(dice);
     Ray ray{from, 0.0f, to - from, kInfinity};
     if (dice.integer(2) == 0) ray.direction = ray.direction / largest_of(ray.direction);
     if (dice.integer(4) == 0) ray.direction = ray.direction * dice.exponential(-60, 60);
@@ -194,8 +227,8 @@ TEST_CASE("exact goes with every structure and instruction set that watertight g
     if (watertight.intersector != "watertight") continue;
     INFO(name_of(watertight));
     CHECK(std::ranges::any_of(rows, [&](const KernelRow& row) {
-      return row.intersector == "exact" && row.structure == watertight.structure && row.leaf == watertight.leaf && row.box == watertight.box &&
-             row.traversal == watertight.traversal && row.isa == watertight.isa;
+      return row.intersector == "exact" && row.structure == watertight.structure && row.leaf == watertight.leaf &&
+             row.box == watertight.box && row.traversal == watertight.traversal && row.isa == watertight.isa;
     }));
   }
 }
@@ -205,7 +238,8 @@ TEST_CASE("exact kernels on the hard cases, every structure") {
     TriangleMesh mesh{c.mesh.vertices, {}, {}};
     for (std::size_t i = 0; i < c.mesh.size(); ++i) {
       const auto corners = c.mesh.corners(i);
-      if (is_finite(corners[0]) && is_finite(corners[1]) && is_finite(corners[2])) mesh.triangles.push_back(c.mesh.triangles[i]);
+      if (is_finite(corners[0]) && is_finite(corners[1]) && is_finite(corners[2]))
+        mesh.triangles.push_back(c.mesh.triangles[i]);
     }
     INFO(c.id << ": " << c.why);
     const std::span rays(&c.ray, 1);
@@ -264,7 +298,9 @@ TEST_CASE("exact kernels of every mode where the constants of box tests overflow
 TEST_CASE("exact kernels of every mode of the kd-tree where the constants of planes overflow") {
   std::vector<KernelRow> rows;
   for (const KernelRow& row : kernel_table())
-    if (row.structure == "kdtree" && row.intersector == "exact" && row.box == "padded" && row.leaf == "triangle4v" && is_available(row.isa)) rows.push_back(row);
+    if (row.structure == "kdtree" && row.intersector == "exact" && row.box == "padded" && row.leaf == "triangle4v" &&
+        is_available(row.isa))
+      rows.push_back(row);
   REQUIRE(rows.size() >= 2 * 10);
   // A direction of length 1 far out: what stands for the reciprocal of its zeros is 2^60.
   const TriangleMesh mesh = moved(test::sphere(24), 0x1p60f, {0x1p70f, -0x1p70f, 0x1p69f});
@@ -284,9 +320,11 @@ TEST_CASE("exact kernels of every mode of the kd-tree where the constants of pla
 TEST_CASE("exact kernels on inputs that once failed") {
   // The edge functions are finite, their sum is not: weights of 0 made a distance of 0 that looked certain.
   TriangleMesh mesh;
-  add_triangle(mesh, {0x1.29ae1cp+46f, 0x1.8653b8p+63f, 0x1.d27b06p+53f}, {0x1.9da016p+50f, -0x1.fabce8p+62f, 0x1.69da9ep+35f},
+  add_triangle(mesh, {0x1.29ae1cp+46f, 0x1.8653b8p+63f, 0x1.d27b06p+53f},
+               {0x1.9da016p+50f, -0x1.fabce8p+62f, 0x1.69da9ep+35f},
                {0x1.bc697p+43f, 0x1.d6e566p+61f, -0x1.7b8ea4p+36f});
-  add_triangle(mesh, {0x1.29ae1cp+46f, 0x1.8653b8p+63f, 0x1.d27b06p+53f}, {0x1.9da016p+50f, -0x1.fabce8p+62f, 0x1.69da9ep+35f},
+  add_triangle(mesh, {0x1.29ae1cp+46f, 0x1.8653b8p+63f, 0x1.d27b06p+53f},
+               {0x1.9da016p+50f, -0x1.fabce8p+62f, 0x1.69da9ep+35f},
                {0x1.c92c12p+63f, -0x1.4dc51p+25f, 0x1.299404p+61f});
   const Ray ray{{0x1.4dda2ap+53f, 0x1.68436cp+49f, 0x1.c75788p+54f},
                 0x1.a727e4p-1f,
@@ -319,7 +357,8 @@ TEST_CASE("hit arithmetic against rational arithmetic") {
       }
       for (std::size_t k = 1; k < found.size(); ++k) {
         const int order = found[0].first < found[k].first ? -1 : found[0].first > found[k].first ? 1 : 0;
-        CHECK(compare_distances_exactly(ray, scene.mesh.corners(found[0].second), scene.mesh.corners(found[k].second)) == order);
+        CHECK(compare_distances_exactly(ray, scene.mesh.corners(found[0].second),
+                                        scene.mesh.corners(found[k].second)) == order);
       }
     }
     CHECK(hits > 20);

@@ -43,8 +43,7 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\naxes:\n  workload: [difuse]\n", ":3", "did you mean 'diffuse'"},
       {"scenes: [bunny]\naxes:\n  threads: [-1]\n", ":3", "threads must be an integer"},
       {"scenes: [bunny]\naxes:\n  traversal: [hybrid]\n", ":3", "unknown traversal"},
-      {"scenes: [bunny]\nmeasure: {resolution: [0, 512]}\n", ":2",
-       "resolution: width must be an integer from 1"},
+      {"scenes: [bunny]\nmeasure: {resolution: [0, 512]}\n", ":2", "resolution: width must be an integer from 1"},
       {"scenes: [bunny]\nmeasure: {resolution: 512}\n", ":2", "[width, height]"},
       {"scenes: [bunny]\nmeasure: {repetitions: -3}\n", ":2", "repetitions must be an integer"},
       {"scenes: [bunny]\nmeasure: {repetitions: 2.5}\n", ":2", "repetitions must be an integer"},
@@ -61,12 +60,16 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\nparameters: {max_leaf_blocks: 9}\n", ":2", "max_leaf_blocks must be an integer from 1 to 8"},
       {"scenes: [bunny]\nparameters: {morton_bits: 31}\n", ":2", "morton_bits must be one of 30, 63"},
       {"scenes: [bunny]\nparameters: {colapse: greedy}\n", ":2", "did you mean 'collapse'"},
-      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [nome]}\n", ":3", "did you mean 'none'"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [nome]}\n", ":3",
+       "did you mean 'none'"},
       {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: []}\n", ":3", "is empty"},
       {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [none, none]}\n", ":3", "given twice"},
-      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersections: [none]}\n", ":3", "did you mean 'self_intersection'"},
-      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [epsilon], epsilon: 2}\n", ":3", "epsilon (a share of the scene's diagonal) must be"},
-      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {epsilon: 1e-3}\n", ":3", "no effect without self_intersection: epsilon"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersections: [none]}\n", ":3",
+       "did you mean 'self_intersection'"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {self_intersection: [epsilon], epsilon: 2}\n", ":3",
+       "epsilon (a share of the scene's diagonal) must be"},
+      {"scenes: [bunny]\naxes: {workload: [diffuse]}\nrays: {epsilon: 1e-3}\n", ":3",
+       "no effect without self_intersection: epsilon"},
       {"scenes: [bunny]\naxes: {workload: [primary]}\nrays: {self_intersection: [none]}\n", ":3", "rays has no effect"},
       {"scenes: [{generate: sphere, offset: [1, 1]}]\n", ":1", "given twice"},
       {"scenes:\n  - {generate: sphere_flake, seed: 2}\n", ":2", "seed: 2 would change nothing"},
@@ -76,7 +79,8 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [{generate: sphere, ofset: 1}]\n", ":1", "did you mean 'offset'"},
       {"scenes: [{catalogue: buny, offset: 1}]\n", ":1", "did you mean 'bunny'"},
       {"scenes: [{catalogue: bunny, triangles: 100}]\n", ":1", "no effect without generate"},
-      {"scenes: [bunny]\nmetrics: [trace, accuracy]\nplots: [leak_picture]\n", ":3", "leak_picture has no data: it shows the workload camera_edges"},
+      {"scenes: [bunny]\nmetrics: [trace, accuracy]\nplots: [leak_picture]\n", ":3",
+       "leak_picture has no data: it shows the workload camera_edges"},
       {"scenes: [bunny]\ninclude: [{builder: morton}]\n", ":2", "names its structure"},
       {"scenes: [bunny]\nexclude: {structure: tree}\n", ":2", "must be a list of maps"},
       {"scenes: [bunny]\nexclude: [{scene: dragon}]\n", ":2", "unknown scene"},
@@ -98,8 +102,7 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
   }
   CHECK(error_of([&] { (void)read_experiment(folder.path / "none.yaml", registry); }).find("no such file") !=
         std::string::npos);
-  CHECK(error_of([&] { (void)read_experiment(folder.path, registry); }).find("is a folder") !=
-        std::string::npos);
+  CHECK(error_of([&] { (void)read_experiment(folder.path, registry); }).find("is a folder") != std::string::npos);
 }
 
 TEST_CASE("cells are the product, in names that the contract fixes; auto follows the rest") {
@@ -132,7 +135,9 @@ TEST_CASE("scenes may be words, as on the command line") {
   const Registry registry = paper_registry();
   const fs::path model = folder.write("ring.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   folder.write("room.yaml", "models: [{file: ring.obj}]\n");
-  const auto read = [&](const std::string& scenes) { return read_experiment(folder.write("words.yaml", "scenes: " + scenes + "\n"), registry); };
+  const auto read = [&](const std::string& scenes) {
+    return read_experiment(folder.write("words.yaml", "scenes: " + scenes + "\n"), registry);
+  };
   const Experiment experiment = read("[ring.obj, room.yaml, sphere:500, 'needles:500:2', sphere]");
   REQUIRE(experiment.scenes.size() == 5);
   CHECK(experiment.scenes[0].spec.file == model);
@@ -173,7 +178,8 @@ TEST_CASE("builder all is each that the structure takes, a named one not twice")
   TemporaryFolder folder;
   const Registry registry = paper_registry();
   const auto cells = [&](const std::string& axes) {
-    const fs::path file = folder.write("all.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {" + axes + ", isa: [sse], intersector: [moller_trumbore]}\n");
+    const fs::path file = folder.write("all.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {" + axes +
+                                                       ", isa: [sse], intersector: [moller_trumbore]}\n");
     std::string builders;
     for (const Cell& cell : make_plan(read_experiment(file, registry), registry).cells)
       if (cell.metric == Cell::Metric::trace) builders += cell.structure + ":" + cell.builder + " ";
@@ -185,26 +191,34 @@ TEST_CASE("builder all is each that the structure takes, a named one not twice")
 
 TEST_CASE("ways of traversal that this machine lacks are known to configurations all the same") {
   const Registry registry = paper_registry();
-  for (std::string way : {"packet16_coherent", "packet8_incoherent", "stream_coherent"}) CHECK(check_axis_value(Axis::traversal, way, registry) == "");
+  for (std::string way : {"packet16_coherent", "packet8_incoherent", "stream_coherent"})
+    CHECK(check_axis_value(Axis::traversal, way, registry) == "");
   std::string wrong = "packet16_coherant";
-  CHECK(check_axis_value(Axis::traversal, wrong, registry).find("did you mean 'packet16_coherent'?") != std::string::npos);
+  CHECK(check_axis_value(Axis::traversal, wrong, registry).find("did you mean 'packet16_coherent'?") !=
+        std::string::npos);
 }
 
-TEST_CASE("an optional scene that is not there has its cells skipped with the reason; ARBORETUM_SCENES is where it may be") {
+TEST_CASE(
+    "an optional scene that is not there has its cells skipped with the reason; ARBORETUM_SCENES is where it may be") {
   TemporaryFolder folder;
   const Registry registry = paper_registry();
-  const fs::path file = folder.write("optional.yaml", "scenes: [{file: away/far.obj, optional: true}, {generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse]}\n");
+  const fs::path file = folder.write("optional.yaml",
+                                     "scenes: [{file: away/far.obj, optional: true}, {generate: sphere, triangles: "
+                                     "500}]\naxes: {structure: [tree], isa: [sse]}\n");
   ::unsetenv("ARBORETUM_SCENES");
   const auto plan_now = [&] { return make_plan(read_experiment(file, registry), registry); };
   Plan plan = plan_now();
   REQUIRE(plan.skipped.size() == 1);
   CHECK(plan.skipped[0].name.find("trace/far/tree/") == 0);
-  CHECK(plan.skipped[0].reason == "optional scene away/far.obj is not here: ARBORETUM_SCENES, the folder to find it in, is not set");
+  CHECK(plan.skipped[0].reason ==
+        "optional scene away/far.obj is not here: ARBORETUM_SCENES, the folder to find it in, is not set");
   CHECK(plan.cells.size() == 2);
-  CHECK(effective_yaml(read_experiment(file, registry)).find("{file: away/far.obj, optional: true}") != std::string::npos);
+  CHECK(effective_yaml(read_experiment(file, registry)).find("{file: away/far.obj, optional: true}") !=
+        std::string::npos);
   const fs::path scenes = folder.path / "scenes";
   ::setenv("ARBORETUM_SCENES", scenes.c_str(), 1);
-  CHECK(plan_now().skipped.at(0).reason == "optional scene away/far.obj is not here: ARBORETUM_SCENES is " + scenes.string());
+  CHECK(plan_now().skipped.at(0).reason ==
+        "optional scene away/far.obj is not here: ARBORETUM_SCENES is " + scenes.string());
   fs::create_directories(scenes / "away");
   folder.write("scenes/away/far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   CHECK(plan_now().skipped.empty());
@@ -241,12 +255,16 @@ metrics: [trace]
   CHECK(names(plan, Cell::Metric::build).empty());
 }
 
-TEST_CASE("ways of leaving a surface are part of the cell where several are swept, of workloads that start on surfaces") {
+TEST_CASE(
+    "ways of leaving a surface are part of the cell where several are swept, of workloads that start on surfaces") {
   const TemporaryFolder folder;
   const Registry registry = paper_registry();
   const auto plan_of = [&](const std::string& ways) {
-    const fs::path file = folder.write("rays.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse], intersector: "
-                                                    "[moller_trumbore], workload: [primary, diffuse]}\nrays: {self_intersection: " + ways + "}\nmetrics: [trace]\n");
+    const fs::path file =
+        folder.write("rays.yaml",
+                     "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], isa: [sse], intersector: "
+                     "[moller_trumbore], workload: [primary, diffuse]}\nrays: {self_intersection: " +
+                         ways + "}\nmetrics: [trace]\n");
     const Experiment experiment = read_experiment(file, registry);
     const fs::path again = folder.write("again.yaml", effective_yaml(experiment));
     CHECK(effective_yaml(read_experiment(again, registry)) == effective_yaml(experiment));
@@ -254,9 +272,12 @@ TEST_CASE("ways of leaving a surface are part of the cell where several are swep
   };
   const Plan swept = plan_of("[none, epsilon], epsilon: 0.001");
   CHECK(names(swept, Cell::Metric::trace) ==
-        std::vector<std::string>{"trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/primary/threads:1",
-                                 "trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/diffuse:self_intersection=none/threads:1",
-                                 "trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/diffuse:self_intersection=epsilon/threads:1"});
+        std::vector<std::string>{
+            "trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/primary/threads:1",
+            "trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/diffuse:self_intersection=none/"
+            "threads:1",
+            "trace/sphere-500/tree/binned_sah/triangle4/moller_trumbore/fast/single/sse/"
+            "diffuse:self_intersection=epsilon/threads:1"});
   CHECK(swept.cells[2].start.epsilon == 0.001);
   const Plan one = plan_of("exclusion");
   REQUIRE(one.cells.size() == 2);
@@ -276,7 +297,8 @@ metrics: [trace]
   const Experiment experiment = read_experiment(file, registry);
   std::vector<std::string> found;
   for (const Cell& cell : make_plan(experiment, registry).cells) found.push_back(cell.scene + " " + cell.workload);
-  CHECK(found == std::vector<std::string>{"sphere-500:size=100:offset=1 primary", "sphere-600:stretch=10 primary", "sphere-600:stretch=10 random"});
+  CHECK(found == std::vector<std::string>{"sphere-500:size=100:offset=1 primary", "sphere-600:stretch=10 primary",
+                                          "sphere-600:stretch=10 random"});
   CHECK(experiment.scenes[1].placing.offset == 1e4);
   const Experiment again = read_experiment(folder.write("again.yaml", effective_yaml(experiment)), registry);
   CHECK(effective_yaml(again) == effective_yaml(experiment));
@@ -305,28 +327,39 @@ metrics: [trace]
 TEST_CASE("a parameter multiplies and names the cells that read it, and no others; one that none reads is refused") {
   const TemporaryFolder folder;
   Registry registry = paper_registry();
-  registry.parameters_read = [](std::string_view structure, std::string_view builder, std::string_view) -> std::optional<std::vector<std::string_view>> {
+  using Names = std::vector<std::string_view>;
+  registry.parameters_read = [](std::string_view structure, std::string_view builder,
+                                std::string_view) -> std::optional<Names> {
     if (structure != "tree") return std::nullopt;
-    return builder == "morton" ? std::vector<std::string_view>{"morton_bits"} : std::vector<std::string_view>{"bins", "collapse"};
+    return builder == "morton" ? Names{"morton_bits"} : Names{"bins", "collapse"};
   };
   const auto builders = [&](const std::string& axes, const std::string& parameters, const Overrides& overrides = {}) {
-    const fs::path file = folder.write("plan.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree, list], isa: [sse], "
-                                                    "intersector: [moller_trumbore], " + axes + "}\nparameters: {" + parameters + "}\nmetrics: [trace]\n");
+    const fs::path file =
+        folder.write("plan.yaml",
+                     "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree, list], isa: [sse], "
+                     "intersector: [moller_trumbore], " +
+                         axes + "}\nparameters: {" + parameters + "}\nmetrics: [trace]\n");
     std::vector<std::string> list;
-    for (const Cell& cell : make_plan(read_experiment(file, registry, overrides), registry).cells) list.push_back(cell.builder_name());
+    for (const Cell& cell : make_plan(read_experiment(file, registry, overrides), registry).cells)
+      list.push_back(cell.builder_name());
     return list;
   };
   using List = std::vector<std::string>;
   CHECK(builders("builder: [all]", "bins: [8, 16], morton_bits: [30, 63]") ==
         List{"binned_sah:bins=8", "binned_sah:bins=16", "morton:morton_bits=30", "morton:morton_bits=63", "none"});
-  CHECK(builders("builder: [all]", "collapse: [greedy, optimal]") == List{"binned_sah:collapse=greedy", "binned_sah:collapse=optimal", "morton", "none"});
-  for (const std::string parameters : {"ploc_radius: [3, 4]", "ploc_radius: 3", "max_depth: 5", "grid_density: 2", "below: bvh4"}) {
+  CHECK(builders("builder: [all]", "collapse: [greedy, optimal]") ==
+        List{"binned_sah:collapse=greedy", "binned_sah:collapse=optimal", "morton", "none"});
+  for (const std::string parameters :
+       {"ploc_radius: [3, 4]", "ploc_radius: 3", "max_depth: 5", "grid_density: 2", "below: bvh4"}) {
     const std::string error = error_of([&] { builders("builder: [all]", parameters); });
     INFO(parameters << ": " << error);
-    CHECK(error.find("plan.yaml:3: " + parameters.substr(0, parameters.find(':')) + " has no effect") != std::string::npos);
+    CHECK(error.find("plan.yaml:3: " + parameters.substr(0, parameters.find(':')) + " has no effect") !=
+          std::string::npos);
   }
-  CHECK(error_of([&] { builders("builder: [binned_sah]", "morton_bits: 30"); }).find("only morton (tree)") != std::string::npos);
-  // Asking for a default is no error (effective.yaml names them all), nor is an axis that the command line takes away from a parameter.
+  CHECK(error_of([&] { builders("builder: [binned_sah]", "morton_bits: 30"); }).find("only morton (tree)") !=
+        std::string::npos);
+  // Asking for a default is no error (effective.yaml names them all), nor is an axis that the command line takes away
+  // from a parameter.
   CHECK(builders("builder: [binned_sah]", "max_depth: 0, ploc_radius: 16, morton_bits: 63") == List{"binned_sah"});
   CHECK(builders("builder: [all]", "morton_bits: [30, 63]", {.axes = {"builder=binned_sah"}}) == List{"binned_sah"});
 }
@@ -378,15 +411,14 @@ measure: {min_time: 0.125, memory: 512MiB}
   CHECK(effective_yaml(second) == effective_yaml(first));
   CHECK(configuration_hash(second) == configuration_hash(first));
   CHECK(second.measure.memory == std::size_t{512} << 20);
-  CHECK(configuration_hash(read_experiment(file, registry, {.axes = {}, .seed = 9})) !=
-        configuration_hash(first));
+  CHECK(configuration_hash(read_experiment(file, registry, {.axes = {}, .seed = 9})) != configuration_hash(first));
 }
-
 
 TEST_CASE("the figure of ways to leave a surface is drawn where there are several, whatever the metrics") {
   const TemporaryFolder folder;
   const auto drawn = [&](const std::string& ways, const std::string& workload) {
-    const std::string yaml = "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], workload: [" + workload + "]}\nmetrics: [trace]\nrays: {self_intersection: [" + ways + "]}\n";
+    const std::string yaml = "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], workload: [" +
+                             workload + "]}\nmetrics: [trace]\nrays: {self_intersection: [" + ways + "]}\n";
     const std::vector<std::string> plots = read_experiment(folder.write("rays.yaml", yaml), paper_registry()).plots;
     return std::ranges::find(plots, "self_intersection") != plots.end();
   };

@@ -1,5 +1,5 @@
-// Node formats beside the plain one: quantised boxes hold what they stand for, exactly; nodes take the bytes they claim; deep trees
-// have the stack they need.
+// Node formats beside the plain one: quantised boxes hold what they stand for, exactly; nodes take the bytes they
+// claim; deep trees have the stack they need.
 #include <algorithm>
 #include <bit>
 #include <boost/multiprecision/cpp_int.hpp>
@@ -46,7 +46,8 @@ void check_node(const std::vector<Bounds3f>& boxes) {
     for (int axis = 0; axis < 3; ++axis) {
       const bvh_quantised::Grid grid = grid_of(node, axis);
       CAPTURE(i, axis, boxes[i].lower[axis], boxes[i].upper[axis], int(grid.exponent), grid.origin);
-      const unsigned low = node.plane(unsigned(axis), 0, unsigned(i)), high = node.plane(unsigned(axis), 1, unsigned(i));
+      const unsigned low = node.plane(unsigned(axis), 0, unsigned(i)),
+                     high = node.plane(unsigned(axis), 1, unsigned(i));
       REQUIRE((grid.exponent >= 21 && grid.exponent <= 254));
       const Rational lower = boxes[i].lower[axis], upper = boxes[i].upper[axis];
       CHECK(exact_plane(grid, low) <= lower);
@@ -59,9 +60,7 @@ void check_node(const std::vector<Bounds3f>& boxes) {
   }
 }
 
-Bounds3f box_between(Vec3f a, Vec3f b) {
-  return {min(a, b), max(a, b)};
-}
+Bounds3f box_between(Vec3f a, Vec3f b) { return {min(a, b), max(a, b)}; }
 
 }  // namespace
 
@@ -85,8 +84,30 @@ TEST_CASE("quantised boxes hold random boxes at every scale and offset, exactly 
 TEST_CASE("quantised boxes hold extreme boxes: flat, points, huge, tiny, subnormal, an ulp thick") {
   constexpr float kMax = std::numeric_limits<float>::max(), kLeast = std::numeric_limits<float>::denorm_min();
   const auto up = [](float x) { return std::nextafter(x, kInfinity); };
-  const float values[] = {-kMax,          -1e30f, -1e6f, -up(1.0f),  -1.0f,   -0x1p-126f, -kLeast, -0.0f, 0.0f, kLeast, 3 * kLeast, 0x1p-149f * 1023,
-                          0x1p-149f * 1024, 1e-38f, 0.1f,  0x1.ff8p0f, 1.0f,    up(1.0f),   1022.0f, 1023.0f, up(1023.0f), 1e6f, up(1e6f), kMax};
+  const float values[] = {-kMax,
+                          -1e30f,
+                          -1e6f,
+                          -up(1.0f),
+                          -1.0f,
+                          -0x1p-126f,
+                          -kLeast,
+                          -0.0f,
+                          0.0f,
+                          kLeast,
+                          3 * kLeast,
+                          0x1p-149f * 1023,
+                          0x1p-149f * 1024,
+                          1e-38f,
+                          0.1f,
+                          0x1.ff8p0f,
+                          1.0f,
+                          up(1.0f),
+                          1022.0f,
+                          1023.0f,
+                          up(1023.0f),
+                          1e6f,
+                          up(1e6f),
+                          kMax};
   std::vector<std::pair<float, float>> ranges;
   for (float a : values)
     for (float b : values)
@@ -102,7 +123,8 @@ TEST_CASE("quantised boxes hold extreme boxes: flat, points, huge, tiny, subnorm
   }
   // A grid of whole steps is kept without loss, and a flat one is flat.
   std::vector<Bounds3f> cells;
-  for (int i = 0; i < 8; ++i) cells.push_back({{float(i) * 128.0f, 5.0f, -3.0f}, {float(i) * 128.0f + 127.0f, 5.0f, 1020.0f}});
+  for (int i = 0; i < 8; ++i)
+    cells.push_back({{float(i) * 128.0f, 5.0f, -3.0f}, {float(i) * 128.0f + 127.0f, 5.0f, 1020.0f}});
   typename QuantisedNodes<8>::Node node;
   const bvh::NodeReference references[8] = {};
   QuantisedNodes<8>::write(node, cells.data(), references, 8);
@@ -157,7 +179,8 @@ TEST_CASE("node bytes: at least 35 % less when quantised, for the same tree") {
 
 TEST_CASE("every triangle stands once in a leaf whose boxes, as rays meet them, hold it") {
   for (const char* structure : kFormats) {
-    for (const TriangleMesh& mesh : {random_triangles(3001, 0.05f, 3), flat_grid(16), moved(random_triangles(500, 0.1f, 4), 1.0f, {1e6f, 1e6f, -1e6f})}) {
+    for (const TriangleMesh& mesh : {random_triangles(3001, 0.05f, 3), flat_grid(16),
+                                     moved(random_triangles(500, 0.1f, 4), 1.0f, {1e6f, 1e6f, -1e6f})}) {
       struct Seen final : StructureVisitor {
         const TriangleMesh& mesh;
         std::vector<unsigned> times;
@@ -195,13 +218,16 @@ TEST_CASE("a tree deeper than the stack on the frame, one triangle a leaf") {
   const auto truth = oracle.closest_hit(rays);
   Structures structures(mesh);
   for (const KernelRow& row : runnable_rows()) {
-    if (std::ranges::find(kFormats, row.structure) == std::end(kFormats) || row.intersector != "watertight" || row.box != "padded") continue;
+    if (std::ranges::find(kFormats, row.structure) == std::end(kFormats) || row.intersector != "watertight" ||
+        row.box != "padded")
+      continue;
     INFO(name_of(row));
     CHECK(oracle.check_closest_hit(rays, truth, closest_hit(row, structures.get(row), rays)).wrong_answers() == 0);
   }
 }
 
-TEST_CASE("a large scene and a short direction: the node's origin in the ray's parameter overflows, the distance does not") {
+TEST_CASE(
+    "a large scene and a short direction: the node's origin in the ray's parameter overflows, the distance does not") {
   TriangleMesh mesh = moved(random_triangles(400, 0.1f, 5), 0x1p40f);
   const float a = 0x1p38f;
   for (int i = 0; i < 30; ++i) {
@@ -213,8 +239,10 @@ TEST_CASE("a large scene and a short direction: the node's origin in the ray's p
   std::vector<Ray> rays;
   for (float length : {0x1p-40f, 0x1p-30f, 0x1p-50f, 1.0f}) {
     for (float off : {0.0f, 1.0f, -3.0f, 0x1p10f}) {
-      rays.push_back({{off, 1, -0x1p40f}, 0, {0, 0, length}, kInfinity}), rays.push_back({{off, -off, 0x1p40f}, 0, {-0.0f, 0, -length}, kInfinity});
-      rays.push_back({{off, off, 1}, 0, {0, 0, length}, kInfinity}), rays.push_back({{1, off, 0}, 0, {0x1p-62f * length, 0, length}, kInfinity});
+      rays.push_back({{off, 1, -0x1p40f}, 0, {0, 0, length}, kInfinity}),
+          rays.push_back({{off, -off, 0x1p40f}, 0, {-0.0f, 0, -length}, kInfinity});
+      rays.push_back({{off, off, 1}, 0, {0, 0, length}, kInfinity}),
+          rays.push_back({{1, off, 0}, 0, {0x1p-62f * length, 0, length}, kInfinity});
     }
   }
   Structures structures(mesh);
@@ -224,7 +252,8 @@ TEST_CASE("a large scene and a short direction: the node's origin in the ray's p
     const KernelRow* reference = find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
     if (!reference) continue;
     INFO(name_of(row));
-    const std::vector<Hit> want = closest_hit(*reference, structures.get(*reference), rays), got = closest_hit(row, structures.get(row), rays);
+    const std::vector<Hit> want = closest_hit(*reference, structures.get(*reference), rays),
+                           got = closest_hit(row, structures.get(row), rays);
     CHECK(same_bits(got, want));
     hits += std::size_t(std::ranges::count_if(want, &Hit::is_hit));
   }

@@ -32,8 +32,8 @@ std::uint64_t hash(const TriangleMesh& mesh) {
 TEST_CASE("every generator makes the count asked for, of sound triangles") {
   for (const GeneratorInfo& generator : generators()) {
     const bool even = generator.rule.starts_with("closed");
-    for (const std::size_t count : {1,  2,  3,  5,  6,  7,  11,  12,  13,   14,   23,   24,
-                                    25, 26, 37, 59, 60, 61, 100, 257, 1000, 1001, 4999, 20000}) {
+    for (const std::size_t count :
+         {1, 2, 3, 5, 6, 7, 11, 12, 13, 14, 23, 24, 25, 26, 37, 59, 60, 61, 100, 257, 1000, 1001, 4999, 20000}) {
       INFO(generator.name << " " << count);
       const Scene scene = generate_scene(generator.name, count, 1);
       CHECK(scene.mesh.size() == (even ? std::max<std::size_t>(6, count / 2 * 2) : count));
@@ -41,8 +41,7 @@ TEST_CASE("every generator makes the count asked for, of sound triangles") {
       CHECK(scene.mesh.materials.size() == (scene.mesh.materials.empty() ? 0 : scene.mesh.size()));
       for (const std::uint16_t m : scene.mesh.materials) REQUIRE(m < scene.materials.size());
       REQUIRE(scene.camera);
-      for (const Triangle& t : scene.mesh.triangles)
-        REQUIRE(std::max({t.a, t.b, t.c}) < scene.mesh.vertices.size());
+      for (const Triangle& t : scene.mesh.triangles) REQUIRE(std::max({t.a, t.b, t.c}) < scene.mesh.vertices.size());
     }
   }
 }
@@ -76,8 +75,7 @@ TEST_CASE("the seed changes what it should, and is refused where it changes noth
   for (const GeneratorInfo& generator : generators()) {
     INFO(generator.name);
     if (generator.takes_seed) {
-      CHECK(hash(generate_scene(generator.name, 500, 1).mesh) !=
-            hash(generate_scene(generator.name, 500, 2).mesh));
+      CHECK(hash(generate_scene(generator.name, 500, 1).mesh) != hash(generate_scene(generator.name, 500, 2).mesh));
     } else {
       CHECK_THROWS_AS(generate_scene(generator.name, 500, 2), UserError);
     }

@@ -29,8 +29,7 @@ namespace {
 struct Variant {
   const char *structure, *builder;
 };
-const Variant kVariants[] = {
-    {"grid", "two_level"}, {"grid", "uniform"}, {"octree", "octants"}, {"bih", "binned_sah"}};
+const Variant kVariants[] = {{"grid", "two_level"}, {"grid", "uniform"}, {"octree", "octants"}, {"bih", "binned_sah"}};
 
 std::unique_ptr<Accel> build(const Variant& v, const TriangleMesh& mesh, std::string leaf = "triangle4",
                              unsigned threads = 1, const BuilderParameters& parameters = {},
@@ -120,8 +119,7 @@ std::vector<Ray> hard_rays(const TriangleMesh& mesh, std::size_t count, std::uin
     const Vec3f d{uniform(seed, i, 1, -1, 1), uniform(seed, i, 2, -1, 1), uniform(seed, i, 3, -1, 1)};
     for (const float away : {0.0f, 0.5f, 10.0f, 100.0f, 1e4f})
       rays.push_back({at - d * (size * away), 0, d, kInfinity});
-    for (const float scale : {1e-20f, 1e-8f, 1e8f, 1e20f})
-      rays.push_back({at - d * size, 0, d * scale, kInfinity});
+    for (const float scale : {1e-20f, 1e-8f, 1e8f, 1e20f}) rays.push_back({at - d * size, 0, d * scale, kInfinity});
   }
   return rays;
 }
@@ -165,15 +163,13 @@ TEST_CASE(
     const std::vector<Ray> rays = hard_rays(scene.mesh, 60, 5);
     for (const KernelRow& row : runnable_rows()) {
       if (row.box != "padded" || row.intersector != "watertight" || row.traversal != "single") continue;
-      const KernelRow* reference =
-          find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
+      const KernelRow* reference = find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
       for (const Variant& v : kVariants) {
         if (row.structure != v.structure || !reference) continue;
         INFO(scene.name << ": " << name_of(row) << ", " << v.builder);
         const auto truth = build({"brute_force", "in_order"}, scene.mesh, std::string(row.leaf)),
                    accel = build(v, scene.mesh, std::string(row.leaf));
-        const std::vector<Hit> want = closest_hit(*reference, *truth, rays),
-                               got = closest_hit(row, *accel, rays);
+        const std::vector<Hit> want = closest_hit(*reference, *truth, rays), got = closest_hit(row, *accel, rays);
         const std::vector<std::uint8_t> occluded = any_hit(row, *accel, rays);
         for (std::size_t i = 0; i < rays.size(); ++i) {
           INFO("ray " << i << ": t " << got[i].t << ", primitive " << got[i].primitive << "; brute force: t "
@@ -228,8 +224,7 @@ TEST_CASE("grid, octree and bih are the same for any number of threads") {
 TEST_CASE("leaves that hold the same triangles share their blocks") {
   TriangleMesh mesh = random_triangles(4000, 0.02f, 13);
   for (Vec3f& p : mesh.vertices) p.z *= 0.01f;
-  for (int i = 0; i < 40; ++i)
-    add_triangle(mesh, {-1, -1, float(i) + 1}, {1, -1, float(i) + 1}, {1, 1, float(i) + 1});
+  for (int i = 0; i < 40; ++i) add_triangle(mesh, {-1, -1, float(i) + 1}, {1, -1, float(i) + 1}, {1, 1, float(i) + 1});
   BuilderParameters p;
   p.grid_density = 16;
   const auto accel = build({"grid", "uniform"}, mesh, "triangle1", 1, p);
@@ -276,16 +271,19 @@ TEST_CASE("the triangle/box test agrees with clipping the triangle to the box") 
 TEST_CASE("a needle is not lost to the rounding of its normal") {
   std::size_t all_rounding = 0;
   for (std::uint64_t i = 0; i < 20000; ++i) {
-    const Vec3f tip = uniform_point(31, i, 0, {{-1, -1, -1}, {1, 1, 1}}), end = uniform_point(31, i, 3, {{-1, -1, -1}, {1, 1, 1}}) * std::ldexp(1.0f, -int(i % 3) * 40);
+    const Vec3f tip = uniform_point(31, i, 0, {{-1, -1, -1}, {1, 1, 1}}),
+                end = uniform_point(31, i, 3, {{-1, -1, -1}, {1, 1, 1}}) * std::ldexp(1.0f, -int(i % 3) * 40);
     const float width = std::ldexp(1.0f, -int(i % 80));
     std::array<Vec3f, 3> t{tip, end, end + uniform_point(31, i, 6, {{-1, -1, -1}, {1, 1, 1}}) * width};
     std::rotate(t.begin(), t.begin() + std::ptrdiff_t(i / 3 % 3), t.end());
-    const double pad = 0x1p-44 * std::max({double(std::abs(tip.x)), double(std::abs(tip.y)), double(std::abs(tip.z)), double(std::abs(end.x)), double(std::abs(end.y)), double(std::abs(end.z))});
+    const double pad = 0x1p-44 * std::max({double(std::abs(tip.x)), double(std::abs(tip.y)), double(std::abs(tip.z)),
+                                           double(std::abs(end.x)), double(std::abs(end.y)), double(std::abs(end.z))});
     const TriangleOverlap overlap(t);
     all_rounding += width < 0x1p-53f;
     for (int at = 0; at <= 64; ++at) {  // points of the edge that is long, in boxes of their own
       const double s = at / 64.0;
-      const std::array<double, 3> p{tip.x + s * (double(end.x) - tip.x), tip.y + s * (double(end.y) - tip.y), tip.z + s * (double(end.z) - tip.z)};
+      const std::array<double, 3> p{tip.x + s * (double(end.x) - tip.x), tip.y + s * (double(end.y) - tip.y),
+                                    tip.z + s * (double(end.z) - tip.z)};
       INFO("triangle " << i << ", " << at);
       if (!overlap.touches(p, {pad, pad, pad})) FAIL_CHECK("a point of the triangle is outside");
     }
@@ -296,7 +294,8 @@ TEST_CASE("a needle is not lost to the rounding of its normal") {
 TEST_CASE("a grid's expected steps are what random rays take") {
   const TriangleMesh mesh = random_triangles(20000, 1e-4f, 14);
   const std::span<const KernelRow> rows = kernel_table();
-  const auto row = std::ranges::find_if(rows, [](const KernelRow& r) { return r.structure == "grid" && r.leaf == "triangle4" && is_available(r.isa); });
+  const auto row = std::ranges::find_if(
+      rows, [](const KernelRow& r) { return r.structure == "grid" && r.leaf == "triangle4" && is_available(r.isa); });
   REQUIRE(row != rows.end());
   const auto accel = build({"grid", "uniform"}, mesh);
   struct Steps final : StructureVisitor {
@@ -311,8 +310,7 @@ TEST_CASE("a grid's expected steps are what random rays take") {
     const double z = 2 * random_double(9, i, 0) - 1, phi = 6.283185307179586 * random_double(9, i, 1),
                  r = std::sqrt(1 - z * z);
     const Vec3f d{float(r * std::cos(phi)), float(r * std::sin(phi)), float(z)};
-    const Vec3f u = normalize(std::abs(d.x) < 0.5f ? cross(d, {1, 0, 0}) : cross(d, {0, 1, 0})),
-                v = cross(d, u);
+    const Vec3f u = normalize(std::abs(d.x) < 0.5f ? cross(d, {1, 0, 0}) : cross(d, {0, 1, 0})), v = cross(d, u);
     const float s = 2 * uniform(9, i, 2, -1, 1), t = 2 * uniform(9, i, 3, -1, 1);
     if (s * s + t * t < 4) rays.push_back({u * s + v * t - d * 3, 0, d, kInfinity});
   }

@@ -40,8 +40,7 @@ constexpr std::string_view kFlatBox =
     "can pass beside a flat box";
 constexpr std::string_view kSharedEdge =
     "the two sides of an edge are decided by different sums, and the ray meets the edge";
-constexpr std::string_view kBeyondRange =
-    "coordinates beyond 2^40, which loaders drop: products of three overflow";
+constexpr std::string_view kBeyondRange = "coordinates beyond 2^40, which loaders drop: products of three overflow";
 constexpr std::string_view kTooSmall = "products of three coordinates underflow, t is lost";
 constexpr std::string_view kTNotRepresentable = "the exact t is beyond the largest float";
 
@@ -108,9 +107,10 @@ constexpr KnownLimit kKnownLimits[] = {
      "needle seen edge on: the edge functions are rounding noise, here of one sign"},
 };
 
-/// Whether a row tests boxes that are flat around these cases' triangles, and tests them fast: BVHs where a leaf is one triangle,
-/// the bounding intervals always (they end where the triangle does, on one axis, whatever the leaf). The kd-tree's fast planes are padded along axes on
-/// which a ray does not move, and cells of grid and octree are wider than a flat triangle.
+/// Whether a row tests boxes that are flat around these cases' triangles, and tests them fast: BVHs where a leaf is one
+/// triangle, the bounding intervals always (they end where the triangle does, on one axis, whatever the leaf). The
+/// kd-tree's fast planes are padded along axes on which a ray does not move, and cells of grid and octree are wider
+/// than a flat triangle.
 bool loses_flat_boxes(const KernelRow& row) {
   if (row.box != "fast" || row.structure == "brute_force") return false;
   if (row.structure == "kdtree" || row.structure == "grid" || row.structure == "octree") return false;
@@ -122,8 +122,8 @@ std::string_view expected_fault(const HardCase& c, const KernelRow& row) {
   const bool has_fma = row.isa >= Isa::avx2;
   for (const KnownLimit& limit : kKnownLimits) {
     if (limit.id != c.id || (!limit.intersector.empty() && limit.intersector != row.intersector)) continue;
-    // The triangle of S04 has no area, so it is NaN in blocks that are no indices; and the kd-tree culls with the scene's bounds, which
-    // its false hit lies outside of.
+    // The triangle of S04 has no area, so it is NaN in blocks that are no indices; and the kd-tree culls with the
+    // scene's bounds, which its false hit lies outside of.
     if (c.id == "S04" && (!row.leaf.ends_with('i') || (row.structure == "kdtree" && row.box == "fast"))) continue;
     if ((limit.arithmetic == fused && !has_fma) || (limit.arithmetic == unfused && has_fma)) continue;
     if (limit.of_fast_boxes && !loses_flat_boxes(row)) continue;
@@ -206,8 +206,7 @@ TEST_CASE("a ray through the diagonal of a quad hits it, in every watertight and
   for (std::size_t i = 0; i < quads.size(); ++i) {
     Structures structures(quads[i]);
     for (const KernelRow& row : runnable_rows()) {
-      if (row.structure == "embree" || (row.intersector != "watertight" && row.intersector != "pluecker"))
-        continue;
+      if (row.structure == "embree" || (row.intersector != "watertight" && row.intersector != "pluecker")) continue;
       INFO("quad " << i << ": " << name_of(row));
       const Hit hit = closest_hit(row, structures.get(row), std::span(&ray, 1))[0];
       CHECK(hit.is_hit());

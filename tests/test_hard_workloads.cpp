@@ -18,9 +18,7 @@ using namespace arboretum::test;
 
 namespace {
 
-Scene scene_of(const char* word) {
-  return load_scene(parse_scene_word(word));
-}
+Scene scene_of(const char* word) { return load_scene(parse_scene_word(word)); }
 
 SceneData data_of(const char* word, const Placing& placing = {}) {
   static const MeasureSettings kSmall{.width = 64, .height = 48};
@@ -43,7 +41,9 @@ TEST_CASE("a picture position and its ray belong to each other; behind the camer
   }
 }
 
-TEST_CASE("hard workloads: as many rays as pixels, of their kind, the same for the same seed; none where there is nothing to aim at") {
+TEST_CASE(
+    "hard workloads: as many rays as pixels, of their kind, the same for the same seed; none where there is nothing to "
+    "aim at") {
   const Scene closed = scene_of("sphere:200"), open = scene_of("fractal_terrain:300");
   const View view{.width = 20, .height = 10, .seed = 3};
   for (std::string_view name : hard_workload_names()) {
@@ -56,7 +56,9 @@ TEST_CASE("hard workloads: as many rays as pixels, of their kind, the same for t
     CHECK(made.pixels.size() == (name == "camera_edges" ? 200u : 0u));
     for (const Ray& ray : made.rays) CHECK(is_valid(ray));
     const auto same = [&](const Workload& other) {
-      return std::ranges::equal(made.rays, other.rays, [](const Ray& a, const Ray& b) { return a.origin == b.origin && a.direction == b.direction; });
+      return std::ranges::equal(made.rays, other.rays, [](const Ray& a, const Ray& b) {
+        return a.origin == b.origin && a.direction == b.direction;
+      });
     };
     CHECK(same(make_hard_workload(name, open, view)));
     CHECK_FALSE(same(make_hard_workload(name, open, {.width = 20, .height = 10, .seed = 4})));
@@ -64,12 +66,15 @@ TEST_CASE("hard workloads: as many rays as pixels, of their kind, the same for t
   }
   CHECK_FALSE(is_hard("diffuse"));
   CHECK_THROWS_AS(make_hard_workload("diffuse", closed, view), std::invalid_argument);
-  // Each kind of ray is what its name says: those in planes have a direction without that axis, those along axes have one alone.
+  // Each kind of ray is what its name says: those in planes have a direction without that axis, those along axes have
+  // one alone.
   for (const Ray& ray : make_hard_workload("hard_axis", closed, view).rays)
     CHECK((ray.direction.x != 0) + (ray.direction.y != 0) + (ray.direction.z != 0) == 1);
 }
 
-TEST_CASE("rays at edges from the camera meet what they are aimed at, where it is seen; an answer that misses it is a leak there") {
+TEST_CASE(
+    "rays at edges from the camera meet what they are aimed at, where it is seen; an answer that misses it is a leak "
+    "there") {
   SceneData data = data_of("sphere:400");
   const Workload& edges = data.workload("camera_edges");
   const auto seen = data.seen_pixels(edges);
@@ -82,7 +87,9 @@ TEST_CASE("rays at edges from the camera meet what they are aimed at, where it i
   CHECK(data.leak_pixels(edges, answers).empty());
   std::vector<std::array<float, 2>> missed;
   for (std::size_t i = 0; i < answers.size() && missed.size() < 5; ++i) {
-    if (std::fabs(answers[i].t - 1.0f) > 1e-3f || oracle.judge(edges.rays[i], 0.0f, oracle.closest_hit(std::span(&edges.rays[i], 1))[0], Hit{}).crack == false) continue;
+    if (std::fabs(answers[i].t - 1.0f) > 1e-3f ||
+        oracle.judge(edges.rays[i], 0.0f, oracle.closest_hit(std::span(&edges.rays[i], 1))[0], Hit{}).crack == false)
+      continue;
     answers[i] = Hit{};
     missed.push_back(edges.pixels[i]);
   }
@@ -94,7 +101,8 @@ TEST_CASE("rays at edges from the camera meet what they are aimed at, where it i
 }
 
 TEST_CASE("placing stretches, then sizes, then moves, and says so") {
-  SceneData plain = data_of("sphere:400"), placed = data_of("sphere:400", {.stretch = 10, .size = 4, .offset = 100, .label = ":x"});
+  SceneData plain = data_of("sphere:400"),
+            placed = data_of("sphere:400", {.stretch = 10, .size = 4, .offset = 100, .label = ":x"});
   REQUIRE(placed.mesh().vertices.size() == plain.mesh().vertices.size());
   for (std::size_t i = 0; i < plain.mesh().vertices.size(); ++i) {
     const Vec3f from = plain.mesh().vertices[i], to = placed.mesh().vertices[i];
@@ -111,22 +119,28 @@ TEST_CASE("placing stretches, then sizes, then moves, and says so") {
   // Framed whole: the primary rays meet it.
   const Workload& primary = placed.workload("primary");
   const Oracle oracle(placed.mesh());
-  CHECK(std::ranges::count_if(oracle.closest_hit(primary.batch()), [](const ExactHit& h) { return h.hit.is_hit(); }) > 50);
+  CHECK(std::ranges::count_if(oracle.closest_hit(primary.batch()), [](const ExactHit& h) { return h.hit.is_hit(); }) >
+        50);
 }
 
 TEST_CASE("a run counts leaks by place and test, and keeps where they are, once a cell") {
   const Folder folder;
   const Registry registry = this_registry();
   const std::string isa(to_string(registry.isas.back()));
-  const auto file = folder.write("leaks.yaml", R"(
+  const auto file = folder.write(
+      "leaks.yaml", R"(
 scenes: [{generate: sphere, triangles: 500}, {generate: sphere, triangles: 500, size: 100, offset: [0, 1e4]}]
-axes: {structure: [bvh8], isa: [)" + isa + R"(], intersector: [moller_trumbore, watertight, exact], workload: [hard_vertex, camera_edges]}
+axes: {structure: [bvh8], isa: [)" +
+                        isa +
+                        R"(], intersector: [moller_trumbore, watertight, exact], workload: [hard_vertex, camera_edges]}
 exclude: [{scene: "sphere-500:size=100:offset=0", workload: camera_edges}, {scene: "sphere-500:size=100:offset=1e4", workload: camera_edges}]
 measure: {repetitions: 2, warmup: 0, min_time: 0.001, resolution: [96, 96]}
 metrics: [trace, accuracy]
 )");
   const Experiment experiment = read_experiment(file, registry);
-  CHECK(experiment.plots == std::vector<std::string>{"rays_per_second", "rays_by_builder", "bytes_per_triangle", "accuracy_vs_time", "leaks_vs_distance", "leaks_vs_aspect", "leak_picture"});
+  CHECK(experiment.plots == std::vector<std::string>{"rays_per_second", "rays_by_builder", "bytes_per_triangle",
+                                                     "accuracy_vs_time", "leaks_vs_distance", "leaks_vs_aspect",
+                                                     "leak_picture"});
   const Plan plan = make_plan(experiment, registry);
   Journal journal(folder.path(), "hash", plan, false);
   const RunOutcome outcome = run_plan(experiment, plan, registry, journal, {});

@@ -1,5 +1,5 @@
-// Every intersector on every leaf block that it reads and every instruction set, a few triangles at a time, against the exact predicate:
-// what docs/numerics.md promises of each.
+// Every intersector on every leaf block that it reads and every instruction set, a few triangles at a time, against the
+// exact predicate: what docs/numerics.md promises of each.
 #include <algorithm>
 #include <iostream>
 #include <map>
@@ -40,7 +40,9 @@ constexpr Promise kPromises[] = {
 /// One intersector's tests of one block on one instruction set, with what it promises.
 struct Tested : LeafTests {
   Promise promise;
-  [[nodiscard]] std::string name() const { return std::string(intersector) + "/" + std::string(leaf) + "/" + std::string(to_string(isa)); }
+  [[nodiscard]] std::string name() const {
+    return std::string(intersector) + "/" + std::string(leaf) + "/" + std::string(to_string(isa));
+  }
 };
 
 const std::vector<Tested>& all_tests() {
@@ -92,14 +94,16 @@ class Leaf {
   std::vector<Line> lines_;
 };
 
-/// A ray at a triangle that stands among others which it misses, so that lanes, and a block with empty ones, all have their turn.
+/// A ray at a triangle that stands among others which it misses, so that lanes, and a block with empty ones, all have
+/// their turn.
 struct Shot {
   TriangleMesh mesh;
   std::uint32_t target = 0;
   Ray ray;
   bool hit = false;
-  RoundedPoint exact;   ///< where it is hit
-  double condition = 0; ///< (|o| + |v0| + t |d|) / (|N.d| / |N|max), sums of absolute components: t's error over the unit roundoff
+  RoundedPoint exact;  ///< where it is hit
+  /// (|o| + |v0| + t |d|) / (|N.d| / |N|max), sums of absolute components: t's error over the unit roundoff
+  double condition = 0;
 };
 
 double sum(Vec3f a) { return std::abs(double(a.x)) + std::abs(double(a.y)) + std::abs(double(a.z)); }
@@ -131,7 +135,8 @@ Shot shot(Dice& dice, bool inside, float offset, float scale) {
     if (s.hit != inside) continue;  // far from the origin the rounded triangle may lie beside the ray
     if (s.hit) {
       s.exact = predicate.round(corners);
-      const double height = std::abs(double(dot(n, s.ray.direction))) / std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
+      const double height =
+          std::abs(double(dot(n, s.ray.direction))) / std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
       s.condition = (sum(s.ray.origin) + sum(corners[0]) + s.exact.t * sum(s.ray.direction)) / height;
     }
     return s;
@@ -150,7 +155,9 @@ TEST_CASE("every intersector has a promise, and every block is read by one") {
     REQUIRE(t.form);
     ++of_leaf[t.leaf];
   }
-  for (const char* leaf : {"triangle4", "triangle4v", "triangle4i", "triangle4w", "triangle4h", "triangle4p", "triangle1w"}) CHECK(of_leaf[leaf] > 0);
+  for (const char* leaf :
+       {"triangle4", "triangle4v", "triangle4i", "triangle4w", "triangle4h", "triangle4p", "triangle1w"})
+    CHECK(of_leaf[leaf] > 0);
   const Isa isa = all_tests().front().isa;
   CHECK_FALSE(find_leaf_tests("triangle4", "pluecker_double", isa));
   CHECK_FALSE(find_leaf_tests("triangle4w", "watertight", isa));
@@ -194,7 +201,8 @@ TEST_CASE("far from the origin precomputed triangles lose t, and the others do n
     const Shot s = shot(dice, true, 1e4f, 1.0f);
     for (const Tested& tests : all_tests()) {
       const Hit hit = Leaf(tests, s.mesh).closest_hit(s.ray);
-      if (hit.is_hit()) errors[std::string(tests.intersector)].push_back(std::abs(hit.t - s.exact.t) / ulp_of(s.exact.t));
+      if (hit.is_hit())
+        errors[std::string(tests.intersector)].push_back(std::abs(hit.t - s.exact.t) / ulp_of(s.exact.t));
     }
   }
   for (auto& [name, list] : errors) {
@@ -219,16 +227,22 @@ TEST_CASE("edges and vertices of a closed fan are not lost where that is promise
     // Every other fan has small whole numbers, so that rays meet its edges and vertices exactly.
     const bool whole = i % 2 == 0;
     const float offset = i % 3 == 0 && !whole ? 1e3f : 0.0f;
-    const auto rounded = [&](Vec3f p) { return whole ? Vec3f{std::round(p.x * 64), std::round(p.y * 64), std::round(p.z * 64)} : p + Vec3f{offset, offset, -offset}; };
+    const auto rounded = [&](Vec3f p) {
+      return whole ? Vec3f{std::round(p.x * 64), std::round(p.y * 64), std::round(p.z * 64)}
+                   : p + Vec3f{offset, offset, -offset};
+    };
     const Vec3f o = dice.point() * 3.0f, c = dice.point(), d = normalize(c - o);
     const Vec3f x = normalize(cross(d, std::abs(d.x) < 0.6f ? Vec3f{1, 0, 0} : Vec3f{0, 1, 0})), y = cross(d, x);
     const int n = 3 + dice.integer(8);
     TriangleMesh fan;
     fan.vertices = {rounded(c)};
     for (int k = 0; k < n; ++k) {
-      const float angle = 6.2831853f * (float(k) + dice.uniform(-0.2f, 0.2f)) / float(n), radius = dice.uniform(0.6f, 1.4f);
-      fan.vertices.push_back(rounded(c + (x * std::cos(angle) + y * std::sin(angle)) * radius + d * dice.uniform(-0.3f, 0.3f)));
-      // Each begins with another corner: the edges from a common first corner are alike even in tests that promise nothing.
+      const float angle = 6.2831853f * (float(k) + dice.uniform(-0.2f, 0.2f)) / float(n),
+                  radius = dice.uniform(0.6f, 1.4f);
+      fan.vertices.push_back(
+          rounded(c + (x * std::cos(angle) + y * std::sin(angle)) * radius + d * dice.uniform(-0.3f, 0.3f)));
+      // Each begins with another corner: the edges from a common first corner are alike even in tests that promise
+      // nothing.
       const std::uint32_t ring[] = {0, std::uint32_t(1 + k), std::uint32_t(1 + (k + 1) % n)};
       const int first = dice.integer(3);
       fan.triangles.push_back({ring[first], ring[(first + 1) % 3], ring[(first + 2) % 3]});
@@ -256,7 +270,8 @@ TEST_CASE("edges and vertices of a closed fan are not lost where that is promise
     CHECK(lost[name].edges > 0);
     CHECK(lost[name].vertices > 0);
   }
-  for (const auto& [name, l] : lost) std::cout << name << ": lost " << l.edges << " at edges, " << l.vertices << " at vertices\n";
+  for (const auto& [name, l] : lost)
+    std::cout << name << ": lost " << l.edges << " at edges, " << l.vertices << " at vertices\n";
 }
 
 TEST_CASE("a triangle of zero area is never hit") {
@@ -266,21 +281,26 @@ TEST_CASE("a triangle of zero area is never hit") {
     const Vec3f a = dice.point(), b = i % 2 ? dice.point() : a * 2.0f;
     TriangleMesh mesh;
     switch (i % 6) {
-      case 0: add_triangle(mesh, a, b, a * 4.0f); break;   // irregular and exactly on a line through the origin
+      case 0: add_triangle(mesh, a, b, a * 4.0f); break;  // irregular and exactly on a line through the origin
       case 1: add_triangle(mesh, a, a, b); break;
       case 2: add_triangle(mesh, a, b, a); break;
       case 3: add_triangle(mesh, b, a, a); break;
       case 4: add_triangle(mesh, a, a, a); break;
       default: {  // the middle of two points of even whole numbers
-        const auto even = [](Vec3f p) { return Vec3f{2 * std::round(p.x * 1e6f), 2 * std::round(p.y * 1e6f), 2 * std::round(p.z * 1e6f)}; };
+        const auto even = [](Vec3f p) {
+          return Vec3f{2 * std::round(p.x * 1e6f), 2 * std::round(p.y * 1e6f), 2 * std::round(p.z * 1e6f)};
+        };
         add_triangle(mesh, even(a), even(b), (even(a) + even(b)) * 0.5f);
       }
     }
     const auto corner = mesh.corners(0);
-    const Vec3f o = dice.point() * (3.0f * length(corner[0])), p = corner[0] + (corner[1] - corner[0]) * dice.uniform(0.0f, 1.0f);
-    for (const Ray& ray : {Ray{o, 0, p - o, kFar}, Ray{o, 0, corner[2] - o, kFar}, Ray{{}, 0, corner[0], kFar}, Ray{corner[0] * -3.0f, 0, corner[0], kFar}}) {
+    const Vec3f o = dice.point() * (3.0f * length(corner[0])),
+                p = corner[0] + (corner[1] - corner[0]) * dice.uniform(0.0f, 1.0f);
+    for (const Ray& ray : {Ray{o, 0, p - o, kFar}, Ray{o, 0, corner[2] - o, kFar}, Ray{{}, 0, corner[0], kFar},
+                           Ray{corner[0] * -3.0f, 0, corner[0], kFar}}) {
       for (const Tested& tests : all_tests()) {
-        if (tests.leaf.ends_with('i')) continue;  // indices name what the vertices are now: refit and motion may give them an area
+        // Indices name what the vertices are now: refit and motion may give them an area
+        if (tests.leaf.ends_with('i')) continue;
         INFO(tests.name() << ", triangle " << i);
         hits[std::string(tests.intersector)] += Leaf(tests, mesh).closest_hit(ray).is_hit();
       }
@@ -303,8 +323,9 @@ TEST_CASE("the interval is closed") {
       const Leaf leaf(tests, s.mesh);
       const float t = leaf.closest_hit(s.ray).t;
       const auto within = [&](float tnear, float tfar) { return Ray{s.ray.origin, tnear, s.ray.direction, tfar}; };
-      for (const auto& [ray, expected] : {std::pair(within(t, t), true), std::pair(within(std::nextafter(t, kFar), kFar), false),
-                                          std::pair(within(0, std::nextafter(t, 0.0f)), false)}) {
+      for (const auto& [ray, expected] :
+           {std::pair(within(t, t), true), std::pair(within(std::nextafter(t, kFar), kFar), false),
+            std::pair(within(0, std::nextafter(t, 0.0f)), false)}) {
         REQUIRE(leaf.closest_hit(ray).is_hit() == expected);
         REQUIRE(leaf.any_hit(ray) == expected);
       }
@@ -333,7 +354,8 @@ TEST_CASE("precomputed numbers are those of their definitions") {
         const float expected = w == k ? 1.0f : 0.0f, most = 2e-4f * (1.0f + float(sum(p)));
         CHECK(std::abs(value(row, 4 * (w - 1), p) + row[4 * w - 1] - expected) < most);
         CHECK(std::abs(value(plane, 4 * w, p) + plane[4 * w + 3] - expected) < most);
-        CHECK(std::abs(number[3 * w] * turned[1] + number[3 * w + 1] * turned[2] + number[3 * w + 2] - expected) < most);
+        CHECK(std::abs(number[3 * w] * turned[1] + number[3 * w + 1] * turned[2] + number[3 * w + 2] - expected) <
+              most);
       }
     }
   }

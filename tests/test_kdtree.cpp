@@ -1,5 +1,5 @@
-// Building the kd-tree: that clipping loses no reference, that duplicates, depth and memory are bounded, and that both builders make
-// the same tree for any number of threads. Its rays: tests/test_kdtree_rays.cpp.
+// Building the kd-tree: that clipping loses no reference, that duplicates, depth and memory are bounded, and that both
+// builders make the same tree for any number of threads. Its rays: tests/test_kdtree_rays.cpp.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -22,7 +22,8 @@ namespace {
 
 constexpr std::size_t kMostReferences = 8;  // times the triangles: the bound that docs/structures.md states
 
-/// What a visitor sees: references of each triangle, whether cells tile their parents, whether a triangle's leaves cover it.
+/// What a visitor sees: references of each triangle, whether cells tile their parents, whether a triangle's leaves
+/// cover it.
 class Recorder final : public StructureVisitor {
  public:
   explicit Recorder(const TriangleMesh& mesh) : mesh_(mesh), leaves_of_(mesh.size()) {}
@@ -50,19 +51,21 @@ class Recorder final : public StructureVisitor {
   [[nodiscard]] bool once_a_leaf() const { return once_; }
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
-  /// Points of triangles (corners, edge points, inner points) that no leaf of the triangle holds; a point counts as held within 2^-20 of
-  /// the scene's largest coordinate, far less than any cell here is wide.
+  /// Points of triangles (corners, edge points, inner points) that no leaf of the triangle holds; a point counts as
+  /// held within 2^-20 of the scene's largest coordinate, far less than any cell here is wide.
   [[nodiscard]] std::size_t lost_points() const {
     const Bounds3f scene = mesh_.bounds();
     double slack = 0;
-    for (std::size_t k = 0; k < 3; ++k) slack = std::max({slack, 0x1p-20 * std::abs(scene.lower[k]), 0x1p-20 * std::abs(scene.upper[k])});
+    for (std::size_t k = 0; k < 3; ++k)
+      slack = std::max({slack, 0x1p-20 * std::abs(scene.lower[k]), 0x1p-20 * std::abs(scene.upper[k])});
     std::size_t lost = 0;
     for (std::size_t t = 0; t < mesh_.size(); ++t) {
       const auto c = mesh_.corners(t);
       for (int i = 0; i <= 6; ++i) {
         for (int j = 0; i + j <= 6; ++j) {
           double p[3];
-          for (std::size_t k = 0; k < 3; ++k) p[k] = (double(c[0][k]) * i + double(c[1][k]) * j + double(c[2][k]) * (6 - i - j)) / 6;
+          for (std::size_t k = 0; k < 3; ++k)
+            p[k] = (double(c[0][k]) * i + double(c[1][k]) * j + double(c[2][k]) * (6 - i - j)) / 6;
           lost += std::ranges::none_of(leaves_of_[t], [&](const Bounds3f& cell) {
             for (std::size_t k = 0; k < 3; ++k) {
               if (p[k] < cell.lower[k] - slack || p[k] > cell.upper[k] + slack) return false;
@@ -80,7 +83,8 @@ class Recorder final : public StructureVisitor {
  private:
   void put(std::uint64_t x) { hash_ = mix64(hash_ ^ x); }
   void put(const Bounds3f& b) {
-    for (std::size_t k = 0; k < 3; ++k) put(std::bit_cast<std::uint32_t>(b.lower[k])), put(std::bit_cast<std::uint32_t>(b.upper[k]));
+    for (std::size_t k = 0; k < 3; ++k)
+      put(std::bit_cast<std::uint32_t>(b.lower[k])), put(std::bit_cast<std::uint32_t>(b.upper[k]));
   }
   const TriangleMesh& mesh_;
   std::vector<std::vector<Bounds3f>> leaves_of_;
@@ -95,10 +99,10 @@ TEST_CASE("clipping keeps what is in the box, to the last bit outward") {
   const std::array<Vec3f, 3> t{Vec3f{0, 0, 0}, Vec3f{4, 0, 0}, Vec3f{0, 4, 0}};
   CHECK(clipped_bounds(t, {{-1, -1, -1}, {5, 5, 5}}) == Bounds3f{{0, 0, 0}, {4, 4, 0}});
   CHECK(clipped_bounds(t, {{1, 1, -1}, {5, 5, 5}}) == Bounds3f{{1, 1, 0}, {3, 3, 0}});
-  CHECK(clipped_bounds(t, {{3, 0, 0}, {3, 5, 0}}) == Bounds3f{{3, 0, 0}, {3, 1, 0}});  // a box without thickness
+  CHECK(clipped_bounds(t, {{3, 0, 0}, {3, 5, 0}}) == Bounds3f{{3, 0, 0}, {3, 1, 0}});    // a box without thickness
   CHECK(clipped_bounds(t, {{4, -1, -1}, {5, 5, 5}}) == Bounds3f{{4, 0, 0}, {4, 0, 0}});  // a corner on its face
-  CHECK(clipped_bounds(t, {{2, 2, 0}, {5, 5, 5}}) == Bounds3f{{2, 2, 0}, {2, 2, 0}});  // an edge on its edge
-  CHECK(clipped_bounds(t, {{2.5f, 2.5f, -1}, {5, 5, 5}}).empty());                      // beside the long edge
+  CHECK(clipped_bounds(t, {{2, 2, 0}, {5, 5, 5}}) == Bounds3f{{2, 2, 0}, {2, 2, 0}});    // an edge on its edge
+  CHECK(clipped_bounds(t, {{2.5f, 2.5f, -1}, {5, 5, 5}}).empty());                       // beside the long edge
   CHECK(clipped_bounds(t, {{-1, -1, 1}, {5, 5, 5}}).empty());
   for (std::size_t i = 0; i < 20000; ++i) {
     Dice dice(i);
@@ -125,7 +129,8 @@ TEST_CASE("clipping keeps what is in the box, to the last bit outward") {
         REQUIRE(std::abs(parts[side].upper[k] - alone.upper[k]) <= 0x1p-20f * std::abs(scale));
       }
     }
-    for (int k = 0; k < 40; ++k) {  // no point of the triangle in the box is outside the result, but for double rounding
+    // No point of the triangle in the box is outside the result, but for double rounding
+    for (int k = 0; k < 40; ++k) {
       double w[3] = {dice.uniform(0, 1), dice.uniform(0, 1), 0};
       if (w[0] + w[1] > 1) w[0] = 1 - w[0], w[1] = 1 - w[1];
       w[2] = 1 - w[0] - w[1];
@@ -152,7 +157,8 @@ TEST_CASE("a reference that a plane cuts is never lost") {
       kdtree::Split split;
       split.axis = dice.integer(3);
       const auto k = std::size_t(split.axis);
-      split.plane = i % 2 ? std::nextafter(box.lower[k], 2.0f) : box.lower[k] + (box.upper[k] - box.lower[k]) * dice.uniform(0, 1);
+      split.plane = i % 2 ? std::nextafter(box.lower[k], 2.0f)
+                          : box.lower[k] + (box.upper[k] - box.lower[k]) * dice.uniform(0, 1);
       if (side_of(box, split) != kdtree::Side::both) continue;
       Bounds3f left, right;
       divide_reference(mesh, {box, 0}, split, cell, left, right);
@@ -174,7 +180,8 @@ TEST_CASE("leaves cover every triangle, cells tile, duplicates and depth are bou
         const auto accel = build(scene.mesh, builder, "triangle1", 1, p);
         Recorder seen(scene.mesh);
         REQUIRE(accel->visit(seen));
-        INFO(scene.name << " " << builder << " " << intersection_cost << ": " << seen.references << " references, depth " << seen.depth);
+        INFO(scene.name << " " << builder << " " << intersection_cost << ": " << seen.references
+                        << " references, depth " << seen.depth);
         CHECK(seen.cells_tile());
         CHECK(seen.once_a_leaf());
         CHECK(seen.lost_points() == 0);

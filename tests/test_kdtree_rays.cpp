@@ -1,4 +1,5 @@
-// The kd-tree's rays: those in planes, flat cells and star-shaped scenes get the brute force's answers, and a packet's go where they would go alone.
+// The kd-tree's rays: those in planes, flat cells and star-shaped scenes get the brute force's answers, and a packet's
+// go where they would go alone.
 #include <algorithm>
 #include <cstdint>
 #include <limits>
@@ -30,8 +31,8 @@ using arboretum::test::same_bits;
 
 namespace {
 
-/// Rays at inner points, corners and edges of triangles; along axes; and in planes of the tree, whose places are coordinates of
-/// the mesh: from before, inside and beside them.
+/// Rays at inner points, corners and edges of triangles; along axes; and in planes of the tree, whose places are
+/// coordinates of the mesh: from before, inside and beside them.
 std::vector<Ray> rays_for(const TriangleMesh& mesh, std::size_t count) {
   std::vector<Ray> rays;
   const Vec3f extent = mesh.bounds().extent();
@@ -40,16 +41,21 @@ std::vector<Ray> rays_for(const TriangleMesh& mesh, std::size_t count) {
     const auto c = mesh.corners(std::size_t(dice.integer(int(mesh.size()))));
     const auto other = mesh.corners(std::size_t(dice.integer(int(mesh.size()))));
     const float s = dice.uniform(0.1f, 0.6f);
-    const Vec3f at = i % 4 == 0 ? c[i % 3] : i % 4 == 1 ? c[0] * s + c[1] * (1 - s) : c[0] * s + c[1] * (0.9f - s) + c[2] * 0.1f;
+    const Vec3f at = i % 4 == 0   ? c[i % 3]
+                     : i % 4 == 1 ? c[0] * s + c[1] * (1 - s)
+                                  : c[0] * s + c[1] * (0.9f - s) + c[2] * 0.1f;
     const float size = length(c[1] - c[0]) + length(c[2] - c[0]);
-    Vec3f from = i % 3 == 0 ? at + dice.point() * (4 * size) : i % 3 == 1 ? other[0] : at + dice.point() * length(extent);
+    Vec3f from = i % 3 == 0   ? at + dice.point() * (4 * size)
+                 : i % 3 == 1 ? other[0]
+                              : at + dice.point() * length(extent);
     if (i % 5 == 0) {  // along an axis, through a vertex of the mesh
       const std::size_t axis = i / 5 % 3;
       from = at, from[axis] -= (i % 2 ? 1.0f : -1.0f) * (extent[axis] + size);
     }
     if (i % 5 == 1) from[i / 5 % 3] = at[i / 5 % 3];  // within a plane at a coordinate of the mesh
     Vec3f direction = at - from;
-    if (i % 7 == 0) for (std::size_t k = 0; k < 3; ++k) direction[k] = direction[k] == 0 ? -0.0f : direction[k];
+    if (i % 7 == 0)
+      for (std::size_t k = 0; k < 3; ++k) direction[k] = direction[k] == 0 ? -0.0f : direction[k];
     if (direction == Vec3f{}) direction = {0, 0, 1};
     rays.push_back({from, i % 6 == 5 ? 0.5f : 0.0f, direction, i % 6 == 4 ? 1.0f : kInfinity});
   }
@@ -66,23 +72,29 @@ std::vector<Ray> extreme_rays(const TriangleMesh& mesh) {
     rays.push_back({at, 0, {1, -size, 1}, kInfinity}), rays.push_back({{size, at.y, at.z}, 0, {-1, 0, 0}, kInfinity});
     rays.push_back({{low.x, size, -size}, 0, {size, -1, 1}, kInfinity}), rays.push_back({at, 0, {0, 0, -size}, size});
   }
-  rays.push_back({{kMax, -kMax, kMax}, 0, {-kMax, kMax, -kMax}, kInfinity}), rays.push_back({{-kMax, 0, 0}, 0, {kLeast, 0, 0}, kInfinity});
-  rays.push_back({at, kMax, {1, 1, 1}, kInfinity}), rays.push_back({at, 0, {1, 2, 3}, 0}), rays.push_back({at, kInfinity, {1, 0, 0}, kInfinity});
+  rays.push_back({{kMax, -kMax, kMax}, 0, {-kMax, kMax, -kMax}, kInfinity}),
+      rays.push_back({{-kMax, 0, 0}, 0, {kLeast, 0, 0}, kInfinity});
+  rays.push_back({at, kMax, {1, 1, 1}, kInfinity}), rays.push_back({at, 0, {1, 2, 3}, 0}),
+      rays.push_back({at, kInfinity, {1, 0, 0}, kInfinity});
   return rays;
 }
 
-/// Rays that share a way for a while: from one point to a patch of the mesh's bounds, in one octant where `eye` is far enough.
+/// Rays that share a way for a while: from one point to a patch of the mesh's bounds, in one octant where `eye` is far
+/// enough.
 std::vector<Ray> fan(const TriangleMesh& mesh, Vec3f eye, float spread, unsigned side) {
   std::vector<Ray> rays;
   const Vec3f extent = mesh.bounds().extent(), centre = mesh.bounds().center();
   for (unsigned i = 0; i < side * side; ++i) {
-    const Vec3f target = centre + Vec3f{(float(i % side) / float(side) - 0.5f) * extent.x, (float(i / side) / float(side) - 0.5f) * extent.y, 0.01f * extent.z} * spread;
+    const Vec3f target = centre + Vec3f{(float(i % side) / float(side) - 0.5f) * extent.x,
+                                        (float(i / side) / float(side) - 0.5f) * extent.y, 0.01f * extent.z} *
+                                      spread;
     rays.push_back({eye, 0, target - eye, kInfinity});
   }
   return rays;
 }
 
-/// The kd-tree's rows of packets and hybrids on every instruction set of this machine: both boxes, the two usual intersectors, once a kernel.
+/// The kd-tree's rows of packets and hybrids on every instruction set of this machine: both boxes, the two usual
+/// intersectors, once a kernel.
 std::vector<KernelRow> packet_rows() {
   std::vector<KernelRow> rows;
   std::set<std::tuple<std::string_view, std::string_view, std::string_view, Isa, ClosestHitFunction>> seen;
@@ -90,7 +102,8 @@ std::vector<KernelRow> packet_rows() {
     const bool packets = row.traversal.starts_with("packet") || row.traversal.starts_with("hybrid");
     const bool usual = row.intersector == "moller_trumbore" || row.intersector == "watertight";
     if (row.structure != "kdtree" || !packets || !usual || !is_available(row.isa)) continue;
-    if (seen.insert({row.intersector, row.box, row.traversal, row.isa, row.timed.closest_hit}).second) rows.push_back(row);
+    if (seen.insert({row.intersector, row.box, row.traversal, row.isa, row.timed.closest_hit}).second)
+      rows.push_back(row);
   }
   return rows;
 }
@@ -119,9 +132,10 @@ TEST_CASE("with padded planes both builders' trees give the brute force's answer
     test::Answers brute_force(structures, rays);
     Trees trees(scene.mesh);
     for (const KernelRow& row : runnable_rows()) {
-      if (row.structure != "kdtree" || row.box != "padded" || row.leaf == "triangle1" || row.leaf == "triangle16") continue;
-      // The others are wrong by more than planes are padded: where triangles are small beside the scene, and on triangles seen along their
-      // planes, which they take for hit far beside the ray.
+      if (row.structure != "kdtree" || row.box != "padded" || row.leaf == "triangle1" || row.leaf == "triangle16")
+        continue;
+      // The others are wrong by more than planes are padded: where triangles are small beside the scene, and on
+      // triangles seen along their planes, which they take for hit far beside the ray.
       const std::string_view name(scene.name);
       if (row.intersector != "watertight" && (name == "outlier" || name == "split regression")) continue;
       const KernelRow* reference = find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
@@ -133,7 +147,8 @@ TEST_CASE("with padded planes both builders' trees give the brute force's answer
         INFO(scene.name << ", " << builder << ": " << name_of(row));
         const std::vector<Hit> got = closest_hit(row, accel, rays);
         test::require_each(
-            rays.size(), [&](std::size_t i) { return same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)); },
+            rays.size(),
+            [&](std::size_t i) { return same_bits(std::span(got).subspan(i, 1), std::span(want).subspan(i, 1)); },
             [&](std::size_t i) { return test::text(got[i]) + "; brute force: " + test::text(want[i]); });
         CHECK(any_hit(row, accel, rays) == answers.any);
       }
@@ -160,7 +175,8 @@ TEST_CASE("a ray in a split plane sees the triangles of both sides") {
     INFO(name_of(row));
     const std::vector<Hit> hits = closest_hit(row, trees.get("sweep_sah", row.leaf), rays);
     test::require_each(
-        rays.size(), [&](std::size_t i) { return hits[i].primitive == std::uint32_t(std::min<std::size_t>(i % 65, 63)); },
+        rays.size(),
+        [&](std::size_t i) { return hits[i].primitive == std::uint32_t(std::min<std::size_t>(i % 65, 63)); },
         [&](std::size_t i) { return test::text(hits[i]); });
   }
 }
@@ -169,7 +185,8 @@ TEST_CASE("a packet's rays visit just what they visit alone, and get the same bi
   std::size_t compared = 0, hits = 0;
   for (const Scene& scene : hard_scenes()) {
     const Vec3f centre = scene.mesh.bounds().center(), extent = scene.mesh.bounds().extent();
-    std::vector<Ray> rays = fan(scene.mesh, centre + extent * 1.5f + Vec3f{1, 1, 1} * (0.1f * length(extent)), 0.7f, 12);
+    std::vector<Ray> rays =
+        fan(scene.mesh, centre + extent * 1.5f + Vec3f{1, 1, 1} * (0.1f * length(extent)), 0.7f, 12);
     const auto append = [&](const std::vector<Ray>& more) { rays.insert(rays.end(), more.begin(), more.end()); };
     append(rays_for(scene.mesh, 150)), append(fan(scene.mesh, centre, 1.0f, 9));
     std::size_t place = 2;
@@ -229,7 +246,8 @@ TEST_CASE("packets of a fan pass most nodes together") {
     std::uint64_t visits = 0;
     for (const Counters::Depth& d : c.depths) visits += d.visits;
     CHECK(double(visits) < 0.6 * double(c.nodes));  // visits of packets or of rays alone, against those of rays
-    CHECK((c.switches > 0) == (row.traversal != "packet4" && row.traversal != "packet8" && row.traversal != "packet16"));
+    CHECK((c.switches > 0) ==
+          (row.traversal != "packet4" && row.traversal != "packet8" && row.traversal != "packet16"));
   }
 }
 

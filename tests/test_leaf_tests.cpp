@@ -13,17 +13,20 @@
 using namespace arboretum;
 using namespace arboretum::test;
 
-TEST_CASE("the table of leaf tests has every intersector with all blocks that it reads, once, on every instruction set, and no others") {
+TEST_CASE(
+    "the table of leaf tests has every intersector with all blocks that it reads, once, on every instruction set, and "
+    "no others") {
   struct Reads {
     std::string_view intersector;
     std::string_view forms;  ///< last letters of the blocks' names, e: none
     bool every_width;        ///< else those that the usual leaves have
   };
   constexpr Reads kReads[] = {
-      {"moller_trumbore", "evi", true}, {"pluecker", "vi", false},         {"watertight", "vi", true},
-      {"exact", "vi", true},            {"baldwin_weber", "w", true},      {"havel_herout", "h", true},
-      {"wald_projection", "p", true},   {"moller_trumbore_double", "vi", false}, {"pluecker_double", "vi", false},
-      {"watertight_refined", "vi", false},
+      {"moller_trumbore", "evi", true}, {"pluecker", "vi", false},
+      {"watertight", "vi", true},       {"exact", "vi", true},
+      {"baldwin_weber", "w", true},     {"havel_herout", "h", true},
+      {"wald_projection", "p", true},   {"moller_trumbore_double", "vi", false},
+      {"pluecker_double", "vi", false}, {"watertight_refined", "vi", false},
   };
   REQUIRE(std::size(kReads) == std::size(kIntersectorPromises));
   for (Isa isa : kAllIsas) {
@@ -62,7 +65,9 @@ namespace {
 struct CountedTests : LeafTests {
   static inline unsigned calls = 0;
   explicit CountedTests(const LeafTests& tests) : LeafTests(tests) {
-    closest_hit = [](PreparedRay&, const std::byte*, unsigned, const Vec3f*, float, NearestHit&) { return ++calls, false; };
+    closest_hit = [](PreparedRay&, const std::byte*, unsigned, const Vec3f*, float, NearestHit&) {
+      return ++calls, false;
+    };
     any_hit = [](PreparedRay&, const std::byte*, unsigned, const Vec3f*, float, float) { return ++calls, false; };
   }
 };
@@ -91,7 +96,8 @@ TEST_CASE("a row calls the leaf tests that it names, unless it says that they ar
     CountedTests::calls = 0;
     const std::vector<Hit> hits = closest_hit(row, accel, rays);
     CHECK((CountedTests::calls == 0) == row.leaves_compiled_in);
-    CHECK(std::ranges::count_if(hits, &Hit::is_hit) == (row.leaves_compiled_in ? std::ranges::count_if(right, &Hit::is_hit) : 0));
+    CHECK(std::ranges::count_if(hits, &Hit::is_hit) ==
+          (row.leaves_compiled_in ? std::ranges::count_if(right, &Hit::is_hit) : 0));
     CountedTests::calls = 0;
     CHECK((any_hit(row, accel, rays) == occluded) == row.leaves_compiled_in);
     CHECK((CountedTests::calls == 0) == row.leaves_compiled_in);
@@ -103,8 +109,10 @@ TEST_CASE("a row calls the leaf tests that it names, unless it says that they ar
     if (!is_available(isa)) continue;
     for (const char* traversal : {"single", "queued", "packet64"}) {
       for (const char* intersector : {"moller_trumbore", "watertight", "exact", "pluecker"}) {
-        const bool race = isa != Isa::scalar && (std::string_view(traversal) == "single" || intersector[0] == 'm' || intersector[0] == 'w');
-        const KernelRow* row = find_kernel("bvh8", default_leaf("bvh8", intersector, isa), intersector, "padded", traversal, isa);
+        const bool race = isa != Isa::scalar &&
+                          (std::string_view(traversal) == "single" || intersector[0] == 'm' || intersector[0] == 'w');
+        const KernelRow* row =
+            find_kernel("bvh8", default_leaf("bvh8", intersector, isa), intersector, "padded", traversal, isa);
         INFO(intersector << " " << traversal << " " << to_string(isa));
         if (isa != Isa::scalar) REQUIRE(row);
         if (row) CHECK(row->leaves_compiled_in == race);

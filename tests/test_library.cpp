@@ -1,5 +1,5 @@
-// Arboretum as a library: one ray, a packet and a batch give the kernel's own answers, bit for bit, defaults are what the
-// header says, and every misuse is one line.
+// Arboretum as a library: one ray, a packet and a batch give the kernel's own answers, bit for bit, defaults are what
+// the header says, and every misuse is one line.
 #include "library/arboretum.h"
 
 #include <tuple>
@@ -123,9 +123,11 @@ TEST_CASE("keys that stand for others mean what they mean on the command line") 
   const TriangleMesh mesh = random_triangles(200, 0.3f, 3);
   const auto settled = [&](const TracerSettings& settings) { return Tracer(mesh, settings).settings(); };
   const TracerSettings plain = settled({});
-  const TracerSettings all_auto = settled({.structure = "auto", .builder = "auto", .leaf = "auto", .intersector = "auto", .box = "auto", .isa = "auto"});
-  CHECK(std::tie(all_auto.structure, all_auto.builder, all_auto.leaf, all_auto.intersector, all_auto.box, all_auto.isa) ==
-        std::tie(plain.structure, plain.builder, plain.leaf, plain.intersector, plain.box, plain.isa));
+  const TracerSettings all_auto = settled(
+      {.structure = "auto", .builder = "auto", .leaf = "auto", .intersector = "auto", .box = "auto", .isa = "auto"});
+  CHECK(
+      std::tie(all_auto.structure, all_auto.builder, all_auto.leaf, all_auto.intersector, all_auto.box, all_auto.isa) ==
+      std::tie(plain.structure, plain.builder, plain.leaf, plain.intersector, plain.box, plain.isa));
   CHECK(settled({.intersector = "moller_trumbore", .box = "auto"}).box == "fast");
   CHECK(settled({.structure = "bvh8", .traversal = "auto"}).traversal == "auto");
   CHECK(settled({.structure = "grid", .traversal = "auto"}).traversal == "single");
@@ -162,7 +164,8 @@ TEST_CASE("make_mesh takes flat arrays and vectors of points alike") {
   const float xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   const std::uint32_t abc[] = {0, 1, 2};
   const TriangleMesh flat = make_mesh(std::span(xyz), std::span(abc));
-  const TriangleMesh points = make_mesh(std::span<const Vec3f>(flat.vertices), std::span<const Triangle>(flat.triangles));
+  const TriangleMesh points =
+      make_mesh(std::span<const Vec3f>(flat.vertices), std::span<const Triangle>(flat.triangles));
   CHECK(flat.vertices == points.vertices);
   CHECK(flat.triangles == points.triangles);
   CHECK(flat.triangles.front() == Triangle{0, 1, 2});

@@ -1,5 +1,6 @@
-// Settings of the ways of traversal, from the configuration to the kernel, and what the counting pass says of packets, hybrids and queues:
-// answers that no setting changes, settings that do what they say, and counts of a tree small enough to know them by hand.
+// Settings of the ways of traversal, from the configuration to the kernel, and what the counting pass says of packets,
+// hybrids and queues: answers that no setting changes, settings that do what they say, and counts of a tree small
+// enough to know them by hand.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -22,14 +23,16 @@ namespace {
 
 unsigned rays_of(const KernelRow& row) { return unsigned(std::stoul(std::string(row.traversal.substr(6)))); }
 
-std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, TraversalSettings settings, Counters* counters = nullptr) {
+std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays,
+                             TraversalSettings settings, Counters* counters = nullptr) {
   std::vector<Hit> hits(rays.size(), Hit{-1.0f, 0, 0, 0});
   RayBatch batch(rays);
   batch.settings = settings;
   row.closest_hit(accel, batch, hits, counters);
   return hits;
 }
-std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, TraversalSettings settings, Counters* counters = nullptr) {
+std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays,
+                                  TraversalSettings settings, Counters* counters = nullptr) {
   std::vector<std::uint8_t> occluded(rays.size(), 0xee);
   RayBatch batch(rays);
   batch.settings = settings;
@@ -52,7 +55,8 @@ std::vector<Ray> mixed_rays(const TriangleMesh& mesh) {
   const std::vector<Ray> generic = generic_rays(mesh, 30, 62);
   rays.insert(rays.end(), generic.begin(), generic.end());
   std::size_t place = 3;
-  for (const Ray& ray : invalid_rays()) rays.insert(rays.begin() + std::ptrdiff_t(place % rays.size()), ray), place += 9;
+  for (const Ray& ray : invalid_rays())
+    rays.insert(rays.begin() + std::ptrdiff_t(place % rays.size()), ray), place += 9;
   return rays;
 }
 
@@ -69,8 +73,8 @@ const KernelRow& kernel(std::string_view traversal) {
   return *row;
 }
 
-/// Four triangles across the x axis at x = 0, 1, 20, 21, two by two in the nodes of a binary tree: the root, two nodes, four leaves. The first of
-/// each pair is half as high as the others, which reach from -1 to 1 in y and z.
+/// Four triangles across the x axis at x = 0, 1, 20, 21, two by two in the nodes of a binary tree: the root, two nodes,
+/// four leaves. The first of each pair is half as high as the others, which reach from -1 to 1 in y and z.
 struct SmallTree {
   TriangleMesh mesh;
   std::unique_ptr<Accel> accel;
@@ -86,10 +90,11 @@ struct SmallTree {
     accel = build_structure("bvh2", mesh, settings, report);
   }
 };
-constexpr Ray kThroughAll{{-5, -0.25f, -0.25f}, 0, {1, 0, 0}, kInfinity};       // meets both nodes, then the first triangle
-constexpr Ray kPastAll{{-5, 0.4f, 0.4f}, 0, {1, 0, 0}, kInfinity};              // within all boxes, past all triangles
-constexpr Ray kFarPair{{30, -0.75f, -0.75f}, 0, {-1, 0, 0}, 15};                // meets one node and in it one leaf
-constexpr Ray kNothing{{-5, 3, 0}, 0, {1, 0, 0}, kInfinity};                    // meets no box
+// Meets both nodes, then the first triangle
+constexpr Ray kThroughAll{{-5, -0.25f, -0.25f}, 0, {1, 0, 0}, kInfinity};
+constexpr Ray kPastAll{{-5, 0.4f, 0.4f}, 0, {1, 0, 0}, kInfinity};  // within all boxes, past all triangles
+constexpr Ray kFarPair{{30, -0.75f, -0.75f}, 0, {-1, 0, 0}, 15};    // meets one node and in it one leaf
+constexpr Ray kNothing{{-5, 3, 0}, 0, {1, 0, 0}, kInfinity};        // meets no box
 
 std::vector<std::uint64_t> visits_of(const Counters& c) {
   std::vector<std::uint64_t> visits;
@@ -106,8 +111,10 @@ TEST_CASE("no threshold of a hybrid and no number of rays in flight changes a bi
   const std::vector<Ray> rays = mixed_rays(mesh);
   Structures structures(mesh);
   std::size_t compared = 0;
-  const auto compare = [&](const KernelRow& row, TraversalSettings settings, std::size_t size, std::span<const Hit> alone, std::span<const std::uint8_t> occluded) {
-    INFO(name_of(row) << ", threshold " << int(settings.hybrid_threshold) << ", in flight " << int(settings.rays_in_flight) << ", batch of " << size);
+  const auto compare = [&](const KernelRow& row, TraversalSettings settings, std::size_t size,
+                           std::span<const Hit> alone, std::span<const std::uint8_t> occluded) {
+    INFO(name_of(row) << ", threshold " << int(settings.hybrid_threshold) << ", in flight "
+                      << int(settings.rays_in_flight) << ", batch of " << size);
     const std::span<const Ray> batch = std::span(rays).first(size);
     REQUIRE(same_bits(closest_hit(row, structures.get(row), batch, settings), alone.first(size)));
     REQUIRE(std::ranges::equal(any_hit(row, structures.get(row), batch, settings), occluded.first(size)));
@@ -116,7 +123,9 @@ TEST_CASE("no threshold of a hybrid and no number of rays in flight changes a bi
   for (std::string_view way : {"hybrid", "queued"}) {
     for (const KernelRow& row : rows_of(way)) {
       if (way == "queued" && row.traversal != "queued") continue;
-      if (way == "hybrid" && row.structure != "bvh8" && row.structure != "bvh4_aos" && row.structure != "bvh2" && row.structure != "kdtree") continue;
+      if (way == "hybrid" && row.structure != "bvh8" && row.structure != "bvh4_aos" && row.structure != "bvh2" &&
+          row.structure != "kdtree")
+        continue;
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
       const std::vector<Hit> alone = test::closest_hit(*single, structures.get(row), rays);
@@ -124,7 +133,8 @@ TEST_CASE("no threshold of a hybrid and no number of rays in flight changes a bi
       if (way == "hybrid") {
         const unsigned width = rays_of(row);
         for (unsigned threshold = 0; threshold <= width; ++threshold)
-          for (std::size_t size = 1; size <= 2 * width + 1; ++size) compare(row, {.hybrid_threshold = threshold}, size, alone, occluded);
+          for (std::size_t size = 1; size <= 2 * width + 1; ++size)
+            compare(row, {.hybrid_threshold = threshold}, size, alone, occluded);
       } else {
         for (unsigned flight : {1u, 2u, 3u, 7u, 33u, 64u})
           for (std::size_t size : {std::size_t(1), std::size_t(flight), 2 * std::size_t(flight) + 1, rays.size()})
@@ -180,8 +190,9 @@ TEST_CASE("a hybrid's threshold and the rays in flight do what they say") {
       const bool set = row.traversal == "queued";
       const double most = set ? flight : std::stoul(std::string(row.traversal.substr(6)));
       CHECK(c.nodes == alone.nodes);
-      // An empty cell of the kd-tree is no leaf to the counters, but the queue passes none either. In the bounding interval hierarchy a turn goes on to the
-      // ray's next leaf: one at first, and one after each leaf while something waits.
+      // An empty cell of the kd-tree is no leaf to the counters, but the queue passes none either. In the bounding
+      // interval hierarchy a turn goes on to the ray's next leaf: one at first, and one after each leaf while something
+      // waits.
       if (row.structure == "bih") {
         CHECK(c.nodes_queued > c.leaves);
         CHECK(c.nodes_queued <= c.leaves + rays.size());
@@ -200,7 +211,8 @@ TEST_CASE("a hybrid's threshold and the rays in flight do what they say") {
   CHECK(queues >= 5);
   std::set<std::string_view> of;
   for (const KernelRow& row : rows_of("queued")) of.insert(row.structure);
-  for (std::string_view structure : {"bvh2", "bvh4", "bvh8", "bvh16", "bvh4_aos", "bvh4_quantised", "bvh8_quantised", "kdtree", "bih", "octree"}) {
+  for (std::string_view structure :
+       {"bvh2", "bvh4", "bvh8", "bvh16", "bvh4_aos", "bvh4_quantised", "bvh8_quantised", "kdtree", "bih", "octree"}) {
     INFO(structure);
     if (some_isa() != Isa::scalar || structure == "bvh8") CHECK(of.contains(structure));
   }
@@ -243,16 +255,16 @@ TEST_CASE("lanes by depth, switches and queue lengths: packets, hybrids and queu
   CHECK(packet.depths[0].lanes == 4);
   CHECK(packet.depths[0].lanes_active == 4);
   CHECK(packet.depths[1].lanes == 8);
-  CHECK(packet.depths[1].lanes_active == 7);              // three in the near node, four in the far one
+  CHECK(packet.depths[1].lanes_active == 7);  // three in the near node, four in the far one
   CHECK(packet.nodes == 4 + 3 + 4);
   CHECK(packet.children_hit == Five{0, 1, 3 + 3 + 4, 0, 0});  // each ray's own children, not the packet's
 
   Counters hybrid;
   (void)closest_hit(kernel("hybrid4"), *tree.accel, rays, {.hybrid_threshold = 3}, &hybrid);
-  CHECK(hybrid.switches == 1);                            // in the near node; the far one has all four again
+  CHECK(hybrid.switches == 1);  // in the near node; the far one has all four again
   CHECK(hybrid.rays_alone == 3);
   CHECK(visits_of(hybrid) == std::vector<std::uint64_t>{1, 3 + 1});
-  CHECK(hybrid.depths[1].lanes_active == 3 * 2 + 4);      // a ray alone: two children in two lanes
+  CHECK(hybrid.depths[1].lanes_active == 3 * 2 + 4);  // a ray alone: two children in two lanes
   CHECK(hybrid.nodes == packet.nodes);
   CHECK(hybrid.children_hit == packet.children_hit);
 
@@ -268,12 +280,15 @@ TEST_CASE("lanes by depth, switches and queue lengths: packets, hybrids and queu
   CHECK(two_by_two.queue_rounds == 4);
   CHECK(two_by_two.nodes_queued == 8);
 
-  // Four tiles of rays of one direction, as many of rays in all directions, four of one again and one tile more of all: `auto` takes those of one
-  // direction for packets, and changes for no single tile.
+  // Four tiles of rays of one direction, as many of rays in all directions, four of one again and one tile more of all:
+  // `auto` takes those of one direction for packets, and changes for no single tile.
   std::vector<Ray> tiles;
   const auto add_tile = [&](bool coherent) {
     for (unsigned i = 0; i < 64; ++i)
-      tiles.push_back(coherent ? kThroughAll : Ray{{-5, 0, 0}, 0, {i % 2 ? 1.0f : -1.0f, i % 4 < 2 ? 1.0f : -1.0f, i % 3 ? 1.0f : -1.0f}, kInfinity});
+      tiles.push_back(
+          coherent
+              ? kThroughAll
+              : Ray{{-5, 0, 0}, 0, {i % 2 ? 1.0f : -1.0f, i % 4 < 2 ? 1.0f : -1.0f, i % 3 ? 1.0f : -1.0f}, kInfinity});
   };
   for (int tile = 0; tile < 13; ++tile) add_tile((tile < 4 || tile >= 8) && tile != 12);
   Counters chosen;
@@ -346,7 +361,8 @@ TEST_CASE("streams and the kd-tree follow their depth too") {
       for (std::uint64_t n : c.children_hit) children += n;
       CHECK(children == c.nodes);
       CHECK(visits <= c.nodes);
-      if (!row.traversal.starts_with("packet") && !row.traversal.starts_with("hybrid") && row.traversal != "auto") CHECK(visits == c.nodes);
+      if (!row.traversal.starts_with("packet") && !row.traversal.starts_with("hybrid") && row.traversal != "auto")
+        CHECK(visits == c.nodes);
     }
     ++seen;
   }
@@ -361,7 +377,9 @@ TEST_CASE("auto on SSE leaves streams for rays in flight where rays share little
     // More than are taken the one way or the other before it is asked again, and no whole number of these.
     const std::vector<Ray> rays = generic_rays(*mesh, 45'001, 7);
     for (std::string_view structure : {"bvh4", "bvh8", "bvh16"}) {
-      const auto row = [&](std::string_view traversal) { return *find_kernel(structure, "triangle4", "moller_trumbore", "padded", traversal, Isa::sse); };
+      const auto row = [&](std::string_view traversal) {
+        return *find_kernel(structure, "triangle4", "moller_trumbore", "padded", traversal, Isa::sse);
+      };
       const Accel& accel = structures.get(row("auto"));
       INFO(structure << ", " << mesh->size() << " triangles");
       Counters closest, any;
@@ -375,20 +393,26 @@ TEST_CASE("auto on SSE leaves streams for rays in flight where rays share little
       const std::vector<Hit> alone = closest_hit(row("single"), accel, rays, {});
       CHECK(std::memcmp(hits.data(), alone.data(), hits.size() * sizeof(Hit)) == 0);
       CHECK(occluded == any_hit(row("single"), accel, rays, {}));
-      CHECK(std::memcmp(closest_hit(row("auto"), accel, rays, {}).data(), alone.data(), hits.size() * sizeof(Hit)) == 0);
+      CHECK(std::memcmp(closest_hit(row("auto"), accel, rays, {}).data(), alone.data(), hits.size() * sizeof(Hit)) ==
+            0);
       CHECK(any_hit(row("auto"), accel, rays, {}) == occluded);
     }
   }
 }
 
-TEST_CASE("settings of a way of traversal: in the plan, in the cell's name and in effective.yaml where they mean something, refused elsewhere") {
-  const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("arboretum-modes-" + std::to_string(::getpid()));
+TEST_CASE(
+    "settings of a way of traversal: in the plan, in the cell's name and in effective.yaml where they mean something, "
+    "refused elsewhere") {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("arboretum-modes-" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / "modes.yaml";
   const Registry registry = this_registry();
   const auto experiment = [&](const std::string& axes, const std::string& parameters) {
-    std::ofstream(file) << "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [bvh8, kdtree], intersector: [moller_trumbore], isa: [" << to_string(some_isa())
-                        << "], " << axes << "}\nparameters: {" << parameters << "}\nmetrics: [trace]\n";
+    std::ofstream(file) << "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [bvh8, kdtree], "
+                           "intersector: [moller_trumbore], isa: ["
+                        << to_string(some_isa()) << "], " << axes << "}\nparameters: {" << parameters
+                        << "}\nmetrics: [trace]\n";
     return read_experiment(file, registry);
   };
   const auto message = [&](const std::string& axes, const std::string& parameters) {
@@ -400,7 +424,8 @@ TEST_CASE("settings of a way of traversal: in the plan, in the cell's name and i
     return std::string("no error");
   };
 
-  const Experiment swept = experiment("traversal: [single, hybrid8, queued, queued8]", "hybrid_threshold: [auto, 0, 3], rays_in_flight: 24");
+  const Experiment swept =
+      experiment("traversal: [single, hybrid8, queued, queued8]", "hybrid_threshold: [auto, 0, 3], rays_in_flight: 24");
   const Plan plan = make_plan(swept, registry);
   std::vector<std::string> ways;
   for (const Cell& cell : plan.cells) {
@@ -415,19 +440,30 @@ TEST_CASE("settings of a way of traversal: in the plan, in the cell's name and i
     CHECK(cell.name().find("/" + ways.back() + "/") != std::string::npos);
   }
   std::ranges::sort(ways);
-  CHECK(ways == std::vector<std::string>{"hybrid8:hybrid_threshold=0", "hybrid8:hybrid_threshold=3", "hybrid8:hybrid_threshold=auto", "queued", "queued8", "single"});
+  CHECK(ways == std::vector<std::string>{"hybrid8:hybrid_threshold=0", "hybrid8:hybrid_threshold=3",
+                                         "hybrid8:hybrid_threshold=auto", "queued", "queued8", "single"});
   CHECK(effective_yaml(swept).find("hybrid_threshold: [auto, 0, 3]") != std::string::npos);
   CHECK(effective_yaml(swept).find("rays_in_flight: [24]") != std::string::npos);
-  CHECK(effective_yaml(experiment("traversal: [single]", "bins: 16")).find("hybrid_threshold: [auto]") != std::string::npos);
-  CHECK(configuration_hash(swept) != configuration_hash(experiment("traversal: [single, hybrid8, queued, queued8]", "hybrid_threshold: [auto, 0, 3], rays_in_flight: 25")));
+  CHECK(effective_yaml(experiment("traversal: [single]", "bins: 16")).find("hybrid_threshold: [auto]") !=
+        std::string::npos);
+  CHECK(configuration_hash(swept) !=
+        configuration_hash(experiment("traversal: [single, hybrid8, queued, queued8]",
+                                      "hybrid_threshold: [auto, 0, 3], rays_in_flight: 25")));
 
-  CHECK(message("traversal: [hybrid8]", "hybrid_threshold: 17").find(":3: hybrid_threshold must be auto or an integer from 0 to 16, not '17'") != std::string::npos);
-  CHECK(message("traversal: [queued]", "rays_in_flight: 0").find("rays_in_flight must be auto or an integer from 1 to 64") != std::string::npos);
-  CHECK(message("traversal: [single]", "hybrid_threshold: 2").find(":3: hybrid_threshold has no effect") != std::string::npos);
-  CHECK(message("traversal: [queued8]", "rays_in_flight: 2").find(":3: rays_in_flight has no effect") != std::string::npos);
-  CHECK(message("traversal: [queued8]", "hybrid_treshold: 2").find("did you mean 'hybrid_threshold'") != std::string::npos);
+  CHECK(message("traversal: [hybrid8]", "hybrid_threshold: 17")
+            .find(":3: hybrid_threshold must be auto or an integer from 0 to 16, not '17'") != std::string::npos);
+  CHECK(message("traversal: [queued]", "rays_in_flight: 0")
+            .find("rays_in_flight must be auto or an integer from 1 to 64") != std::string::npos);
+  CHECK(message("traversal: [single]", "hybrid_threshold: 2").find(":3: hybrid_threshold has no effect") !=
+        std::string::npos);
+  CHECK(message("traversal: [queued8]", "rays_in_flight: 2").find(":3: rays_in_flight has no effect") !=
+        std::string::npos);
+  CHECK(message("traversal: [queued8]", "hybrid_treshold: 2").find("did you mean 'hybrid_threshold'") !=
+        std::string::npos);
   CHECK(message("traversal: [hybrid8]", "hybrid_threshold: 8") == "no error");
   const Plan wide = make_plan(experiment("traversal: [hybrid4]", "hybrid_threshold: [4, 5]"), registry);
-  CHECK(std::ranges::any_of(wide.skipped, [](const SkippedCell& c) { return c.reason == "hybrid4 has packets of 4 rays: no threshold of 5"; }));
+  CHECK(std::ranges::any_of(wide.skipped, [](const SkippedCell& c) {
+    return c.reason == "hybrid4 has packets of 4 rays: no threshold of 5";
+  }));
   std::filesystem::remove_all(folder);
 }

@@ -104,7 +104,8 @@ TEST_CASE("morton: vertices that no triangle has do not spoil the tree") {
   BuilderParameters parameters;
   parameters.morton_bits = 30;  // with 63 more bits would be looked at where the first tell nothing apart
   const double cost = sah_of("morton", mesh, parameters);
-  for (const Vec3f stray : {Vec3f{1e6f, 0, 0}, Vec3f{std::numeric_limits<float>::quiet_NaN(), 0, 0}, Vec3f{0, std::numeric_limits<float>::infinity(), 0}}) {
+  for (const Vec3f stray : {Vec3f{1e6f, 0, 0}, Vec3f{std::numeric_limits<float>::quiet_NaN(), 0, 0},
+                            Vec3f{0, std::numeric_limits<float>::infinity(), 0}}) {
     INFO("stray vertex " << stray.x << " " << stray.y);
     mesh.vertices.push_back(stray);
     check_tree(build("morton", mesh, 4, 1, best_isa(), parameters), mesh, 4, false);

@@ -1,5 +1,5 @@
-// Motion: boxes that hold their triangles at every time; bvh4_motion against brute force over the mesh as it stands at the ray's
-// time, bit for bit; the oracle at every time; no crack in a closed mesh that moves; workloads' times.
+// Motion: boxes that hold their triangles at every time; bvh4_motion against brute force over the mesh as it stands at
+// the ray's time, bit for bit; the oracle at every time; no crack in a closed mesh that moves; workloads' times.
 #include <map>
 
 #include "oracle/oracle.h"
@@ -34,7 +34,8 @@ TriangleMesh flying_sphere(std::uint32_t rings, std::size_t frames, Vec3f offset
     const double a = 0.35 * double(k);
     std::vector<Vec3f>& frame = mesh.later_frames.emplace_back();
     for (const Vec3f& v : start) {
-      const Vec3f turned{float(v.x * std::cos(a) - v.y * std::sin(a)), float(v.x * std::sin(a) + v.y * std::cos(a)), v.z * (1.0f + 0.1f * float(k))};
+      const Vec3f turned{float(v.x * std::cos(a) - v.y * std::sin(a)), float(v.x * std::sin(a) + v.y * std::cos(a)),
+                         v.z * (1.0f + 0.1f * float(k))};
       frame.push_back(turned + offset + Vec3f{0.15f * float(k), -0.1f * float(k), 0.05f * float(k)});
     }
   }
@@ -51,7 +52,8 @@ std::vector<KernelRow> motion_rows() {
   return rows;
 }
 
-std::vector<Hit> closest_at(const KernelRow& row, const Accel& accel, const std::vector<Ray>& rays, const std::vector<float>& times) {
+std::vector<Hit> closest_at(const KernelRow& row, const Accel& accel, const std::vector<Ray>& rays,
+                            const std::vector<float>& times) {
   std::vector<Hit> hits(rays.size());
   row.closest_hit(accel, {rays, times}, hits, nullptr);
   return hits;
@@ -96,8 +98,10 @@ TEST_CASE("linear boxes hold their triangles at every time") {
 
 TEST_CASE("bvh4_motion gives the answers of brute force over the mesh at the ray's time, bit for bit") {
   for (std::size_t frames : {2u, 3u, 6u}) {
-    for (const KernelScene& scene : {KernelScene{"soup", random_triangles(600, 0.2f, 2)}, KernelScene{"sphere", sphere(10)}, KernelScene{"flat", flat_grid(12)},
-                                     KernelScene{"one", random_triangles(1, 0.7f, 3)}, KernelScene{"large", moved(random_triangles(100, 0.3f, 5), 0x1p30f)}}) {
+    for (const KernelScene& scene :
+         {KernelScene{"soup", random_triangles(600, 0.2f, 2)}, KernelScene{"sphere", sphere(10)},
+          KernelScene{"flat", flat_grid(12)}, KernelScene{"one", random_triangles(1, 0.7f, 3)},
+          KernelScene{"large", moved(random_triangles(100, 0.3f, 5), 0x1p30f)}}) {
       const float size = scene.mesh.bounds().extent().x;
       const TriangleMesh mesh = wandering(scene.mesh, frames, 0.05f * size, frames);
       BuildSettings settings;
@@ -106,7 +110,8 @@ TEST_CASE("bvh4_motion gives the answers of brute force over the mesh at the ray
       const auto accel = build_structure("bvh4_motion", mesh, settings, report);
       for (float time : kTimes) {
         const TriangleMesh posed = pose(mesh, time);
-        const auto still = build_structure("brute_force", posed, {.builder = "in_order", .leaf = "triangle4i", .parameters = {}}, report);
+        const auto still = build_structure("brute_force", posed,
+                                           {.builder = "in_order", .leaf = "triangle4i", .parameters = {}}, report);
         std::vector<Ray> rays = generic_rays(posed, 80, 21);
         const std::vector<Ray> aimed = aimed_rays(posed, posed.bounds().center(), 60, 22);
         rays.insert(rays.end(), aimed.begin(), aimed.end());
@@ -114,14 +119,18 @@ TEST_CASE("bvh4_motion gives the answers of brute force over the mesh at the ray
         const std::vector<float> times(rays.size(), time);
         for (const KernelRow& row : motion_rows()) {
           if (row.box != "padded") continue;
-          const KernelRow* reference = find_kernel("brute_force", "triangle4i", row.intersector, "padded", "single", row.isa);
-          if (!reference) reference = find_kernel("brute_force", "triangle4v", row.intersector, "padded", "single", row.isa);
+          const KernelRow* reference =
+              find_kernel("brute_force", "triangle4i", row.intersector, "padded", "single", row.isa);
+          if (!reference)
+            reference = find_kernel("brute_force", "triangle4v", row.intersector, "padded", "single", row.isa);
           REQUIRE(reference);
           if (reference->leaf != row.leaf) continue;
           INFO(scene.name << ", " << frames << " frames, time " << time << ": " << name_of(row));
-          const std::vector<Hit> got = closest_at(row, *accel, rays, times), want = closest_hit(*reference, *still, rays);
+          const std::vector<Hit> got = closest_at(row, *accel, rays, times),
+                                 want = closest_hit(*reference, *still, rays);
           for (std::size_t i = 0; i < rays.size(); ++i) {
-            INFO("ray " << i << ": t " << got[i].t << ", primitive " << got[i].primitive << "; brute force: t " << want[i].t << ", primitive " << want[i].primitive);
+            INFO("ray " << i << ": t " << got[i].t << ", primitive " << got[i].primitive << "; brute force: t "
+                        << want[i].t << ", primitive " << want[i].primitive);
             REQUIRE(same_bits({&got[i], 1}, {&want[i], 1}));
           }
           std::vector<std::uint8_t> occluded(rays.size(), 0xee);
@@ -230,7 +239,8 @@ TEST_CASE("the waving cloth: no wrong answer in any workload; times lie in the s
       std::vector<std::uint8_t> occluded(workload.rays.size());
       if (any) row.any_hit(*accel, workload.batch(), occluded, nullptr);
       const AnswerCheck check = any ? oracle.check_any_hit(workload.batch(), any_truth, occluded)
-                                    : oracle.check_closest_hit(workload.batch(), truth, closest_at(row, *accel, workload.rays, workload.times));
+                                    : oracle.check_closest_hit(workload.batch(), truth,
+                                                               closest_at(row, *accel, workload.rays, workload.times));
       CAPTURE(check.missed_hits, check.false_hits, check.wrong_surface, check.rays);
       CHECK(check.wrong_answers() == 0);
     }
@@ -240,10 +250,13 @@ TEST_CASE("the waving cloth: no wrong answer in any workload; times lie in the s
 TEST_CASE("key frames through the scene file: spacing, shutter, instances") {
   const Folder folder;
   const auto obj = [](float x) { return "v " + std::to_string(x) + " 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"; };
-  folder.write("a.obj", obj(0)), folder.write("b.obj", obj(0.25f)), folder.write("c.obj", obj(0.75f)), folder.write("still.obj", obj(0.5f));
-  const Scene scene = load_file(folder.write(
-      "s.yaml", "meshes: [{keyframes: [a.obj, b.obj, c.obj], name: m}, {keyframes: [a.obj, c.obj], name: n}, still.obj]\nshutter: [0, 1]\n"
-                "instances: [{mesh: m, transforms: [{translate: [10, 0, 0]}, {scale: 2}]}]\n"));
+  folder.write("a.obj", obj(0)), folder.write("b.obj", obj(0.25f)), folder.write("c.obj", obj(0.75f)),
+      folder.write("still.obj", obj(0.5f));
+  const Scene scene =
+      load_file(folder.write("s.yaml",
+                             "meshes: [{keyframes: [a.obj, b.obj, c.obj], name: m}, {keyframes: [a.obj, c.obj], name: "
+                             "n}, still.obj]\nshutter: [0, 1]\n"
+                             "instances: [{mesh: m, transforms: [{translate: [10, 0, 0]}, {scale: 2}]}]\n"));
   REQUIRE(scene.mesh.frames() == 3);
   CHECK_FALSE(scene.mesh.instancing);
   const auto x = [&](std::size_t triangle, float time) { return scene.mesh.corners(triangle, frame_at(time, 3))[0].x; };
@@ -251,7 +264,9 @@ TEST_CASE("key frames through the scene file: spacing, shutter, instances") {
   CHECK(x(1, 1.0f) == 1.5f);
   CHECK(x(2, 0.5f) == 0.375f);  // two frames in a scene of three
   CHECK(x(3, 0.7f) == 0.5f);
-  CHECK_THAT(error_of([&] { (void)load_file(folder.write("t.yaml", "meshes: [{keyframes: [a.obj, b.obj]}]\nshutter: [0, 2]\n")); }),
+  CHECK_THAT(error_of([&] {
+               (void)load_file(folder.write("t.yaml", "meshes: [{keyframes: [a.obj, b.obj]}]\nshutter: [0, 2]\n"));
+             }),
              Catch::Contains("t.yaml:2: the shutter [0, 2] must lie within [0, 1]"));
   const Scene still = load_file(folder.write("u.yaml", "meshes: [{keyframes: [a.obj, b.obj]}]\nshutter: [0.5, 0.5]\n"));
   CHECK_FALSE(still.mesh.moves());
@@ -272,6 +287,7 @@ TEST_CASE("a structure that holds one moment takes no mesh that moves") {
     INFO(entry.info.name);
     BuildSettings settings;
     settings.builder = entry.info.builders.front(), settings.leaf = entry.info.leaves.front();
-    CHECK_THAT(error_of([&] { (void)build_structure(entry.info.name, mesh, settings, report); }), Catch::Contains("holds one moment, and the mesh has 3 key frames"));
+    CHECK_THAT(error_of([&] { (void)build_structure(entry.info.name, mesh, settings, report); }),
+               Catch::Contains("holds one moment, and the mesh has 3 key frames"));
   }
 }

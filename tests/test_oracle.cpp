@@ -39,8 +39,8 @@ Scene exponential_soup(Dice& dice) {
   for (int i = 0; i < 12; ++i) add_triangle(s.mesh, p(), p(), p());
   for (int i = 0; i < 20; ++i) s.rays.push_back({p(), 0.0f, p(), kInf});
   for (const Triangle& t : s.mesh.triangles) {
-    const Vec3f o = p(), target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f +
-                                  s.mesh.vertices[t.c] * 0.25f;
+    const Vec3f o = p(),
+                target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f + s.mesh.vertices[t.c] * 0.25f;
     s.rays.push_back({o, 0.0f, target - o, kInf});
   }
   return s;
@@ -54,8 +54,8 @@ Scene whole_range(Dice& dice) {
   for (int i = 0; i < 6; ++i) add_triangle(s.mesh, p(scale), p(scale), p(scale));
   for (int i = 0; i < 6; ++i) add_triangle(s.mesh, p(scale), p(size), p(scale));
   for (const Triangle& t : s.mesh.triangles) {
-    const Vec3f o = p(scale), target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f +
-                                       s.mesh.vertices[t.c] * 0.25f;
+    const Vec3f o = p(scale),
+                target = s.mesh.vertices[t.a] * 0.5f + s.mesh.vertices[t.b] * 0.25f + s.mesh.vertices[t.c] * 0.25f;
     s.rays.push_back({o, 0.0f, target * 0.5f - o * 0.5f, kInf});
     s.rays.push_back({o, 0.0f, p(size), kInf});
   }
@@ -70,8 +70,7 @@ Scene aimed_fan(Dice& dice) {
   const Vec3f apex{whole(4), whole(4), whole(4)};
   std::vector<Vec3f> ring;
   for (int i = 0; i < 6; ++i) ring.push_back({whole(8), whole(8), dice.integer(2) ? apex.z : whole(8)});
-  for (std::size_t i = 0; i < ring.size(); ++i)
-    add_triangle(s.mesh, apex, ring[i], ring[(i + 1) % ring.size()]);
+  for (std::size_t i = 0; i < ring.size(); ++i) add_triangle(s.mesh, apex, ring[i], ring[(i + 1) % ring.size()]);
   add_triangle(s.mesh, ring[0], apex, ring[1]);  // a copy, wound the other way
   add_triangle(s.mesh, apex, apex, ring[1]);     // without area
   for (const Vec3f& p : ring) {
@@ -96,8 +95,8 @@ Scene nearly_aimed(Dice& dice) {
   std::vector<Vec3f> p;
   for (int i = 0; i < 8; ++i) p.push_back(dice.point() + Vec3f{dice.integer(2) * 1000.0f, 0, 0});
   for (int i = 0; i < 14; ++i) {
-    add_triangle(s.mesh, p[static_cast<std::size_t>(dice.integer(8))],
-                 p[static_cast<std::size_t>(dice.integer(8))], p[static_cast<std::size_t>(dice.integer(8))]);
+    add_triangle(s.mesh, p[static_cast<std::size_t>(dice.integer(8))], p[static_cast<std::size_t>(dice.integer(8))],
+                 p[static_cast<std::size_t>(dice.integer(8))]);
   }
   for (int i = 0; i < 40; ++i) {
     const Vec3f o = dice.point() * 3.0f, q = p[static_cast<std::size_t>(dice.integer(8))],
@@ -209,12 +208,9 @@ TEST_CASE("the oracle equals rational brute force on nasty scenes, and each leve
     bool needs_double_double, needs_integers;
   };
   const Family families[] = {
-      {"random soup", random_soup, 25, true, false},
-      {"exponential soup", exponential_soup, 25, true, false},
-      {"whole float range", whole_range, 25, true, false},
-      {"aimed fan", aimed_fan, 30, true, true},
-      {"nearly aimed", nearly_aimed, 25, true, true},
-      {"flat grid", flat_grid, 20, true, true},
+      {"random soup", random_soup, 25, true, false},       {"exponential soup", exponential_soup, 25, true, false},
+      {"whole float range", whole_range, 25, true, false}, {"aimed fan", aimed_fan, 30, true, true},
+      {"nearly aimed", nearly_aimed, 25, true, true},      {"flat grid", flat_grid, 20, true, true},
       {"three scales", three_scales, 30, true, true},
   };
   std::uint64_t seed = 1;
@@ -249,7 +245,9 @@ TEST_CASE("sign of an edge function that doubles get wrong") {
 
 TEST_CASE("a ray exactly through a vertex needs no whole numbers, one an ulp beside it is not taken for such") {
   const Vec3f hub{0.25f, 0.5f, 2.0f}, origin{0.125f, -0.75f, -1.0f};
-  const Corners first{hub, Vec3f{3, 0.1f, 2.3f}, Vec3f{0.3f, 5, 1.7f}}, second{Vec3f{-2, 0.3f, 1.1f}, hub, Vec3f{0.3f, 5, 1.7f}}, missed{Vec3f{3, 0.1f, 2.3f}, Vec3f{0.3f, 5, 1.7f}, Vec3f{4, 5, 2.5f}};
+  const Corners first{hub, Vec3f{3, 0.1f, 2.3f}, Vec3f{0.3f, 5, 1.7f}},
+      second{Vec3f{-2, 0.3f, 1.1f}, hub, Vec3f{0.3f, 5, 1.7f}},
+      missed{Vec3f{3, 0.1f, 2.3f}, Vec3f{0.3f, 5, 1.7f}, Vec3f{4, 5, 2.5f}};
   const Ray through{origin, 0, {0.5f * (hub.x - origin.x), 0.5f * (hub.y - origin.y), 0.5f * (hub.z - origin.z)}, kInf};
   Enclosure t;
   ExactPredicate on(through);
@@ -324,8 +322,7 @@ TEST_CASE("the search tree finds what a plain loop finds, on a mesh with depth")
     for (std::uint32_t k = 0; k < mesh.size(); ++k) {
       Enclosure t;
       if (!predicate.meets(mesh.corners(k), t)) continue;
-      if (nearest == kNoPrimitive || predicate.compare_t(mesh.corners(k), mesh.corners(nearest)) < 0)
-        nearest = k;
+      if (nearest == kNoPrimitive || predicate.compare_t(mesh.corners(k), mesh.corners(nearest)) < 0) nearest = k;
     }
     CHECK(truth[i].hit.primitive == nearest);
     CHECK((any[i] != 0) == (nearest != kNoPrimitive));
@@ -342,8 +339,7 @@ TEST_CASE("meshes and rays that mean nothing") {
   TriangleMesh mesh;
   add_triangle(mesh, {-1, -1, nan}, {1, -1, 0}, {0, 1, 0});
   add_triangle(mesh, {-1, -1, -0.5f}, {kInf, -1, 0}, {0, 1, 0});
-  for (int i = 0; i < 1000; ++i)
-    add_triangle(mesh, {-1, -1, 0}, {1, -1, 0}, {0, 1, 0});  // one place: no split helps
+  for (int i = 0; i < 1000; ++i) add_triangle(mesh, {-1, -1, 0}, {1, -1, 0}, {0, 1, 0});  // one place: no split helps
   const Oracle oracle(mesh);
   const ExactHit answer = oracle.closest_hit({&ray, 1}).front();
   CHECK(answer.hit.primitive == 2);

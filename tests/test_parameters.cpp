@@ -25,14 +25,18 @@ class Fingerprint final : public StructureVisitor {
  private:
   void add(std::uint32_t number) { numbers.push_back(number); }
   void add(const Bounds3f& box) {
-    for (std::size_t axis = 0; axis < 3; ++axis) add(std::bit_cast<std::uint32_t>(box.lower[axis])), add(std::bit_cast<std::uint32_t>(box.upper[axis]));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      add(std::bit_cast<std::uint32_t>(box.lower[axis])), add(std::bit_cast<std::uint32_t>(box.upper[axis]));
   }
 };
 
-std::vector<std::uint32_t> shape_of(const StructureInfo& info, std::string_view builder, const TriangleMesh& mesh, const BuilderParameters& parameters) {
+std::vector<std::uint32_t> shape_of(const StructureInfo& info, std::string_view builder, const TriangleMesh& mesh,
+                                    const BuilderParameters& parameters) {
   BuildReport report;
-  const std::string leaf(std::ranges::find(info.leaves, "triangle4") == info.leaves.end() ? info.leaves.front() : "triangle4");
-  const BuildSettings settings{.builder = std::string(builder), .leaf = leaf, .isa = best_isa(), .threads = 1, .parameters = parameters};
+  const std::string leaf(std::ranges::find(info.leaves, "triangle4") == info.leaves.end() ? info.leaves.front()
+                                                                                          : "triangle4");
+  const BuildSettings settings{
+      .builder = std::string(builder), .leaf = leaf, .isa = best_isa(), .threads = 1, .parameters = parameters};
   Fingerprint shape;
   (void)build_structure(info.name, mesh, settings, report)->visit(shape);
   return shape.numbers;
@@ -41,16 +45,21 @@ std::vector<std::uint32_t> shape_of(const StructureInfo& info, std::string_view 
 /// Values other than the default; each alone changes what reads it on one of meshes() at least.
 const std::vector<std::pair<std::string_view, std::vector<void (*)(BuilderParameters&)>>> kOthers{
     {"bins", {[](BuilderParameters& p) { p.bins = 4; }}},
-    {"traversal_cost", {[](BuilderParameters& p) { p.traversal_cost = 9.0f; }, [](BuilderParameters& p) { p.traversal_cost = 0.05f; }}},
-    {"intersection_cost", {[](BuilderParameters& p) { p.intersection_cost = 9.0f; }, [](BuilderParameters& p) { p.intersection_cost = 0.05f; }}},
-    {"max_leaf_blocks", {[](BuilderParameters& p) { p.max_leaf_blocks = 1; }, [](BuilderParameters& p) { p.max_leaf_blocks = 7; }}},
+    {"traversal_cost",
+     {[](BuilderParameters& p) { p.traversal_cost = 9.0f; }, [](BuilderParameters& p) { p.traversal_cost = 0.05f; }}},
+    {"intersection_cost",
+     {[](BuilderParameters& p) { p.intersection_cost = 9.0f; },
+      [](BuilderParameters& p) { p.intersection_cost = 0.05f; }}},
+    {"max_leaf_blocks",
+     {[](BuilderParameters& p) { p.max_leaf_blocks = 1; }, [](BuilderParameters& p) { p.max_leaf_blocks = 7; }}},
     {"morton_bits", {[](BuilderParameters& p) { p.morton_bits = 30; }}},
     {"ploc_radius", {[](BuilderParameters& p) { p.ploc_radius = 1; }}},
     {"duplication_budget", {[](BuilderParameters& p) { p.duplication_budget = 0.0f; }}},
     {"spatial_overlap", {[](BuilderParameters& p) { p.spatial_overlap = 1.0f; }}},
     {"spatial_gain", {[](BuilderParameters& p) { p.spatial_gain = 0.01f; }}},
     {"reinsertion_rounds", {[](BuilderParameters& p) { p.reinsertion_rounds = 1; }}},
-    {"reinsertion_top", {[](BuilderParameters& p) { p.reinsertion_top = 0; }, [](BuilderParameters& p) { p.reinsertion_top = 4096; }}},
+    {"reinsertion_top",
+     {[](BuilderParameters& p) { p.reinsertion_top = 0; }, [](BuilderParameters& p) { p.reinsertion_top = 4096; }}},
     {"empty_bonus", {[](BuilderParameters& p) { p.empty_bonus = 0.9f; }}},
     {"max_depth", {[](BuilderParameters& p) { p.max_depth = 2; }}},
     {"grid_density", {[](BuilderParameters& p) { p.grid_density = 4.0f; }}},
@@ -58,15 +67,16 @@ const std::vector<std::pair<std::string_view, std::vector<void (*)(BuilderParame
     {"collapse", {[](BuilderParameters& p) { p.collapse = "greedy"; }}},
 };
 
-/// Triangles in each other's way; needles among small triangles, and a knot of triangles that only the last bits of a Morton code part; and a mesh
-/// large enough for a top worth reinserting: what spans the scene among what is small.
+/// Triangles in each other's way; needles among small triangles, and a knot of triangles that only the last bits of a
+/// Morton code part; and a mesh large enough for a top worth reinserting: what spans the scene among what is small.
 std::vector<TriangleMesh> meshes() {
   const auto add_corners = [](TriangleMesh& mesh, Vec3f a, Vec3f b, Vec3f c) {
     const auto first = std::uint32_t(mesh.vertices.size());
     mesh.vertices.insert(mesh.vertices.end(), {a, b, c});
     mesh.triangles.push_back({first, first + 1, first + 2});
   };
-  std::vector<TriangleMesh> list{random_triangles(600, 0.9f, 5), random_triangles(1000, 0.02f, 3), random_triangles(12000, 0.01f, 6)};
+  std::vector<TriangleMesh> list{random_triangles(600, 0.9f, 5), random_triangles(1000, 0.02f, 3),
+                                 random_triangles(12000, 0.01f, 6)};
   const TriangleMesh large = random_triangles(60, 1.5f, 8);
   for (std::size_t i = 0; i < large.size(); ++i) {
     const std::array<Vec3f, 3> corners = large.corners(i);
@@ -97,7 +107,8 @@ TEST_CASE("a builder says what it reads: nothing else changes what it builds, an
       INFO(entry.info.name << " " << builder);
       REQUIRE(read);  // each of ours says
       // bvh8 stands for the others that let any builder make a binary tree.
-      if (entry.info.name != "bvh8" && builder != entry.info.builders.front() && entry.info.builders.size() > 2) continue;
+      if (entry.info.name != "bvh8" && builder != entry.info.builders.front() && entry.info.builders.size() > 2)
+        continue;
       const auto is_read = [&](std::size_t i) { return std::ranges::find(*read, kOthers[i].first) != read->end(); };
       std::vector<bool> changed(kOthers.size());
       for (const TriangleMesh& mesh : scenes) {

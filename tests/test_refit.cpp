@@ -29,7 +29,9 @@ TriangleMesh deformed(TriangleMesh mesh) {
   return mesh;
 }
 
-bool can_refit(std::string_view structure) { return structure.starts_with("bvh") && structure != "bvh4_aos" && structure != "bvh4_motion"; }
+bool can_refit(std::string_view structure) {
+  return structure.starts_with("bvh") && structure != "bvh4_aos" && structure != "bvh4_motion";
+}
 
 }  // namespace
 
@@ -57,7 +59,9 @@ TEST_CASE("a refitted structure answers as brute force on the moved mesh, bit fo
         accel->refit(moved);
       }
       auto& [hits, occluded] = wanted[brute];
-      if (hits.empty()) hits = closest_hit(*brute, reference.get(*brute), rays), occluded = any_hit(*brute, reference.get(*brute), rays);
+      if (hits.empty())
+        hits = closest_hit(*brute, reference.get(*brute), rays),
+        occluded = any_hit(*brute, reference.get(*brute), rays);
       REQUIRE(same_bits(closest_hit(row, *accel, rays), hits));
       REQUIRE(any_hit(row, *accel, rays) == occluded);
     }
@@ -94,7 +98,8 @@ TEST_CASE("refit says what it cannot do, and then leaves the structure as it was
   broken.vertices[7].y = std::numeric_limits<float>::quiet_NaN();
   CHECK_THROWS_WITH(accel->refit(broken), Catch::Contains("not finite"));
   settings.leaf = "triangle1", settings.builder = "in_order";
-  CHECK_THROWS_WITH(build_structure("brute_force", mesh, settings, report)->refit(mesh), Catch::Contains("cannot be refitted"));
+  CHECK_THROWS_WITH(build_structure("brute_force", mesh, settings, report)->refit(mesh),
+                    Catch::Contains("cannot be refitted"));
   const auto empty = build_structure("bvh8", {}, BuildSettings{}, report);
   CHECK_NOTHROW(empty->refit(TriangleMesh{}));
 }
@@ -121,7 +126,8 @@ TEST_CASE("a binary tree is refitted") {
       if (node.is_leaf()) {
         for (std::uint32_t i = 0; i < node.count; ++i) box.extend(moved.bounds(tree.primitives[tree.first[index] + i]));
       } else {
-        for (std::uint32_t child : {node.left, node.left + 1}) box.extend({tree.nodes[child].lower, tree.nodes[child].upper}), stack.push_back(child);
+        for (std::uint32_t child : {node.left, node.left + 1})
+          box.extend({tree.nodes[child].lower, tree.nodes[child].upper}), stack.push_back(child);
       }
       wrong += !(box == Bounds3f{node.lower, node.upper});
     }

@@ -1,5 +1,5 @@
-// A picture with the effects that a scene calls for is the picture with all of them, bit for bit; and the same for every structure,
-// way of traversal and number of threads.
+// A picture with the effects that a scene calls for is the picture with all of them, bit for bit; and the same for
+// every structure, way of traversal and number of threads.
 #include "scenes/generators/generators.h"
 #include "tests/render_scenes.h"
 #include "tests/scene_files.h"
@@ -57,7 +57,13 @@ TEST_CASE("small scenes of every material: the detected effects give the picture
       {.name = "metal", .diffuse = {0, 0, 0}, .specular = {0.8f, 0.7f, 0.3f}, .roughness = 0.3f, .illum = 3},
       {.name = "plastic", .diffuse = {0.1f, 0.6f, 0.3f}, .specular = {0.04f, 0.04f, 0.04f}, .roughness = 0.1f},
       {.name = "shiny", .diffuse = {0.1f, 0.6f, 0.3f}, .specular = {0.5f, 0.5f, 0.5f}, .shininess = 100},
-      {.name = "glass", .diffuse = {0, 0, 0}, .specular = {1, 1, 1}, .transmission = {0.9f, 1, 0.8f}, .ior = 1.5f, .opacity = 0, .illum = 7},
+      {.name = "glass",
+       .diffuse = {0, 0, 0},
+       .specular = {1, 1, 1},
+       .transmission = {0.9f, 1, 0.8f},
+       .ior = 1.5f,
+       .opacity = 0,
+       .illum = 7},
       {.name = "filter", .diffuse = {0, 0, 0}, .transmission = {0.9f, 0.1f, 0.1f}, .ior = 1.0f, .illum = 4},
       {.name = "veil", .diffuse = {0.7f, 0.6f, 0.3f}, .opacity = 0.4f},
       {.name = "glowing", .diffuse = {0.7f, 0.6f, 0.3f}, .emission = {0, 2, 0}},
@@ -70,7 +76,11 @@ TEST_CASE("small scenes of every material: the detected effects give the picture
     scene.environment = {0.2f, 0.3f, 0.5f};
     scene.lights = {{.position = {2, 4, 2}, .intensity = {20, 20, 20}},
                     {.type = Light::Type::directional, .direction = {1, -2, -1}, .intensity = {0.4f, 0.4f, 0.3f}},
-                    {.type = Light::Type::spot, .position = {0, 5, 0}, .direction = {0.2f, -1, 0}, .intensity = {9, 9, 20}, .cone_degrees = 40}};
+                    {.type = Light::Type::spot,
+                     .position = {0, 5, 0},
+                     .direction = {0.2f, -1, 0},
+                     .intensity = {9, 9, 20},
+                     .cone_degrees = 40}};
     check_detected_is_all(scene);
     scene.materials[1].emission = {0, 0, 0};
     scene.lights.resize(1), scene.environment = {0, 0, 0};
@@ -99,7 +109,8 @@ TEST_CASE("no lights at all: black, and no shadow rays") {
 
 TEST_CASE("glass of ior exactly 1 is as if it were not there") {
   Scene scene = lit_scene();
-  scene.materials[2] = {.name = "air", .diffuse = {0, 0, 0}, .specular = {1, 1, 1}, .ior = 1.0f, .opacity = 0, .illum = 7};
+  scene.materials[2] = {
+      .name = "air", .diffuse = {0, 0, 0}, .specular = {1, 1, 1}, .ior = 1.0f, .opacity = 0, .illum = 7};
   CHECK_FALSE(detected(scene).has(EffectKind::dielectric));
   check_detected_is_all(scene);
   Scene without = scene;
@@ -183,8 +194,10 @@ TEST_CASE("opacity maps: all 1 is none, 0 is no surface, holes let light and sha
   check_detected_is_all(scene);
   Scene without = scene;
   without.mesh.triangles.resize(4), without.mesh.materials.resize(4);
-  const Picture open = picture_of(scene, detected(scene), kSmall), bare = picture_of(without, detected(without), kSmall);
-  for (std::size_t i = 0; i < open.pixels.size(); ++i)  // rays begin at tnear > 0: not the same bits, but the same picture
+  const Picture open = picture_of(scene, detected(scene), kSmall),
+                bare = picture_of(without, detected(without), kSmall);
+  // Rays begin at tnear > 0: not the same bits, but the same picture
+  for (std::size_t i = 0; i < open.pixels.size(); ++i)
     CHECK(std::abs(open.pixels[i].x - bare.pixels[i].x) <= 1e-4f * std::abs(bare.pixels[i].x));
 }
 
@@ -192,10 +205,14 @@ TEST_CASE("an image around the scene: of one colour as that colour, black as non
   const Folder folder;
   folder.write("thing.obj", obj_text());
   const auto under = [&](const std::string& environment) {
-    return load_file(folder.write("scene.yaml", "meshes: [thing.obj]\nenvironment: " + environment + "\ncamera: {position: [0.4, -3, 2], look_at: [0.5, 0.5, 0.4], up: [0, 0, 1]}\n"));
+    return load_file(folder.write("scene.yaml",
+                                  "meshes: [thing.obj]\nenvironment: " + environment +
+                                      "\ncamera: {position: [0.4, -3, 2], look_at: [0.5, 0.5, 0.4], up: [0, 0, 1]}\n"));
   };
-  folder.write("white.ppm", pixels({255, 255, 255})), folder.write("black.ppm", pixels({0, 0})), folder.write("sky.ppm", pixels({10, 255, 90, 20, 0, 0, 0, 40}));
-  const Scene white = under("{image: white.ppm}"), black = under("{image: black.ppm}"), sky = under("{image: sky.ppm}"), constant = under("{radiance: 1}");
+  folder.write("white.ppm", pixels({255, 255, 255})), folder.write("black.ppm", pixels({0, 0})),
+      folder.write("sky.ppm", pixels({10, 255, 90, 20, 0, 0, 0, 40}));
+  const Scene white = under("{image: white.ppm}"), black = under("{image: black.ppm}"), sky = under("{image: sky.ppm}"),
+              constant = under("{radiance: 1}");
   for (const Scene* scene : {&white, &black, &sky}) check_detected_is_all(*scene);
   CHECK(same_bits(picture_of(white, detected(white), kSmall), picture_of(constant, detected(constant), kSmall)));
   CHECK_FALSE(detected(black).has(EffectKind::env_light));
@@ -229,10 +246,15 @@ TEST_CASE("diffuse maps: of one colour no texture, of several one") {
 TEST_CASE("identity instances, and instances in a structure of two levels") {
   const Folder folder;
   folder.write("thing.obj", obj_text());
-  const std::string rest = "environment: {radiance: 1}\ncamera: {position: [0.4, -3, 2], look_at: [0.5, 0.5, 0.4], up: [0, 0, 1]}\n";
+  const std::string rest =
+      "environment: {radiance: 1}\ncamera: {position: [0.4, -3, 2], look_at: [0.5, 0.5, 0.4], up: [0, 0, 1]}\n";
   const Scene plain = load_file(folder.write("plain.yaml", "meshes: [thing.obj]\n" + rest));
-  const Scene one = load_file(folder.write("one.yaml", "meshes: [thing.obj]\ninstances: [{mesh: thing, transforms: [{translate: [0, 0, 0]}]}]\n" + rest));
-  const Scene two = load_file(folder.write("two.yaml", "meshes: [thing.obj]\ninstances: [{mesh: thing, transforms: [{translate: [0, 0, 0]}, {translate: [2, 1, 0]}]}]\n" + rest));
+  const Scene one = load_file(folder.write(
+      "one.yaml", "meshes: [thing.obj]\ninstances: [{mesh: thing, transforms: [{translate: [0, 0, 0]}]}]\n" + rest));
+  const Scene two = load_file(folder.write("two.yaml",
+                                           "meshes: [thing.obj]\ninstances: [{mesh: thing, transforms: [{translate: "
+                                           "[0, 0, 0]}, {translate: [2, 1, 0]}]}]\n" +
+                                               rest));
   CHECK_FALSE(detected(one).has(EffectKind::instancing));
   CHECK(detected(two).has(EffectKind::instancing));
   check_detected_is_all(one), check_detected_is_all(two);
@@ -247,7 +269,9 @@ TEST_CASE("identity instances, and instances in a structure of two levels") {
 TEST_CASE("an emissive triangle without area is dropped with its light") {
   const Folder folder;
   folder.write("m.mtl", "newmtl grey\nKd 0.5 0.5 0.5\nnewmtl lamp\nKd 0 0 0\nKe 5 5 5\n");
-  const std::string obj = "mtllib m.mtl\nv -4 0 4\nv 4 0 4\nv 0 0 -4\nv 1 2 1\nv 2 2 2\nv 3 2 3\nusemtl grey\nf 1 2 3\nusemtl lamp\nf 4 5 6\n";
+  const std::string obj =
+      "mtllib m.mtl\nv -4 0 4\nv 4 0 4\nv 0 0 -4\nv 1 2 1\nv 2 2 2\nv 3 2 3\nusemtl grey\nf 1 2 3\nusemtl lamp\nf 4 5 "
+      "6\n";
   const Scene scene = load_file(folder.write("m.obj", obj));
   CHECK(scene.report.degenerate == 1);
   CHECK(detected(scene).empty());
@@ -265,7 +289,9 @@ TEST_CASE("what is left out sends no rays, and what is simulated does") {
   const Scene box = generate_scene("cornell_box", 2000, 1);
   RenderStatistics all, less;
   const Picture whole = picture_of(box, detected(box), kSmall, {}, &all);
-  for (const RayKind kind : {RayKind::mirror, RayKind::glossy, RayKind::dielectric, RayKind::diffuse_gi, RayKind::shadow_soft}) CHECK(all[kind].rays > 0);
+  for (const RayKind kind :
+       {RayKind::mirror, RayKind::glossy, RayKind::dielectric, RayKind::diffuse_gi, RayKind::shadow_soft})
+    CHECK(all[kind].rays > 0);
   CHECK(all[RayKind::shadow_hard].rays == 0);
   CHECK(all[RayKind::env_light].rays == 0);
   CHECK(all[RayKind::alpha_cutout].rays == 0);
@@ -289,18 +315,23 @@ TEST_CASE("pictures are the same for every structure, way of traversal and numbe
   for (const std::string_view intersector : {"watertight", "exact", "pluecker"}) {
     for (const Scene* scene : {&box, static_cast<const Scene*>(&veiled)}) {
       RenderSettings settings = kSmall;
-      const Picture picture = picture_of(*scene, detected(*scene), settings, {.structure = "brute_force", .intersector = intersector});
-      for (const std::string_view structure : {"bvh2", "bvh4", "bvh8", "bvh16", "bvh4_aos", "kdtree", "grid", "octree"}) {
-        for (const std::string_view traversal : {"single", "queued", "stream", "packet8", "packet64", "hybrid8", "auto"}) {
+      const Picture picture =
+          picture_of(*scene, detected(*scene), settings, {.structure = "brute_force", .intersector = intersector});
+      for (const std::string_view structure :
+           {"bvh2", "bvh4", "bvh8", "bvh16", "bvh4_aos", "kdtree", "grid", "octree"}) {
+        for (const std::string_view traversal :
+             {"single", "queued", "stream", "packet8", "packet64", "hybrid8", "auto"}) {
           const std::string_view leaf = default_leaf(structure, intersector, best_isa());
           if (!find_kernel(structure, leaf, intersector, "padded", traversal, best_isa())) continue;
           INFO(intersector << " " << structure << " " << traversal);
-          CHECK(same_bits(picture, picture_of(*scene, detected(*scene), settings, {structure, traversal, intersector})));
+          CHECK(
+              same_bits(picture, picture_of(*scene, detected(*scene), settings, {structure, traversal, intersector})));
         }
       }
       for (const unsigned threads : {2u, 5u, 0u}) {
         settings.threads = threads;
-        CHECK(same_bits(picture, picture_of(*scene, detected(*scene), settings, {.structure = "bvh8", .intersector = intersector})));
+        CHECK(same_bits(picture, picture_of(*scene, detected(*scene), settings,
+                                            {.structure = "bvh8", .intersector = intersector})));
       }
     }
   }

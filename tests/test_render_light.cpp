@@ -24,11 +24,16 @@ Camera aimed(Vec3f from, Vec3f at) {
   return {.position = from, .look_at = at, .up = up, .vertical_fov = 0.01f};
 }
 
-/// Mean radiance along the middle of the view, of a quarter of the samples in each of four pixels: most bounds below are three
-/// standard deviations and more.
-Vec3f seen(const Scene& scene, unsigned samples, EffectSet effects, Integrator integrator = Integrator::path, unsigned depth = 64) {
-  const Picture p = picture_of(scene, effects, {.integrator = integrator, .width = 2, .height = 2, .samples = (samples + 3) / 4,
-                                              .depth = integrator == Integrator::whitted ? std::min(depth, kMostBranching) : depth});
+/// Mean radiance along the middle of the view, of a quarter of the samples in each of four pixels: most bounds below
+/// are three standard deviations and more.
+Vec3f seen(const Scene& scene, unsigned samples, EffectSet effects, Integrator integrator = Integrator::path,
+           unsigned depth = 64) {
+  const Picture p = picture_of(scene, effects,
+                               {.integrator = integrator,
+                                .width = 2,
+                                .height = 2,
+                                .samples = (samples + 3) / 4,
+                                .depth = integrator == Integrator::whitted ? std::min(depth, kMostBranching) : depth});
   return {float(mean(p, 0)), float(mean(p, 1)), float(mean(p, 2))};
 }
 Vec3f seen(const Scene& scene, unsigned samples = 1, Integrator integrator = Integrator::path, unsigned depth = 64) {
@@ -44,14 +49,16 @@ Scene convex(Material material) {
   return scene;
 }
 
-/// Of a small horizontal patch to a parallel rectangle 2a x 2b right above it at height c (Howell's catalogue, B-3, four quarters).
+/// Of a small horizontal patch to a parallel rectangle 2a x 2b right above it at height c (Howell's catalogue, B-3,
+/// four quarters).
 double form_factor(double a, double b, double c) {
   const double x = a / c, y = b / c, p = std::sqrt(1 + x * x), q = std::sqrt(1 + y * y);
   return 4.0 / (2.0 * kPi) * (x / p * std::atan(y / p) + y / q * std::atan(x / q));
 }
 
 void check_near(Vec3f value, Vec3f wanted, double relative) {
-  for (std::size_t channel = 0; channel < 3; ++channel) CHECK(double(value[channel]) == Approx(double(wanted[channel])).epsilon(relative));
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    CHECK(double(value[channel]) == Approx(double(wanted[channel])).epsilon(relative));
 }
 
 }  // namespace
@@ -59,7 +66,8 @@ void check_near(Vec3f value, Vec3f wanted, double relative) {
 TEST_CASE("furnace: a convex diffuse thing under a sky of radiance L gives back albedo times L, in every sample") {
   Scene scene = convex({.diffuse = {0.9f, 0.5f, 0.1f}});
   scene.environment = {2, 4, 8};
-  for (const Integrator integrator : {Integrator::path, Integrator::whitted}) check_near(seen(scene, 8, integrator), {1.8f, 2.0f, 0.8f}, 1e-6);
+  for (const Integrator integrator : {Integrator::path, Integrator::whitted})
+    check_near(seen(scene, 8, integrator), {1.8f, 2.0f, 0.8f}, 1e-6);
   check_near(seen(scene, 8, detected(scene).without(EffectKind::diffuse_gi)), {1.8f, 2.0f, 0.8f}, 1e-6);
   check_near(seen(scene, 8, detected(scene).without(EffectKind::env_light)), {0, 0, 0}, 1e-6);
 }
@@ -69,12 +77,14 @@ TEST_CASE("ambient occlusion: open is white, closed in is black, and so is where
   check_near(seen(open, 64, Integrator::ambient_occlusion), {1, 1, 1}, 1e-6);
   open.camera = aimed({3, 1, 2}, {30, 10, 2});
   CHECK(seen(open, 64, Integrator::ambient_occlusion) == Vec3f{0, 0, 0});
-  // In a flat room the ceiling is nearer than a fifth of the diagonal, but for the most slanted rays: those of cosine c go as far as 0.1 / c.
+  // In a flat room the ceiling is nearer than a fifth of the diagonal, but for the most slanted rays: those of cosine c
+  // go as far as 0.1 / c.
   Scene closed;
   add_box(closed, {-1, 0, -1}, {1, 0.1f, 1});
   closed.materials = {{}};
   closed.camera = aimed({0, 0.05f, 0}, {0.01f, 0, 0.01f});
-  const double reach = 0.2 * std::sqrt(4 + 4 + 0.01), least = 0.1 / reach;  // a share least^2 of cosine-distributed rays is more slanted
+  // a share least^2 of cosine-distributed rays is more slanted
+  const double reach = 0.2 * std::sqrt(4 + 4 + 0.01), least = 0.1 / reach;
   check_near(seen(closed, 40000, Integrator::ambient_occlusion), Vec3f{1, 1, 1} * float(least * least), 0.1);
 }
 
@@ -95,7 +105,8 @@ namespace {
 /// 8 x 4 pixels, every one another colour, one of them a hundred times as bright.
 RadianceImage sky_image() {
   RadianceImage image{8, 4, {}};
-  for (int i = 0; i < 32; ++i) image.pixels.push_back(Vec3f{0.1f * float(i % 5), 0.2f, 0.05f * float(i % 7)} * (i == 13 ? 100.0f : 1.0f));
+  for (int i = 0; i < 32; ++i)
+    image.pixels.push_back(Vec3f{0.1f * float(i % 5), 0.2f, 0.05f * float(i % 7)} * (i == 13 ? 100.0f : 1.0f));
   return image;
 }
 
@@ -123,7 +134,8 @@ TEST_CASE("an image around the scene: where its pixels are, and densities that a
   }
   constexpr int kSteps = 800;
   for (int i = 0; i < kSteps * kSteps; ++i) {
-    const double y = 2 * (i % kSteps + 0.5) / kSteps - 1, around = 2 * kPi * (i / kSteps + 0.5) / kSteps, r = std::sqrt(1 - y * y);
+    const double y = 2 * (i % kSteps + 0.5) / kSteps - 1, around = 2 * kPi * (i / kSteps + 0.5) / kSteps,
+                 r = std::sqrt(1 - y * y);
     sum += sky.pdf({r * std::sin(around), y, r * std::cos(around)}) * 4 * kPi / (kSteps * kSteps);
   }
   CHECK(sum == Approx(1.0).epsilon(0.005));
@@ -146,7 +158,9 @@ TEST_CASE("a floor under an image: paths and shadow rays against the integral") 
   const Environment stored(read_radiance(folder));
   for (const float roughness : {0.0f, 0.5f}) {
     Scene scene = floor_scene();
-    scene.materials[0] = {.diffuse = {0.5f, 0.5f, 0.5f}, .specular = Vec3f{1, 1, 1} * (roughness > 0 ? 0.3f : 0.0f), .roughness = roughness};
+    scene.materials[0] = {.diffuse = {0.5f, 0.5f, 0.5f},
+                          .specular = Vec3f{1, 1, 1} * (roughness > 0 ? 0.3f : 0.0f),
+                          .roughness = roughness};
     scene.environment = mean_radiance(image), scene.environment_image = folder.string();
     const Vec3d at{0.25, 0, -0.3}, viewer{1, 2, 1.5};
     scene.camera = aimed(to_float(viewer), to_float(at));
@@ -156,7 +170,8 @@ TEST_CASE("a floor under an image: paths and shadow rays against the integral") 
     Vec3d sum;
     constexpr int kSteps = 600;
     for (int i = 0; i < kSteps * kSteps; ++i) {
-      const double y = (i % kSteps + 0.5) / kSteps, around = 2 * kPi * (i / kSteps + 0.5) / kSteps, r = std::sqrt(1 - y * y);
+      const double y = (i % kSteps + 0.5) / kSteps, around = 2 * kPi * (i / kSteps + 0.5) / kSteps,
+                   r = std::sqrt(1 - y * y);
       const Vec3d in{r * std::sin(around), y, r * std::cos(around)};
       const Bsdf::Value value = bsdf.evaluate(local(in));
       sum = sum + Vec3d((value.diffuse + value.glossy) * stored.radiance(in)) * (2 * kPi / (kSteps * kSteps));
@@ -184,9 +199,11 @@ TEST_CASE("clamped paths bring no more than that from beyond the first hit") {
 TEST_CASE("furnace: mirrors and clear glass lose nothing but what Ks and Tf say") {
   Scene scene = convex({.diffuse = {0, 0, 0}, .specular = {0.8f, 0.5f, 0.2f}, .illum = 3});
   scene.environment = {1, 1, 1};
-  for (const Integrator integrator : {Integrator::path, Integrator::whitted}) check_near(seen(scene, 4, integrator), {0.8f, 0.5f, 0.2f}, 1e-6);
+  for (const Integrator integrator : {Integrator::path, Integrator::whitted})
+    check_near(seen(scene, 4, integrator), {0.8f, 0.5f, 0.2f}, 1e-6);
   scene.materials[0] = {.diffuse = {0.1f, 0.5f, 0.9f}, .specular = {0.8f, 0.5f, 0.2f}, .illum = 3};
-  for (const Integrator integrator : {Integrator::path, Integrator::whitted}) check_near(seen(scene, 20000, integrator), {0.9f, 1.0f, 1.0f}, 0.01);
+  for (const Integrator integrator : {Integrator::path, Integrator::whitted})
+    check_near(seen(scene, 20000, integrator), {0.9f, 1.0f, 1.0f}, 0.01);
   scene.materials[0] = {.diffuse = {0, 0, 0}, .ior = 1.5f, .opacity = 0, .illum = 7};
   check_near(seen(scene, 20000), {1, 1, 1}, 0.01);
   check_near(seen(scene, 1, Integrator::whitted), {1, 1, 1}, 0.01);  // branches that hold less than 2^-10 end
@@ -201,8 +218,10 @@ TEST_CASE("point, directional and spot lights over a floor") {
   const double distance2 = dot(to_light, to_light), cosine = to_light.y / std::sqrt(distance2);
   const auto wanted = [](double irradiance) { return Vec3f{0.5f, 0.25f, 1.0f} * float(irradiance / kPi); };
   scene.lights = {{.position = {-1, 3, 1}, .intensity = {20, 20, 20}}};
-  for (const Integrator integrator : {Integrator::path, Integrator::whitted}) check_near(seen(scene, 4, integrator), wanted(20 * cosine / distance2), 1e-3);
-  scene.lights[0].type = Light::Type::spot, scene.lights[0].direction = to_float(to_light * -1.0), scene.lights[0].cone_degrees = 1;
+  for (const Integrator integrator : {Integrator::path, Integrator::whitted})
+    check_near(seen(scene, 4, integrator), wanted(20 * cosine / distance2), 1e-3);
+  scene.lights[0].type = Light::Type::spot, scene.lights[0].direction = to_float(to_light * -1.0),
+  scene.lights[0].cone_degrees = 1;
   check_near(seen(scene), wanted(20 * cosine / distance2), 1e-3);
   scene.lights[0].direction = {0, -1, 0};
   check_near(seen(scene), {0, 0, 0}, 1e-3);
@@ -211,7 +230,8 @@ TEST_CASE("point, directional and spot lights over a floor") {
   scene.lights[0].direction = {1, 2, 0};  // from below
   check_near(seen(scene), {0, 0, 0}, 1e-3);
   // Two lights: each is chosen by its power, the sum is right.
-  scene.lights = {{.position = {-1, 3, 1}, .intensity = {20, 20, 20}}, {.type = Light::Type::directional, .direction = {1, -2, 0}, .intensity = {3, 3, 3}}};
+  scene.lights = {{.position = {-1, 3, 1}, .intensity = {20, 20, 20}},
+                  {.type = Light::Type::directional, .direction = {1, -2, 0}, .intensity = {3, 3, 3}}};
   const double both = 20 * cosine / distance2 + 3 * 2 / std::sqrt(5.0);
   check_near(seen(scene, 1, Integrator::whitted), wanted(both), 1e-3);
   check_near(seen(scene, 20000), wanted(both), 0.01);
@@ -230,8 +250,9 @@ TEST_CASE("area light: the form factor of a rectangle above a floor") {
     add_square(lit, {-0.5f, float(height), -0.5f}, {2, 0, 0}, {0, 0, 1.5f}, 1);
     const Vec3f wanted = Vec3f{7, 5, 3} * float(0.6 * form_factor(1.0, 0.75, height));
     INFO("height " << height);
-    check_near(seen(lit, 160000, detected(lit)), wanted, 0.01);                                     // shadow rays and paths weighed together
-    check_near(seen(lit, 160000, detected(lit).without(EffectKind::diffuse_gi)), wanted, 0.01);     // shadow rays alone
+    // Shadow rays and paths weighed together
+    check_near(seen(lit, 160000, detected(lit)), wanted, 0.01);
+    check_near(seen(lit, 160000, detected(lit).without(EffectKind::diffuse_gi)), wanted, 0.01);  // shadow rays alone
     check_near(seen(lit, 160000, Integrator::whitted), wanted, 0.01);
     // Without choosing, one of the two triangles alone lights: less, and not nothing.
     const Vec3f half = seen(lit, 20000, detected(lit).without(EffectKind::multi_light));
@@ -243,7 +264,8 @@ TEST_CASE("area light: the form factor of a rectangle above a floor") {
 TEST_CASE("a glossy floor under an area light: paths against the integral over the light") {
   for (const float roughness : {0.1f, 0.4f, 0.9f}) {
     Scene scene = floor_scene();
-    scene.materials[0] = {.diffuse = {0.3f, 0.2f, 0.1f}, .specular = {0.2f, 0.3f, 0.5f}, .roughness = roughness, .illum = 2};
+    scene.materials[0] = {
+        .diffuse = {0.3f, 0.2f, 0.1f}, .specular = {0.2f, 0.3f, 0.5f}, .roughness = roughness, .illum = 2};
     scene.materials.push_back({.diffuse = {0, 0, 0}, .emission = {1, 1, 1}});
     add_square(scene, {-1, 2, -2}, {1.5f, 0, 0}, {0, 0, 1.5f}, 1);
     const Vec3d at{0.25, 0, -0.3}, viewer{1, 2, 1.5};
@@ -254,7 +276,8 @@ TEST_CASE("a glossy floor under an area light: paths against the integral over t
     Vec3d sum;
     constexpr int kSteps = 400;
     for (int i = 0; i < kSteps * kSteps; ++i) {
-      const Vec3d light{-1 + 1.5 * (i % kSteps + 0.5) / kSteps, 2, -2 + 1.5 * (i / kSteps + 0.5) / kSteps}, way = light - at;
+      const Vec3d light{-1 + 1.5 * (i % kSteps + 0.5) / kSteps, 2, -2 + 1.5 * (i / kSteps + 0.5) / kSteps},
+          way = light - at;
       const Bsdf::Value value = bsdf.evaluate(local(normalize(way)));
       const double solid_angle = 1.5 * 1.5 / (kSteps * kSteps) * way.y / std::pow(dot(way, way), 1.5);
       sum = sum + Vec3d(value.diffuse + value.glossy) * solid_angle;
@@ -262,7 +285,8 @@ TEST_CASE("a glossy floor under an area light: paths against the integral over t
     INFO("roughness " << roughness);
     check_near(seen(scene, 100000, Integrator::path, 1), to_float(sum), 0.01);
     check_near(seen(scene, 100000, detected(scene).without(EffectKind::diffuse_gi)), to_float(sum), 0.01);
-    if (roughness > 0.1f) check_near(seen(scene, 100000, Integrator::whitted), to_float(sum), 0.01);  // else too few shadow rays hit the lobe
+    // Else too few shadow rays hit the lobe
+    if (roughness > 0.1f) check_near(seen(scene, 100000, Integrator::whitted), to_float(sum), 0.01);
   }
 }
 
@@ -272,7 +296,8 @@ TEST_CASE("a mirror shows a lamp by Ks, a holed screen by its holes, and lets th
   scene.materials.push_back({.diffuse = {0, 0, 0}, .emission = {4, 4, 4}});
   add_square(scene, {-3, 0.5f, -3}, {6, 0, 0}, {0, 2, 0}, 1);
   scene.camera = aimed({0, 1, 1}, {0, 0, -1});
-  for (const Integrator integrator : {Integrator::path, Integrator::whitted}) check_near(seen(scene, 2, integrator), {2, 1, 4}, 1e-6);
+  for (const Integrator integrator : {Integrator::path, Integrator::whitted})
+    check_near(seen(scene, 2, integrator), {2, 1, 4}, 1e-6);
 
   scene.materials.push_back({.diffuse = {0, 0, 0}, .opacity = 0.3f});
   add_square(scene, {-1, 0.1f, 0}, {2, 0, 0}, {0, 2, 0}, 2);  // crossed once, before the mirror
@@ -291,15 +316,22 @@ TEST_CASE("a mirror shows a lamp by Ks, a holed screen by its holes, and lets th
   }
 }
 
-TEST_CASE("through a slab of glass a ray goes on in its direction, moved aside by Snell's law, less what is reflected") {
+TEST_CASE(
+    "through a slab of glass a ray goes on in its direction, moved aside by Snell's law, less what is reflected") {
   Scene scene;
   add_box(scene, {-50, -50, -1}, {50, 50, 0}, 0);  // a pane one thick
-  scene.materials = {{.diffuse = {0, 0, 0}, .specular = {1, 1, 1}, .transmission = {0.5f, 1, 1}, .ior = 1.6f, .opacity = 0, .illum = 7},
+  scene.materials = {{.diffuse = {0, 0, 0},
+                      .specular = {1, 1, 1},
+                      .transmission = {0.5f, 1, 1},
+                      .ior = 1.6f,
+                      .opacity = 0,
+                      .illum = 7},
                      {.diffuse = {0, 0, 0}, .emission = {1, 1, 1}}};
   const double sine = 0.8, cosine = 0.6, inside = 0.8 / 1.6, inside_cosine = std::sqrt(1 - inside * inside);
-  scene.camera = aimed({float(-4 * sine / cosine), 0, 4}, {0, 0, 0});  // enters at the origin
+  scene.camera = aimed({float(-4 * sine / cosine), 0, 4}, {0, 0, 0});             // enters at the origin
   const double exit = inside / inside_cosine, behind = exit + 2 * sine / cosine;  // at z = -1 and -3
-  const double s = (cosine - 1.6 * inside_cosine) / (cosine + 1.6 * inside_cosine), p = (1.6 * cosine - inside_cosine) / (1.6 * cosine + inside_cosine);
+  const double s = (cosine - 1.6 * inside_cosine) / (cosine + 1.6 * inside_cosine),
+               p = (1.6 * cosine - inside_cosine) / (1.6 * cosine + inside_cosine);
   const double through = std::pow(1 - 0.5 * (s * s + p * p), 2);
   for (const double aside : {0.0, 0.3}) {  // what bounced within comes out farther on
     Scene lit = scene;
@@ -307,7 +339,8 @@ TEST_CASE("through a slab of glass a ray goes on in its direction, moved aside b
     const Vec3f wanted = aside == 0.0 ? Vec3f{0.25f, 1, 1} * float(through) : Vec3f{0, 0, 0};
     for (const Integrator integrator : {Integrator::whitted, Integrator::path}) {
       INFO(to_string(integrator) << ", " << aside);
-      check_near(seen(lit, integrator == Integrator::path ? 40000 : 4, integrator), wanted, integrator == Integrator::path ? 0.01 : 1e-4);
+      check_near(seen(lit, integrator == Integrator::path ? 40000 : 4, integrator), wanted,
+                 integrator == Integrator::path ? 0.01 : 1e-4);
     }
   }
 }
@@ -321,14 +354,17 @@ TEST_CASE("no light leaks into a closed room, near the origin and 100 from it, n
     add_box(room, at({0.3f, -2, -1}), at({0.9f, -0.8f, 0.1f}));  // stands on the floor: its faces meet that
     room.materials = {{.diffuse = {0.9f, 0.9f, 0.9f}, .specular = {0.05f, 0.05f, 0.05f}, .roughness = 0.3f}};
     room.environment = {1, 1, 1};
-    room.lights = {{.position = at({5, 5, 5}), .intensity = {1e4f, 1e4f, 1e4f}}, {.type = Light::Type::directional, .direction = {1, -2, -3}, .intensity = {9, 9, 9}}};
+    room.lights = {{.position = at({5, 5, 5}), .intensity = {1e4f, 1e4f, 1e4f}},
+                   {.type = Light::Type::directional, .direction = {1, -2, -3}, .intensity = {9, 9, 9}}};
     room.camera = Camera{.position = at({-0.7f, 0.3f, 1.6f}), .look_at = at({0.5f, -1, -1}), .vertical_fov = 80};
     const Picture picture = picture_of(room, detected(room), {.width = 48, .height = 48, .samples = 8});
-    // At 10^4 float32 is so coarse (2^-10) that the step off a wall may pass the next one at an edge (docs/numerics.md: leaks).
+    // At 10^4 float32 is so coarse (2^-10) that the step off a wall may pass the next one at an edge (docs/numerics.md:
+    // leaks).
     CHECK(std::ranges::count_if(picture.pixels, [](Vec3f p) { return is_bright(p); }) <= (far < 1e3f ? 0 : 20));
 
     Scene lamp;  // within a black box within a box
-    add_box(lamp, at({-1, -1, -1}), at({1, 1, 1}), 1), add_box(lamp, at({-2, -2, -2}), at({2, 2, 2})), add_box(lamp, at({-9, -9, -9}), at({9, 9, 9}));
+    add_box(lamp, at({-1, -1, -1}), at({1, 1, 1}), 1), add_box(lamp, at({-2, -2, -2}), at({2, 2, 2})),
+        add_box(lamp, at({-9, -9, -9}), at({9, 9, 9}));
     lamp.materials = {{.diffuse = {0.9f, 0.9f, 0.9f}}, {.diffuse = {0, 0, 0}, .emission = {5, 5, 5}}};
     lamp.camera = Camera{.position = at({-7, 3, 6}), .look_at = at({0, 0, 0}), .vertical_fov = 80};
     const Picture dark = picture_of(lamp, detected(lamp), {.width = 48, .height = 48, .samples = 8});
@@ -340,7 +376,8 @@ TEST_CASE("a thing that passes by while the shutter is open is seen for as long 
   Scene scene;
   add_square(scene, {-2, -1, 0}, {2, 0, 0}, {0, 2, 0});
   scene.mesh.later_frames = {scene.mesh.vertices};
-  for (Vec3f& v : scene.mesh.later_frames[0]) v.x += 4.0f;  // its right edge runs from 0 to 4, its left one from -2 to 2
+  // Its right edge runs from 0 to 4, its left one from -2 to 2
+  for (Vec3f& v : scene.mesh.later_frames[0]) v.x += 4.0f;
   scene.key_frames = 2, scene.shutter = {0, 1};
   scene.materials = {{.diffuse = {0, 0, 0}, .emission = {1, 1, 1}}};
   scene.camera = aimed({1, 0, 5}, {1, 0, 0});  // there from time 1/4 to 3/4
@@ -352,7 +389,8 @@ TEST_CASE("a thing that passes by while the shutter is open is seen for as long 
 }
 
 TEST_CASE("lens: all rays of a picture position meet at the focus distance, and only there") {
-  const Camera camera{.position = {1, 2, 3}, .look_at = {0, 0, -1}, .vertical_fov = 50, .aperture_radius = 0.25f, .focus_distance = 4};
+  const Camera camera{
+      .position = {1, 2, 3}, .look_at = {0, 0, -1}, .vertical_fov = 50, .aperture_radius = 0.25f, .focus_distance = 4};
   const RayGenerator generator(camera, 64, 48);
   const Vec3d forward = normalize(Vec3d(camera.look_at) - Vec3d(camera.position));
   const auto at_depth = [&](const Ray& ray, double depth) {

@@ -1,4 +1,5 @@
-// The workloads `whitted` and `path`: what is recorded of a renderer, that cells answer it rightly, and that wrong answers are seen.
+// The workloads `whitted` and `path`: what is recorded of a renderer, that cells answer it rightly, and that wrong
+// answers are seen.
 #include "experiments/render_job.h"
 #include "experiments/scene_data.h"
 #include "scenes/generators/generators.h"
@@ -18,7 +19,8 @@ SceneData data_of(const std::string& word) {
 
 /// The row of single rays, by the best instruction set.
 const KernelRow& row_of(std::string_view structure, std::string_view intersector) {
-  const KernelRow* row = find_kernel(structure, default_leaf(structure, intersector, best_isa()), intersector, "padded", "single", best_isa());
+  const KernelRow* row = find_kernel(structure, default_leaf(structure, intersector, best_isa()), intersector, "padded",
+                                     "single", best_isa());
   REQUIRE(row);
   return *row;
 }
@@ -36,7 +38,8 @@ double difference(const Picture& a, const Picture& b) {
 
 }  // namespace
 
-TEST_CASE("recorded rays: those of the exact picture, answered exactly by `exact`, and the same picture by all structures") {
+TEST_CASE(
+    "recorded rays: those of the exact picture, answered exactly by `exact`, and the same picture by all structures") {
   for (const std::string word : {"cornell_box:2000", "sphere_flake:2000", "sphere:500"}) {
     SceneData data = data_of(word);
     Structures structures(data.mesh());
@@ -59,11 +62,13 @@ TEST_CASE("recorded rays: those of the exact picture, answered exactly by `exact
         CHECK(check.wrong_answers() + check.wrong_primitive == 0);
         CHECK(check.t_error_ulp_max <= 0.5);  // t is the exact one, rounded
         CHECK(data.check(rays, any_hit(row, accel, rays.any().rays)).wrong_answers() == 0);
-        // The kernel leads the renderer the same way; u and v may differ in the last bits, which mirrors and glass magnify.
+        // The kernel leads the renderer the same way; u and v may differ in the last bits, which mirrors and glass
+        // magnify.
         RenderStatistics statistics;
         const Picture picture = rays.render(accel, row, {}, 2, statistics);
         CHECK(difference(rays.picture(), picture) < 0.01);
-        CHECK(double(statistics.total().rays) == Approx(double(rays.closest().rays.size() + rays.any().rays.size())).epsilon(0.01));
+        CHECK(double(statistics.total().rays) ==
+              Approx(double(rays.closest().rays.size() + rays.any().rays.size())).epsilon(0.01));
         // What is wrong is seen.
         std::vector<Hit> wrong = hits;
         wrong[0] = hits[0].is_hit() ? Hit{} : Hit{.t = 1, .u = 0, .v = 0, .primitive = 0};

@@ -28,13 +28,16 @@ TEST_CASE("effect sets: auto, all, names, and the nearest name") {
     CHECK(EffectSet::all().has(EffectKind(i)));
     CHECK(parse_effects(std::string(kEffectNames[i]), {}) == EffectSet{}.with(EffectKind(i)));
   }
-  CHECK(error_of([] { static_cast<void>(parse_effects("glosy", {})); }).find("did you mean 'glossy'") != std::string::npos);
+  CHECK(error_of([] { static_cast<void>(parse_effects("glosy", {})); }).find("did you mean 'glossy'") !=
+        std::string::npos);
   CHECK(parse_effects(" dof,\tmirror ", {}) == EffectSet{}.with(EffectKind::dof).with(EffectKind::mirror));
   CHECK(parse_effects(" all", {}) == EffectSet::all());
   for (const char* const words : {"", " ", "dof,", ",dof", "dof, ,mirror"})
     CHECK(error_of([&] { static_cast<void>(parse_effects(words, {})); }).find("an empty name") != std::string::npos);
-  CHECK(error_of([] { static_cast<void>(parse_effects("all,mirror", {})); }).find("'all' stands alone") != std::string::npos);
-  CHECK(error_of([] { static_cast<void>(parse_effects("mirror,auto", {})); }).find("'auto' stands alone") != std::string::npos);
+  CHECK(error_of([] { static_cast<void>(parse_effects("all,mirror", {})); }).find("'all' stands alone") !=
+        std::string::npos);
+  CHECK(error_of([] { static_cast<void>(parse_effects("mirror,auto", {})); }).find("'auto' stands alone") !=
+        std::string::npos);
   CHECK(error_of([] { static_cast<void>(parse_integrator("pth")); }).find("did you mean 'path'") != std::string::npos);
 }
 
@@ -47,7 +50,9 @@ TEST_CASE("random numbers: uniform, and other ones for every pixel, sample, hit 
       for (std::uint64_t d = 0; d < 5; ++d) numbers.insert(sampler.camera(CameraDimension(d)));
       for (std::uint64_t node = 0; node < 4; ++node) {
         for (std::uint64_t d = 0; d < 10; ++d) numbers.insert(sampler.hit(node, HitDimension(d)));
-        for (std::uint64_t d = 0; d < 3; ++d) numbers.insert(sampler.pass(node, PassDimension(d), 0)), numbers.insert(sampler.pass(node, PassDimension(d), 1));
+        for (std::uint64_t d = 0; d < 3; ++d)
+          numbers.insert(sampler.pass(node, PassDimension(d), 0)),
+              numbers.insert(sampler.pass(node, PassDimension(d), 1));
       }
     }
   }
@@ -83,7 +88,9 @@ TEST_CASE("textures: centres of pixels, bilinear between them, repeated, v upwar
 
 TEST_CASE("texture coordinates come from files, for triangles and polygons, and stay with their triangles") {
   const Folder folder;
-  const std::string obj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 2 2\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1 2 5\nf 5 5 5\nf 1/1 2/2 3/3 4/4\nf 1/-1 3/-2 2/-3\nf 4 2 5\n";
+  const std::string obj =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 2 2\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1 2 5\nf 5 5 5\nf 1/1 2/2 3/3 "
+      "4/4\nf 1/-1 3/-2 2/-3\nf 4 2 5\n";
   const Scene scene = load_file(folder.write("square.obj", obj));
   REQUIRE(scene.mesh.size() == 5);
   REQUIRE(scene.texture_coordinates.size() == 5);
@@ -96,17 +103,24 @@ TEST_CASE("texture coordinates come from files, for triangles and polygons, and 
   }
   CHECK(scene.texture_coordinates[3] == TextureTriangle{{{0, 1}, {1, 1}, {1, 0}}});
   CHECK(scene.texture_coordinates[4] == TextureTriangle{});
-  CHECK(error_of([&] { load_file(folder.write("bad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/2 3/1\n")); }).find("bad.obj:5: texture index 2") != std::string::npos);
+  CHECK(error_of([&] {
+          load_file(folder.write("bad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/2 3/1\n"));
+        }).find("bad.obj:5: texture index 2") != std::string::npos);
   CHECK(load_file(folder.write("plain.obj", obj_text())).texture_coordinates.empty());
 
-  const std::string ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float u\nproperty float x\nproperty float y\nproperty float z\nproperty float v\n"
-                          "element face 1\nproperty list uchar int vertex_indices\nend_header\n0.5 0 0 0 1\n0.25 1 0 0 2\n0.125 0 1 0 3\n3 2 0 1\n";
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float u\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty float v\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0.5 0 0 0 1\n0.25 1 0 0 2\n0.125 0 1 0 3\n3 "
+      "2 0 1\n";
   const Scene points = load_file(folder.write("a.ply", ply));
   REQUIRE(points.texture_coordinates.size() == 1);
   CHECK(points.texture_coordinates[0] == TextureTriangle{{{0.125f, 3}, {0.5f, 1}, {0.25f, 2}}});
 
   folder.write("plain.obj", obj_text());
-  const Scene both = load_file(folder.write("both.yaml", "meshes: [plain.obj, a.ply, square.obj]\ninstances: [{mesh: a, transforms: [{scale: 2}, {scale: 3}]}]\n"));
+  const Scene both = load_file(folder.write(
+      "both.yaml",
+      "meshes: [plain.obj, a.ply, square.obj]\ninstances: [{mesh: a, transforms: [{scale: 2}, {scale: 3}]}]\n"));
   REQUIRE(both.texture_coordinates.size() == both.mesh.size());
   CHECK(both.texture_coordinates[0] == points.texture_coordinates[0]);
   CHECK(both.texture_coordinates[1] == points.texture_coordinates[0]);
@@ -167,13 +181,15 @@ TEST_CASE("lobes: densities add up to at most 1, directions follow them, weights
         constexpr int kCount = 100000;
         Dice dice(7);
         for (int i = 0; i < kCount; ++i) {
-          const auto scatter = bsdf.scatter(lobes, double(dice.uniform(0, 1)), double(dice.uniform(0, 1)), double(dice.uniform(0, 1)));
+          const auto scatter =
+              bsdf.scatter(lobes, double(dice.uniform(0, 1)), double(dice.uniform(0, 1)), double(dice.uniform(0, 1)));
           if (!scatter) continue;
           CHECK(scatter->pdf == Approx(bsdf.pdf(scatter->direction, lobes)).epsilon(1e-6));
           CHECK(length(scatter->direction) == Approx(1.0));
           sum = sum + Vec3d(scatter->weight) * (1.0 / kCount), mean = mean + scatter->direction * (1.0 / kCount);
         }
-        for (const auto& [drawn, wanted] : {std::pair{sum.x, whole.x}, {sum.y, whole.y}, {sum.z, whole.z}}) CHECK(drawn == Approx(wanted).margin(0.006));
+        for (const auto& [drawn, wanted] : {std::pair{sum.x, whole.x}, {sum.y, whole.y}, {sum.z, whole.z}})
+          CHECK(drawn == Approx(wanted).margin(0.006));
         const Vec3d direction = integral([&](Vec3d in) { return in * bsdf.pdf(in, lobes); });
         CHECK(length(mean - direction) < 0.01);
       }
@@ -221,7 +237,9 @@ TEST_CASE("a half mirror: the two lobes share by what they give back") {
 TEST_CASE("glass: Fresnel's share, Snell's law, total reflection") {
   Material glass{.diffuse = {0, 0, 0}, .specular = {1, 1, 1}, .transmission = {0.5f, 1, 1}, .ior = 1.5f, .illum = 7};
   const Surface surface = make_surface(glass, EffectSet::all());
-  const auto branches = [&](double sine, bool front) { return Bsdf(surface, surface.diffuse, towards(sine), front).branches(); };
+  const auto branches = [&](double sine, bool front) {
+    return Bsdf(surface, surface.diffuse, towards(sine), front).branches();
+  };
   CHECK(branches(0, true).directions[0].weight.x == Approx(0.04f));
   CHECK(branches(0, false).directions[0].weight.x == Approx(0.04f));
   CHECK(branches(0, true).directions[1].weight.x == Approx(0.48f));
@@ -229,7 +247,8 @@ TEST_CASE("glass: Fresnel's share, Snell's law, total reflection") {
   REQUIRE(bent.count == 2);
   CHECK(bent.directions[1].direction.z == Approx(-std::sqrt(1 - 0.16)));
   CHECK(std::hypot(bent.directions[1].direction.x, bent.directions[1].direction.y) == Approx(0.4));
-  const double s = (0.8 - 1.5 * std::sqrt(0.84)) / (0.8 + 1.5 * std::sqrt(0.84)), p = (1.5 * 0.8 - std::sqrt(0.84)) / (1.5 * 0.8 + std::sqrt(0.84));
+  const double s = (0.8 - 1.5 * std::sqrt(0.84)) / (0.8 + 1.5 * std::sqrt(0.84)),
+               p = (1.5 * 0.8 - std::sqrt(0.84)) / (1.5 * 0.8 + std::sqrt(0.84));
   CHECK(bent.directions[0].weight.x == Approx(0.5 * (s * s + p * p)));
   CHECK(branches(0.66, false).count == 2);
   CHECK(branches(0.67, false).count == 1);
@@ -250,7 +269,9 @@ TEST_CASE("lights are chosen by power, and their densities add up") {
   Scene scene = floor_scene();
   scene.materials.push_back({.emission = {2, 2, 2}});
   add_square(scene, {-1, 2, -1}, {2, 0, 0}, {0, 0, 1}, 1);
-  scene.lights = {{.position = {0, 3, 0}, .intensity = {1, 1, 1}}, {.position = {0, 3, 0}, .intensity = {0, 0, 0}}, {.position = {3, 3, 0}, .intensity = {3, 3, 3}}};
+  scene.lights = {{.position = {0, 3, 0}, .intensity = {1, 1, 1}},
+                  {.position = {0, 3, 0}, .intensity = {0, 0, 0}},
+                  {.position = {3, 3, 0}, .intensity = {3, 3, 3}}};
   std::vector<Surface> surfaces;
   for (const Material& m : scene.materials) surfaces.push_back(make_surface(m, EffectSet::all()));
   const LightTable table(scene.mesh, surfaces, scene.lights, EffectSet::all());
@@ -282,10 +303,12 @@ TEST_CASE("lights are chosen by power, and their densities add up") {
   scene.lights[0].intensity = Vec3f{1, 1, 1} * 1e24f;
   const LightTable dim(scene.mesh, surfaces, scene.lights, EffectSet::all());
   for (const double choice : {0.0, 0.49, 0.51, 0.999999}) {
-    const LightSample among = *dim.sample_area(from, 0, choice, 0.5, 0.5), before = *table.sample_area(from, 0, choice, 0.5, 0.5);
+    const LightSample among = *dim.sample_area(from, 0, choice, 0.5, 0.5),
+                      before = *table.sample_area(from, 0, choice, 0.5, 0.5);
     CHECK(among.on->primitive == (choice < 0.5 ? 2u : 3u));
     CHECK(among.radiance == before.radiance);
-    CHECK(before.radiance.x == Approx(chosen(choice < 0.5 ? 0.7 : 0.9).radiance.x / 3));  // a third of the power is theirs
+    // a third of the power is theirs
+    CHECK(before.radiance.x == Approx(chosen(choice < 0.5 ? 0.7 : 0.9).radiance.x / 3));
   }
   scene.lights[0].intensity = {1, 1, 1};
   const LightTable strongest(scene.mesh, surfaces, scene.lights, EffectSet::all().without(EffectKind::multi_light));
@@ -303,10 +326,14 @@ TEST_CASE("an emitter counts by the largest area that it has while it moves") {
     scene.mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
     return LightTable(scene.mesh, surfaces, {}, EffectSet::all());
   };
-  const auto both = [](Vec3f a, Vec3f b, Vec3f c) { return std::vector<Vec3f>{a, b, c, {0, 0, 9}, {1, 0, 9}, {0, 1, 9}}; };
-  const std::vector<Vec3f> nothing = both({0, 0, 0}, {0, 0, 0}, {0, 0, 0}), large = both({0, 0, 0}, {3, 0, 0}, {0, 1, 0});
+  const auto both = [](Vec3f a, Vec3f b, Vec3f c) {
+    return std::vector<Vec3f>{a, b, c, {0, 0, 9}, {1, 0, 9}, {0, 1, 9}};
+  };
+  const std::vector<Vec3f> nothing = both({0, 0, 0}, {0, 0, 0}, {0, 0, 0}),
+                           large = both({0, 0, 0}, {3, 0, 0}, {0, 1, 0});
   CHECK(table_of({nothing, nothing}).size() == 1);
-  for (const auto& frames : {std::vector{nothing, large}, std::vector{large, nothing}, std::vector{nothing, large, nothing}}) {
+  for (const auto& frames :
+       {std::vector{nothing, large}, std::vector{large, nothing}, std::vector{nothing, large, nothing}}) {
     const LightTable table = table_of(frames);
     REQUIRE(table.size() == 2);
     CHECK(table.emission(0) == Vec3f{1, 1, 1});
@@ -321,16 +348,21 @@ TEST_CASE("an emitter counts by the largest area that it has while it moves") {
 TEST_CASE("a material that is not there is an error") {
   Scene scene = floor_scene();
   scene.mesh.materials[1] = 1;
-  CHECK(error_of([&] { static_cast<void>(RenderScene(scene, EffectSet::all())); }).find("triangle 1 is of material 1") != std::string::npos);
+  CHECK(error_of([&] {
+          static_cast<void>(RenderScene(scene, EffectSet::all()));
+        }).find("triangle 1 is of material 1") != std::string::npos);
   scene.mesh.materials.resize(1);
-  CHECK(error_of([&] { static_cast<void>(RenderScene(scene, EffectSet::all())); }).find("2 triangles have 1") != std::string::npos);
+  CHECK(error_of([&] { static_cast<void>(RenderScene(scene, EffectSet::all())); }).find("2 triangles have 1") !=
+        std::string::npos);
 }
 
 TEST_CASE("pictures: developed by exposure and sRGB, and the same again from their file") {
   const Folder folder;
-  Picture picture{3, 2, {{0, 0.5f, 1}, {2, -1, 0.0031308f}, {0.25f, 0.1f, 0.001f}, {1, 1, 1}, {0, 0, 0}, {0.2158605f, 0, 0}}};
+  Picture picture{
+      3, 2, {{0, 0.5f, 1}, {2, -1, 0.0031308f}, {0.25f, 0.1f, 0.001f}, {1, 1, 1}, {0, 0, 0}, {0.2158605f, 0, 0}}};
   const std::vector<std::uint8_t> plain = develop(picture, 0);
-  CHECK(std::vector<std::uint8_t>(plain.begin(), plain.begin() + 6) == std::vector<std::uint8_t>{0, 188, 255, 255, 0, 10});
+  CHECK(std::vector<std::uint8_t>(plain.begin(), plain.begin() + 6) ==
+        std::vector<std::uint8_t>{0, 188, 255, 255, 0, 10});
   CHECK(plain[15] == 128);
   CHECK(develop(picture, 1)[1] == 255);
   CHECK(develop(picture, -1)[2] == 188);
@@ -350,12 +382,14 @@ TEST_CASE("pictures: developed by exposure and sRGB, and the same again from the
   CHECK(bytes.substr(0, header.size()) == header);
   CHECK(std::memcmp(bytes.data() + header.size() + 36, picture.pixels.data(), 36) == 0);  // the first row comes last
   CHECK(error_of([&] { write_picture(folder.path() / "a.jpg", picture, 0); }).find(".png") != std::string::npos);
-  CHECK(error_of([&] { write_picture(folder.path() / "no" / "a.png", picture, 0); }).find("no such folder") != std::string::npos);
+  CHECK(error_of([&] { write_picture(folder.path() / "no" / "a.png", picture, 0); }).find("no such folder") !=
+        std::string::npos);
 }
 
 TEST_CASE("heat colours: lightness rises evenly") {
   const auto lightness = [](std::array<std::uint8_t, 3> c) {
-    const double y = luminance({srgb_to_linear(float(c[0]) / 255), srgb_to_linear(float(c[1]) / 255), srgb_to_linear(float(c[2]) / 255)});
+    const double y = luminance(
+        {srgb_to_linear(float(c[0]) / 255), srgb_to_linear(float(c[1]) / 255), srgb_to_linear(float(c[2]) / 255)});
     return y > 0.008856 ? 116.0 * std::cbrt(y) - 16.0 : 903.3 * y;
   };
   CHECK(lightness(heat_color(0)) < 8.0);
@@ -386,7 +420,8 @@ TEST_CASE("heat maps: what the counting kernel counts for each pixel's ray, with
       row->closest_hit(*accel, RayBatch({&ray, 1}, {}), {&hit, 1}, &all);
     }
   }
-  const HeatMap nodes = count_work(tracer, settings, HeatCount::nodes), triangles = count_work(tracer, settings, HeatCount::triangles);
+  const HeatMap nodes = count_work(tracer, settings, HeatCount::nodes),
+                triangles = count_work(tracer, settings, HeatCount::triangles);
   CHECK(std::accumulate(nodes.counts.begin(), nodes.counts.end(), std::uint64_t{0}) == all.nodes);
   CHECK(std::accumulate(triangles.counts.begin(), triangles.counts.end(), std::uint64_t{0}) == all.triangles);
   CHECK(triangles.mean == Approx(double(all.triangles) / 200));
@@ -398,10 +433,12 @@ TEST_CASE("heat maps: what the counting kernel counts for each pixel's ray, with
     const std::uint8_t* p = drawn.rgb.data() + 3 * (std::size_t(y) * drawn.width + x);
     return std::array<std::uint8_t, 3>{p[0], p[1], p[2]};
   };
-  for (const unsigned x : {0u, 9u, 19u}) CHECK(pixel(x, 4) == heat_color(double(triangles.counts[4 * 20 + x]) / double(triangles.top)));
+  for (const unsigned x : {0u, 9u, 19u})
+    CHECK(pixel(x, 4) == heat_color(double(triangles.counts[4 * 20 + x]) / double(triangles.top)));
   CHECK(drawn_size_at_most(20, 10, "triangles a ray")[0] >= drawn.width);
   CHECK(drawn_size_at_most(20, 10, "triangles a ray")[1] == drawn.height);
-  CHECK(error_of([] { static_cast<void>(parse_heat_count("node")); }).find("did you mean 'nodes'") != std::string::npos);
+  CHECK(error_of([] { static_cast<void>(parse_heat_count("node")); }).find("did you mean 'nodes'") !=
+        std::string::npos);
 }
 
 TEST_CASE("labels beside a heat map's bar do not overlap") {
@@ -411,7 +448,8 @@ TEST_CASE("labels beside a heat map's bar do not overlap") {
       INFO("top " << top << ", " << length << " pixels");
       REQUIRE(ticks.size() >= 2);
       REQUIRE(ticks.size() <= 10);
-      REQUIRE((ticks.front().count == 0 && ticks.front().y == 24 + length && ticks.back().count == top && ticks.back().y == 24));
+      REQUIRE((ticks.front().count == 0 && ticks.front().y == 24 + length && ticks.back().count == top &&
+               ticks.back().y == 24));
       for (std::size_t i = 1; i < ticks.size(); ++i) REQUIRE(ticks[i].y + 8 <= ticks[i - 1].y);
     }
   }
@@ -429,7 +467,8 @@ TEST_CASE("pictures that a .png cannot hold are refused before they are made") {
 TEST_CASE("settings that cannot be") {
   const auto error = [](RenderSettings s) { return error_of([&] { check(s); }); };
   CHECK(error({.integrator = Integrator::whitted, .depth = 33}).find("0 to 32") != std::string::npos);
-  for (const float clamp : {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN()}) CHECK(error({.clamp = clamp}).find("clamp") != std::string::npos);
+  for (const float clamp : {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN()})
+    CHECK(error({.clamp = clamp}).find("clamp") != std::string::npos);
   check({.integrator = Integrator::whitted, .depth = 32}), check({.depth = 4096});
 }
 

@@ -165,8 +165,7 @@ TEST_CASE("Google Benchmark's flags: ours are taken, wrong ones are named") {
   std::vector<std::string> wrong{"--benchmark_repetitions=many"};
   CHECK(error_of([&] { (void)take_benchmark_flags(wrong); }).find("a number from 1") != std::string::npos);
   std::vector<std::string> format{"--benchmark_format=xml"};
-  CHECK(error_of([&] { (void)take_benchmark_flags(format); }).find("one of console, json, csv") !=
-        std::string::npos);
+  CHECK(error_of([&] { (void)take_benchmark_flags(format); }).find("one of console, json, csv") != std::string::npos);
 }
 
 TEST_CASE("interleaved jobs run each of their repetitions once, and an error comes out") {

@@ -1,4 +1,5 @@
-// Instances and motion in experiments: what the plan keeps and skips, cells by the structure below, a run of both, and its resumption.
+// Instances and motion in experiments: what the plan keeps and skips, cells by the structure below, a run of both, and
+// its resumption.
 #include "experiments/config.h"
 #include "experiments/journal.h"
 #include "experiments/plan.h"
@@ -27,7 +28,8 @@ std::size_t with(const Plan& plan, const std::string& part) {
 
 std::size_t skipped(const Plan& plan, const std::string& part, const std::string& reason) {
   std::size_t count = 0;
-  for (const SkippedCell& cell : plan.skipped) count += cell.name.find(part) != std::string::npos && cell.reason.find(reason) != std::string::npos;
+  for (const SkippedCell& cell : plan.skipped)
+    count += cell.name.find(part) != std::string::npos && cell.reason.find(reason) != std::string::npos;
   return count;
 }
 
@@ -42,8 +44,10 @@ TEST_CASE("the plan knows what moves and what can stand below, and gives reasons
   CHECK(with(plan, "trace/forest-3000/bvh8/binned_sah/") == 2);
   CHECK(with(plan, "trace/forest-3000/two_level/binned_sah:below=bvh4/") == 2);
   CHECK(with(plan, "trace/forest-3000/two_level/in_order:below=brute_force/") == 2);
-  CHECK(skipped(plan, "forest-3000/two_level/binned_sah:below=two_level/", "two_level over two_level: two_level stands above other structures") == 2);
-  if (find_structure("embree")) CHECK(skipped(plan, "forest-3000/two_level/", "two_level over embree: embree is a library") == 2);
+  CHECK(skipped(plan, "forest-3000/two_level/binned_sah:below=two_level/",
+                "two_level over two_level: two_level stands above other structures") == 2);
+  if (find_structure("embree"))
+    CHECK(skipped(plan, "forest-3000/two_level/", "two_level over embree: embree is a library") == 2);
   CHECK(skipped(plan, "forest-3000/bvh4_motion/", "bvh4_motion is for moving scenes, and nothing moves") == 2);
   CHECK(with(plan, "trace/waving_cloth-600/bvh4_motion/") == 2);
   CHECK(skipped(plan, "waving_cloth-600/bvh8/", "bvh8 holds one moment, and the scene moves") == 2);
@@ -59,9 +63,11 @@ TEST_CASE("a scene that was loaded before its turn is not loaded again; whose tu
 axes: {structure: [bvh2], isa: [scalar], intersector: [watertight]}
 measure: {repetitions: 1, warmup: 0, min_time: 0.001, resolution: [8, 8]}
 metrics: [build]
-)"), registry);
+)"),
+                           registry);
   };
-  const Experiment one = read("[{file: triangle.obj}]"), two = read("[{generate: city, triangles: 1000}, {file: triangle.obj}]");
+  const Experiment one = read("[{file: triangle.obj}]"),
+                   two = read("[{generate: city, triangles: 1000}, {file: triangle.obj}]");
   const auto run = [&](const Experiment& experiment, LoadedScene loaded) {
     const Plan plan = make_plan(experiment, registry);
     Journal journal(folder.path(), "hash", plan, false);

@@ -55,15 +55,13 @@ TEST_CASE("scene files: key frames are kept, and must fit together") {
   folder.write("a.obj", obj_text());
   folder.write("b.obj", obj_text());
   folder.write("c.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  const Scene scene =
-      load_file(folder.write("s.yaml", "meshes: [{keyframes: [a.obj, b.obj]}]\nshutter: [0, 1]\n"));
+  const Scene scene = load_file(folder.write("s.yaml", "meshes: [{keyframes: [a.obj, b.obj]}]\nshutter: [0, 1]\n"));
   CHECK(scene.mesh.size() == 4);
   CHECK(scene.key_frames == 2);
   CHECK(scene.mesh.frames() == 2);
   CHECK(scene.report.warnings.empty());
-  CHECK_THAT(
-      error_of([&] { (void)load_file(folder.write("t.yaml", "meshes: [{keyframes: [a.obj, c.obj]}]\n")); }),
-      Catch::Contains("t.yaml:1: key frame 'c.obj' has other triangles"));
+  CHECK_THAT(error_of([&] { (void)load_file(folder.write("t.yaml", "meshes: [{keyframes: [a.obj, c.obj]}]\n")); }),
+             Catch::Contains("t.yaml:1: key frame 'c.obj' has other triangles"));
 }
 
 TEST_CASE("bad scene files: file, line, and the nearest key") {
@@ -117,20 +115,16 @@ TEST_CASE("bad scene files: file, line, and the nearest key") {
       {"meshes: [a.obj]\nenvironment: {image: x.hdr}\n", "x.hdr: no such file"},
       {"meshes: [a.obj]\nenvironment: {image: a.obj}\n", "a.obj: no image that can be read"},
       {"meshes: [a.obj]\nshutter: [1, 0]\n", ":2: the shutter closes before it opens"},
-      {"meshes: [a.obj]\ninstances: [{mesh: b, transforms: [{scale: 1}]}]\n",
-       ":2: unknown mesh 'b' (valid: a)"},
+      {"meshes: [a.obj]\ninstances: [{mesh: b, transforms: [{scale: 1}]}]\n", ":2: unknown mesh 'b' (valid: a)"},
       {"meshes: [a.obj]\ninstances: [{mesh: 1, transforms: [{scale: 1}]}]\n", ":2: mesh 1 does not exist"},
-      {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{scale: 0}]}]\n",
-       ":2: a transform flattens its mesh"},
-      {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [[1, 2, 3]]}]\n",
-       ":2: a transform has 16 numbers"},
+      {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{scale: 0}]}]\n", ":2: a transform flattens its mesh"},
+      {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [[1, 2, 3]]}]\n", ":2: a transform has 16 numbers"},
       {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{rotation: 1}]}]\n",
        ":2: unknown key of a transform 'rotation'; did you mean 'rotate'?"},
   };
   for (const auto& c : cases) {
     INFO(c.first);
-    CHECK_THAT(error_of([&] { (void)load_file(folder.write("s.yaml", c.first)); }),
-               Catch::Contains(c.second));
+    CHECK_THAT(error_of([&] { (void)load_file(folder.write("s.yaml", c.first)); }), Catch::Contains(c.second));
   }
 }
 
@@ -148,11 +142,11 @@ TEST_CASE("words of the command line, and what scenes are called") {
   CHECK(parse_scene_word("models/a.obj").name() == "a");
   CHECK(parse_scene_word("not_there.yaml").name() == "not_there");
   CHECK(parse_scene_word(folder.write("room.yaml", "meshes: [none.obj]\n").string()).name() == "room");
-  CHECK(parse_scene_word(folder.write("room.yaml", "meshes: [none.obj]\nname: chamber\n").string()).name() == "chamber");
+  CHECK(parse_scene_word(folder.write("room.yaml", "meshes: [none.obj]\nname: chamber\n").string()).name() ==
+        "chamber");
   CHECK_THAT(error_of([] { (void)parse_scene_word("buny"); }), Catch::Contains("did you mean 'bunny'?"));
   CHECK_THAT(error_of([] { (void)parse_scene_word("citty:100"); }), Catch::Contains("did you mean 'city'?"));
-  CHECK_THAT(error_of([] { (void)parse_scene_word("city:many"); }),
-             Catch::Contains("'many' is no whole number"));
+  CHECK_THAT(error_of([] { (void)parse_scene_word("city:many"); }), Catch::Contains("'many' is no whole number"));
   CHECK_THAT(error_of([] { (void)parse_scene_word("city:-5"); }), Catch::Contains("no whole number"));
   CHECK_THAT(error_of([] { (void)parse_scene_word(""); }), Catch::Contains("empty"));
   CHECK_THAT(error_of([] { (void)load_scene(SceneSpec{}); }), Catch::Contains("exactly one"));
@@ -173,9 +167,9 @@ TEST_CASE("the catalogue is sound, and says how to bring what is not there") {
   CHECK(find_catalogue_entry("dragon").triangles == 871414);
 
   const Folder folder;
-  const fs::path list = folder.write(
-      "list.yaml", "scenes: [{name: thing, description: d, package: {debian: thing-data}, file: " +
-                       (folder.path() / "thing.obj").string() + ", licence: free, triangles: 4}]\n");
+  const fs::path list =
+      folder.write("list.yaml", "scenes: [{name: thing, description: d, package: {debian: thing-data}, file: " +
+                                    (folder.path() / "thing.obj").string() + ", licence: free, triangles: 4}]\n");
   ::setenv("ARBORETUM_CATALOGUE", list.c_str(), 1);
   const SceneSpec thing{.catalogue = "thing", .file = {}, .scene = {}, .generator = {}};
   CHECK_THAT(error_of([&] { (void)load_scene(thing); }), Catch::Contains("./arboretum fetch thing"));
@@ -201,8 +195,8 @@ TEST_CASE("inspection counts what is wrong with a mesh") {
   CHECK(info.boundary_edges == 3);
   CHECK(info.non_manifold_edges == 3);
   CHECK_FALSE(info.closed);
-  CHECK(inspect_scene(load_file(folder.write("b.stl", stl_ascii()))).boundary_edges ==
-        4);  // vertices joined by position
+  // vertices joined by position
+  CHECK(inspect_scene(load_file(folder.write("b.stl", stl_ascii()))).boundary_edges == 4);
   const Scene sphere = load_scene(parse_scene_word("sphere:500"));
   CHECK(inspect_scene(sphere).closed);
   CHECK(inspect_scene(sphere).edges == 750);
@@ -214,12 +208,14 @@ TEST_CASE("inspection tells images that cannot be read, of used materials alone,
   folder.write("a.obj", "mtllib a.mtl\nusemtl wall\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   folder.write("b.obj", "v 0 0 9\nv 1 0 9\nv 0 1 9\nf 1 2 3\n");
   folder.write("c.obj", "v 0 0 8\nv 1 0 9\nv 0 1 9\nf 1 2 3\n");
-  const std::string meshes = "instances: [{mesh: a, transforms: [{translate: [2, 0, 0]}, {translate: [4, 0, 0]}]}]\nmeshes: [a.obj, ";
+  const std::string meshes =
+      "instances: [{mesh: a, transforms: [{translate: [2, 0, 0]}, {translate: [4, 0, 0]}]}]\nmeshes: [a.obj, ";
   const SceneInfo still = inspect_scene(load_file(folder.write("still.yaml", meshes + "b.obj]\n")));
   REQUIRE(still.report.warnings.size() == 1);
   CHECK_THAT(still.report.warnings[0], Catch::Contains("none.png: no image that can be read"));
   CHECK((still.instances == 3 && still.named_instances == 2));
-  const SceneInfo moving = inspect_scene(load_file(folder.write("moving.yaml", meshes + "{keyframes: [b.obj, c.obj]}]\nshutter: [0, 1]\n")));
+  const SceneInfo moving =
+      inspect_scene(load_file(folder.write("moving.yaml", meshes + "{keyframes: [b.obj, c.obj]}]\nshutter: [0, 1]\n")));
   CHECK((moving.instances == 0 && moving.named_instances == 2 && moving.key_frames == 2));
 }
 
@@ -228,8 +224,7 @@ TEST_CASE("effects: called for exactly where something needs them") {
   plain.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   plain.mesh.triangles = {{0, 1, 2}};
   plain.mesh.materials = {0};
-  plain.materials = {Material{.name = "grey"},
-                     Material{.name = "unused", .emission = {1, 1, 1}, .opacity = 0.5f}};
+  plain.materials = {Material{.name = "grey"}, Material{.name = "unused", .emission = {1, 1, 1}, .opacity = 0.5f}};
   const auto called = [](const Scene& scene) {
     std::vector<std::string> names;
     for (const Effect& e : effects_of(scene)) {
@@ -261,8 +256,7 @@ TEST_CASE("effects: called for exactly where something needs them") {
       {Material{.name = "mirror", .specular = {1, 1, 1}, .illum = 3}, {"mirror"}},
       {Material{.name = "brushed", .specular = {1, 1, 1}, .roughness = 0.2f, .illum = 3}, {"glossy"}},
       {Material{.name = "plastic", .specular = {0.04f, 0.04f, 0.04f}, .illum = 2}, {"glossy"}},
-      {Material{.name = "glass", .specular = {1, 1, 1}, .ior = 1.5f, .opacity = 0, .illum = 7},
-       {"dielectric"}},
+      {Material{.name = "glass", .specular = {1, 1, 1}, .ior = 1.5f, .opacity = 0, .illum = 7}, {"dielectric"}},
       {Material{.name = "air", .ior = 1.0f, .illum = 7}, {}},
       {Material{.name = "black filter", .transmission = {0, 0, 0}, .ior = 1.5f, .illum = 7}, {}},
       {Material{.name = "leaf", .opacity = 0.5f}, {"alpha_cutout"}},
@@ -289,8 +283,7 @@ TEST_CASE("effects: called for exactly where something needs them") {
   // is (PGM, PPM).
   const Folder folder;
   const std::string varied =
-      folder.write("varied.ppm", "P6 3 1 255\n" + std::string("\xff\xff\xff\x10\x10\x10\xff\xff\xff", 9))
-          .string();
+      folder.write("varied.ppm", "P6 3 1 255\n" + std::string("\xff\xff\xff\x10\x10\x10\xff\xff\xff", 9)).string();
   const std::string white = folder.write("white.ppm", "P6 3 1 255\n" + std::string(9, '\xff')).string();
   scene = plain;
   scene.materials[0].diffuse_map = scene.materials[0].opacity_map = white;

@@ -19,9 +19,7 @@ using namespace arboretum;
 using namespace arboretum::test;
 
 // Assimp itself leaks on some of the damaged files; only a build with the address sanitizer asks.
-extern "C" const char* __lsan_default_suppressions() {
-  return "leak:libassimp";
-}
+extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp"; }
 
 namespace {
 
@@ -66,8 +64,7 @@ std::string gltf_buffer() {
 }
 
 std::string gltf_json(const std::string& buffer_member, const std::string& node_members = "") {
-  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0)" +
-         node_members +
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0)" + node_members +
          R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"accessors":[)"
          R"({"bufferView":0,"componentType":5126,"count":5,"type":"VEC3","min":[0,0,0],"max":[1,1,1]},)"
          R"({"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}],"bufferViews":[)"
@@ -113,9 +110,8 @@ TEST_CASE("every format gives the same triangles in the same order") {
 TEST_CASE("node transforms of glTF are applied") {
   const Folder folder;
   folder.write("part.bin", gltf_buffer());
-  check_pyramid(
-      load_file(folder.write("a.gltf", gltf_json(R"(,"uri":"part.bin")", R"(,"translation":[10,20,30])"))),
-      {10, 20, 30});
+  check_pyramid(load_file(folder.write("a.gltf", gltf_json(R"(,"uri":"part.bin")", R"(,"translation":[10,20,30])"))),
+                {10, 20, 30});
 }
 
 TEST_CASE("OBJ: polygons, negative indices, materials, line ends, exact decimals") {
@@ -123,11 +119,11 @@ TEST_CASE("OBJ: polygons, negative indices, materials, line ends, exact decimals
   folder.write("m.mtl",
                "newmtl glass\nKs 1 1 1\nNi 1.5\nTf 0.9 0.8 0.7\nillum 7\nNs 12\n\nnewmtl lamp\nKd 0.1 0.2 "
                "0.3\nKe 5 6 7\nPr 0.25\nd 0.5\nmap_Kd wood.png\nmap_d leaf.png\n");
-  const Scene scene = load_file(
-      folder.write("a.obj",
-                   "mtllib m.mtl\r\nv 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nf 1 2 3\r\nusemtl lamp\r\nf "
-                   "1/1/1 2/2/2 3//3 4\r\nusemtl glass\r\n"
-                   "v 0.100000001490116119384765625 +.5 1e-1\r\nf -1 -2 -3\r\nusemtl missing\r\nf 1 2 -1"));
+  const Scene scene =
+      load_file(folder.write("a.obj",
+                             "mtllib m.mtl\r\nv 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nf 1 2 3\r\nusemtl lamp\r\nf "
+                             "1/1/1 2/2/2 3//3 4\r\nusemtl glass\r\n"
+                             "v 0.100000001490116119384765625 +.5 1e-1\r\nf -1 -2 -3\r\nusemtl missing\r\nf 1 2 -1"));
   REQUIRE(scene.mesh.size() == 5);
   CHECK(scene.report.polygons_split == 1);
   REQUIRE(scene.materials.size() == 3);  // the two of the file and a default one
@@ -157,23 +153,27 @@ TEST_CASE("PLY: material ids, other properties, other element order of types") {
   const Scene named = load_file(folder.write("b.ply", ply_binary(true, true)));
   REQUIRE(named.materials.size() == 2);
   CHECK(named.materials[1].name == "second");
-  const Scene odd = load_file(
-      folder.write("c.ply",
-                   "ply\nformat ascii 1.0\nelement thing 1\nproperty list uchar float values\nelement vertex "
-                   "3\nproperty uchar red\nproperty double z\nproperty "
-                   "double x\nproperty int y\nelement face 1\nproperty float quality\nproperty list uchar "
-                   "uint vertex_index\nend_header\n2 0.5 1e3\n255 3 1 2\n0 6 4 5\n9 9 7 9\n0.1 3 0 1 2\n"));
+  const Scene odd =
+      load_file(folder.write("c.ply",
+                             "ply\nformat ascii 1.0\nelement thing 1\nproperty list uchar float values\nelement vertex "
+                             "3\nproperty uchar red\nproperty double z\nproperty "
+                             "double x\nproperty int y\nelement face 1\nproperty float quality\nproperty list uchar "
+                             "uint vertex_index\nend_header\n2 0.5 1e3\n255 3 1 2\n0 6 4 5\n9 9 7 9\n0.1 3 0 1 2\n"));
   CHECK(odd.mesh.corners(0)[0] == Vec3f{1, 2, 3});
   CHECK(odd.mesh.corners(0)[2] == Vec3f{7, 9, 9});
 }
 
 TEST_CASE("PLY: faces index the first vertices, whatever other elements of that name promise") {
   const Folder folder;
-  const std::string head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n",
-                    tail = "element face 1\nproperty list uchar int vertex_indices\nelement vertex 9\nproperty float x\nend_header\n0 0 0\n1 0 0\n0 1 0\n",
-                    rest = "\n0\n0\n0\n0\n0\n0\n0\n0\n0\n";
+  const std::string
+      head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n",
+      tail =
+          "element face 1\nproperty list uchar int vertex_indices\nelement vertex 9\nproperty float x\nend_header\n0 0 "
+          "0\n1 0 0\n0 1 0\n",
+      rest = "\n0\n0\n0\n0\n0\n0\n0\n0\n0\n";
   CHECK(load_file(folder.write("right.ply", head + tail + "3 0 1 2" + rest)).mesh.size() == 1);
-  CHECK_THROWS_WITH(load_file(folder.write("wrong.ply", head + tail + "3 0 1 8" + rest)), Catch::Contains("vertex index 8 is out of range: there are 3 vertices"));
+  CHECK_THROWS_WITH(load_file(folder.write("wrong.ply", head + tail + "3 0 1 8" + rest)),
+                    Catch::Contains("vertex index 8 is out of range: there are 3 vertices"));
 }
 
 TEST_CASE("numbers beyond float's range are read alike in every locale") {
@@ -209,8 +209,7 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
       {"negative.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf -1 -2 -4\n",
        "negative.obj:5: face index -4 is out of range"},
       {"zero.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "zero.obj:4: face index 0 is out of range"},
-      {"wrap.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4294967299\n",
-       "wrap.obj:4: a face index is out of range"},
+      {"wrap.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4294967299\n", "wrap.obj:4: a face index is out of range"},
       {"word.obj", "v 0 0 0\nv 1 zero 0\n", "word.obj:2: vertex 2 has no number for y"},
       {"points.obj", "v 0 0 0\nv 1 0 0\n", "no face in it (2 vertices)"},
       {"text.obj", "this is no model\n", "no face in it"},
@@ -301,8 +300,7 @@ TEST_CASE("damaged bytes in any format end in an error or a usable scene, never 
       try {
         const Scene scene = load_file(folder.write(name, damaged));
         REQUIRE(scene.mesh.size() > 0);
-        for (const Triangle& t : scene.mesh.triangles)
-          REQUIRE(std::max({t.a, t.b, t.c}) < scene.mesh.vertices.size());
+        for (const Triangle& t : scene.mesh.triangles) REQUIRE(std::max({t.a, t.b, t.c}) < scene.mesh.vertices.size());
       } catch (const UserError& error) {
         ++errors;
         CHECK(std::string(error.what()).find('\n') == std::string::npos);
@@ -423,11 +421,8 @@ TEST_CASE("zero area is decided exactly") {
        true},  // on x = y = z, whatever rounding did to them
       {{0.1f, 0.2f, 0.3f}, {0.2f, 0.4f, 0.6f}, {0.4f, 0.8f, 1.2f}, true},  // multiples by powers of two
       {{1, 1, 0}, {one_up, one_up, 0}, {1, one_up, 0}, false},
-      {{0, 0, 0}, {tiny, 0, 0}, {0, tiny, 0}, false},  // area 1e-90
-      {{kMaxCoordinate, 0, 0},
-       {kMaxCoordinate, tiny, 0},
-       {0, 0, 0},
-       false},  // the difference is not a double
+      {{0, 0, 0}, {tiny, 0, 0}, {0, tiny, 0}, false},                         // area 1e-90
+      {{kMaxCoordinate, 0, 0}, {kMaxCoordinate, tiny, 0}, {0, 0, 0}, false},  // the difference is not a double
       {{kMaxCoordinate, tiny, 0}, {0, tiny, 0}, {-1, tiny, 0}, true},
       {{1, 2, 3}, {1, 2, 3}, {4, 5, 6}, true},
       {{0, 0, 0}, {-0.0f, 0, 0}, {1, 1, 1}, true},
@@ -445,18 +440,7 @@ TEST_CASE("polygons: any simple one is covered exactly once") {
       {{0, 0}, {1, 0}, {1, 1}, {0, 1}},
       {{0, 0}, {4, 0}, {4, 4}, {3, 1}},          // concave quad, either diagonal but one fails
       {{0, 0}, {1, 0}, {2, 0}, {2, 2}, {0, 2}},  // collinear corners
-      {{0, 0},
-       {5, 0},
-       {5, 5},
-       {4, 5},
-       {4, 1},
-       {3, 1},
-       {3, 5},
-       {2, 5},
-       {2, 1},
-       {1, 1},
-       {1, 5},
-       {0, 5}},  // a comb
+      {{0, 0}, {5, 0}, {5, 5}, {4, 5}, {4, 1}, {3, 1}, {3, 5}, {2, 5}, {2, 1}, {1, 1}, {1, 5}, {0, 5}},  // a comb
   };
   for (const auto& polygon : polygons) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -469,8 +453,7 @@ TEST_CASE("polygons: any simple one is covered exactly once") {
           const auto& q = polygon[(i + 1) % polygon.size()];
           area += 0.5 * (double(polygon[i][0]) * q[1] - double(q[0]) * polygon[i][1]);
           Vec3f v;
-          v[std::size_t(axis)] = p[0], v[std::size_t((axis + 1) % 3)] = p[1],
-          v[std::size_t((axis + 2) % 3)] = 7;
+          v[std::size_t(axis)] = p[0], v[std::size_t((axis + 1) % 3)] = p[1], v[std::size_t((axis + 2) % 3)] = 7;
           vertices.push_back(v);
           corners.push_back(std::uint32_t(i));
         }

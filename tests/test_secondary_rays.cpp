@@ -14,7 +14,8 @@ using namespace arboretum::test;
 
 TEST_CASE("watertight with padded boxes has no wrong answer in any workload") {
   std::size_t rays_checked = 0;
-  for (const char* word : {"city:3000", "cornell_box:2000", "fractal_terrain:5000", "teapot_in_stadium:4000", "needles:2000"}) {
+  for (const char* word :
+       {"city:3000", "cornell_box:2000", "fractal_terrain:5000", "teapot_in_stadium:4000", "needles:2000"}) {
     const Scene scene = load_scene(parse_scene_word(word));
     const Oracle oracle(scene.mesh);
     const View view{64, 64, 1};
@@ -31,8 +32,9 @@ TEST_CASE("watertight with padded boxes has no wrong answer in any workload") {
       for (const KernelRow& row : runnable_rows()) {
         if (row.intersector != "watertight" || row.box != "padded") continue;
         const Accel& accel = structures.get(row);
-        const AnswerCheck check = any ? oracle.check_any_hit(workload.rays, any_truth, any_hit(row, accel, workload.rays))
-                                      : oracle.check_closest_hit(workload.rays, truth, closest_hit(row, accel, workload.rays));
+        const AnswerCheck check =
+            any ? oracle.check_any_hit(workload.rays, any_truth, any_hit(row, accel, workload.rays))
+                : oracle.check_closest_hit(workload.rays, truth, closest_hit(row, accel, workload.rays));
         INFO(word << " " << name << ": " << name_of(row));
         CAPTURE(check.missed_hits, check.false_hits, check.wrong_surface);
         CHECK(check.wrong_answers() == 0);

@@ -1,5 +1,5 @@
-// How rays leave surfaces: the five ways, what they do to the rays, that primitives are passed through, and that what is counted of
-// them is right.
+// How rays leave surfaces: the five ways, what they do to the rays, that primitives are passed through, and that what
+// is counted of them is right.
 #include <map>
 #include <string>
 #include <vector>
@@ -17,8 +17,9 @@ using namespace arboretum::test;
 
 namespace {
 
-constexpr SelfIntersection kWays[] = {SelfIntersection::none, SelfIntersection::epsilon, SelfIntersection::integer_offset,
-                                      SelfIntersection::error_bound, SelfIntersection::exclusion};
+constexpr SelfIntersection kWays[] = {SelfIntersection::none, SelfIntersection::epsilon,
+                                      SelfIntersection::integer_offset, SelfIntersection::error_bound,
+                                      SelfIntersection::exclusion};
 
 SceneChoice sphere(std::size_t triangles, double offset) {
   const SceneSpec spec = parse_scene_word(std::string("sphere:").append(std::to_string(triangles)));
@@ -33,13 +34,20 @@ SceneData data_of(const SceneChoice& choice) {
 
 }  // namespace
 
-TEST_CASE("the offset of Waechter and Binder: steps of the number format, away from zero and towards it, and a fixed one near zero") {
+TEST_CASE(
+    "the offset of Waechter and Binder: steps of the number format, away from zero and towards it, and a fixed one "
+    "near zero") {
   struct Case {
     float p, n, expected;
   };
-  const Case cases[] = {{1.0f, 1.0f, 1.0f + 256 * 0x1p-23f}, {-1.0f, -1.0f, -1.0f - 256 * 0x1p-23f}, {1.0f, -0.5f, 1.0f - 128 * 0x1p-24f},
-                        {1024.0f, 0.25f, 1024.0f + 64 * 0x1p-13f}, {0.03125f, 1.0f, 0.03125f + 256 * 0x1p-28f}, {0.03f, 1.0f, 0.03f + 0x1p-16f},
-                        {0.0f, -1.0f, -0x1p-16f}, {5.0f, 0.0f, 5.0f}};
+  const Case cases[] = {{1.0f, 1.0f, 1.0f + 256 * 0x1p-23f},
+                        {-1.0f, -1.0f, -1.0f - 256 * 0x1p-23f},
+                        {1.0f, -0.5f, 1.0f - 128 * 0x1p-24f},
+                        {1024.0f, 0.25f, 1024.0f + 64 * 0x1p-13f},
+                        {0.03125f, 1.0f, 0.03125f + 256 * 0x1p-28f},
+                        {0.03f, 1.0f, 0.03f + 0x1p-16f},
+                        {0.0f, -1.0f, -0x1p-16f},
+                        {5.0f, 0.0f, 5.0f}};
   for (const Case& c : cases) {
     INFO(c.p << " along " << c.n);
     CHECK(integer_offset({c.p, c.p, c.p}, {c.n, c.n, c.n}) == Vec3f{c.expected, c.expected, c.expected});
@@ -76,22 +84,25 @@ TEST_CASE("every way has the same rays from the same hits, but for where they be
 }
 
 TEST_CASE("what is counted of starts: table") {
-  const auto exact = [](double t, std::uint32_t id) { return ExactHit{id == kNoPrimitive ? Hit{} : Hit{float(t), 0, 0, id}, t, false}; };
+  const auto exact = [](double t, std::uint32_t id) {
+    return ExactHit{id == kNoPrimitive ? Hit{} : Hit{float(t), 0, 0, id}, t, false};
+  };
   const auto given = [](float t, std::uint32_t id) { return Hit{t, 0, 0, id}; };
   struct Case {
     ExactHit truth;
     Hit answer;
     std::uint64_t self, near, leak;
   };
-  const Case cases[] = {{exact(1, 5), given(1, 5), 0, 0, 0},        {exact(1, 5), given(0.5f, 5), 0, 0, 0},
-                        {exact(1, 5), given(1e-6f, 7), 1, 0, 0},    {exact(0, kNoPrimitive), given(1e-6f, 7), 1, 0, 0},
-                        {exact(1, 5), given(0.5f, 6), 0, 1, 0},     {exact(0, kNoPrimitive), given(3, 6), 0, 1, 0},
-                        {exact(1, 5), given(2, 6), 0, 0, 1},        {exact(1, 5), Hit{}, 0, 0, 1},
-                        {exact(0, kNoPrimitive), Hit{}, 0, 0, 0},   {exact(1, 5), given(1.0001f, 6), 0, 0, 0}};
+  const Case cases[] = {{exact(1, 5), given(1, 5), 0, 0, 0},      {exact(1, 5), given(0.5f, 5), 0, 0, 0},
+                        {exact(1, 5), given(1e-6f, 7), 1, 0, 0},  {exact(0, kNoPrimitive), given(1e-6f, 7), 1, 0, 0},
+                        {exact(1, 5), given(0.5f, 6), 0, 1, 0},   {exact(0, kNoPrimitive), given(3, 6), 0, 1, 0},
+                        {exact(1, 5), given(2, 6), 0, 0, 1},      {exact(1, 5), Hit{}, 0, 0, 1},
+                        {exact(0, kNoPrimitive), Hit{}, 0, 0, 0}, {exact(1, 5), given(1.0001f, 6), 0, 0, 0}};
   const std::uint32_t source = 7;
   for (const Case& c : cases) {
     INFO(c.truth.t << " " << c.truth.hit.primitive << " answered " << c.answer.t << " " << c.answer.primitive);
-    const StartCheck check = check_closest_starts(std::span(&c.truth, 1), std::span(&c.answer, 1), std::span(&source, 1));
+    const StartCheck check =
+        check_closest_starts(std::span(&c.truth, 1), std::span(&c.answer, 1), std::span(&source, 1));
     CHECK(check.rays == 1);
     CHECK(check.self_hits == c.self);
     CHECK(check.near_hits == c.near);
@@ -113,10 +124,13 @@ TEST_CASE("a convex surface is left by offsets and exclusion, and met again with
     const Workload& workload = data.workload("diffuse", {way});
     const Oracle oracle(data.mesh());
     std::vector<Hit> hits;
-    for (const ExactHit& h : workload.excludes_sources ? closest_hit_excluding(oracle, workload.batch(), workload.sources) : oracle.closest_hit(workload.batch()))
+    for (const ExactHit& h : workload.excludes_sources
+                                 ? closest_hit_excluding(oracle, workload.batch(), workload.sources)
+                                 : oracle.closest_hit(workload.batch()))
       hits.push_back(h.hit);
     const StartCheck check = data.check_starts(workload, hits);
-    return Rates{double(check.self_hits) / double(check.rays), double(check.near_hits) / double(check.rays), double(check.leaks) / double(check.rays)};
+    return Rates{double(check.self_hits) / double(check.rays), double(check.near_hits) / double(check.rays),
+                 double(check.leaks) / double(check.rays)};
   };
   SceneData near = data_of(sphere(2000, 0.0)), far = data_of(sphere(2000, 1e4));
   for (SceneData* data : {&near, &far}) {
@@ -165,14 +179,16 @@ TEST_CASE("kernels that know nothing of it pass through excluded primitives, wha
     any_hit_excluding(row, accel, occlusion.batch(), occlusion.sources, occluded);
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < hits.size(); ++i) wrong += hits[i].primitive != truth["diffuse"].first[i].hit.primitive;
-    for (std::size_t i = 0; i < occluded.size(); ++i) wrong += (occluded[i] != 0) != truth["ambient_occlusion"].first[i].hit.is_hit();
+    for (std::size_t i = 0; i < occluded.size(); ++i)
+      wrong += (occluded[i] != 0) != truth["ambient_occlusion"].first[i].hit.is_hit();
     CHECK(wrong == 0);
     // Nothing excluded: nothing changes.
     const std::vector<std::uint32_t> none(hits.size(), kNoPrimitive);
     std::vector<Hit> plain(hits.size()), passed(hits.size());
     row.closest_hit(accel, diffuse.batch(), plain);
     closest_hit_excluding(row, accel, diffuse.batch(), none, passed);
-    CHECK(std::equal(plain.begin(), plain.end(), passed.begin(), [](const Hit& a, const Hit& b) { return a.primitive == b.primitive && a.t == b.t; }));
+    CHECK(std::equal(plain.begin(), plain.end(), passed.begin(),
+                     [](const Hit& a, const Hit& b) { return a.primitive == b.primitive && a.t == b.t; }));
   }
   CHECK(rows > 0);
 }
@@ -191,7 +207,9 @@ TEST_CASE("exact answers of rays from points with more digits than float32 has")
   const std::array<double, 3> start{0.1, 0.1, between};
   for (float direction : {1.0f, -1.0f}) {
     const Ray ray{.origin = {0.1f, 0.1f, 1.0f}, .direction = {0, 0, direction}};
-    const auto from = [&](std::uint32_t left_out) { return oracle.closest_hit_from(std::span(&start, 1), std::span(&ray, 1), std::span(&left_out, 1)).front(); };
+    const auto from = [&](std::uint32_t left_out) {
+      return oracle.closest_hit_from(std::span(&start, 1), std::span(&ray, 1), std::span(&left_out, 1)).front();
+    };
     const ExactHit hit = from(kNoPrimitive);
     CHECK(hit.hit.primitive == (direction > 0 ? 1u : 0u));
     CHECK(hit.t == (direction > 0 ? double(upper) - between : between - 1.0));
@@ -205,7 +223,8 @@ TEST_CASE("exact answers of rays from points with more digits than float32 has")
   std::vector<std::array<double, 3>> starts;
   constexpr double kAlong = 0x1p-20;
   for (const Ray& r : primary.rays)
-    starts.push_back({r.origin.x + kAlong * r.direction.x, r.origin.y + kAlong * r.direction.y, r.origin.z + kAlong * r.direction.z});
+    starts.push_back({r.origin.x + kAlong * r.direction.x, r.origin.y + kAlong * r.direction.y,
+                      r.origin.z + kAlong * r.direction.z});
   const std::vector<std::uint32_t> nothing(starts.size(), kNoPrimitive);
   const std::vector<ExactHit> moved = flake.closest_hit_from(starts, primary.rays, nothing);
   std::size_t hits = 0;
@@ -215,7 +234,8 @@ TEST_CASE("exact answers of rays from points with more digits than float32 has")
     ++hits;
     CHECK(moved[i].t == Approx(plain[i].t - kAlong).epsilon(1e-14));
     // Left out, it is passed through.
-    const auto beyond = flake.closest_hit_from(std::span(&starts[i], 1), std::span(&primary.rays[i], 1), std::span(&plain[i].hit.primitive, 1));
+    const auto beyond = flake.closest_hit_from(std::span(&starts[i], 1), std::span(&primary.rays[i], 1),
+                                               std::span(&plain[i].hit.primitive, 1));
     CHECK(beyond[0].hit.primitive != plain[i].hit.primitive);
     CHECK((!beyond[0].hit.is_hit() || beyond[0].t >= moved[i].t));
   }

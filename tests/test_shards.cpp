@@ -1,4 +1,5 @@
-// Shards are the plan, cut the same everywhere; merged they are the whole run; what does not belong together is refused.
+// Shards are the plan, cut the same everywhere; merged they are the whole run; what does not belong together is
+// refused.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -38,7 +39,9 @@ struct Sweep {
   Experiment experiment;
   Plan plan;
   explicit Sweep(std::vector<Isa> isas = {Isa::scalar, Isa::sse, Isa::avx2}, const std::string& yaml = kSweep)
-      : registry(paper_registry(std::move(isas))), experiment(read_experiment(folder.write("sweep.yaml", yaml), registry)), plan(make_plan(experiment, registry)) {}
+      : registry(paper_registry(std::move(isas))),
+        experiment(read_experiment(folder.write("sweep.yaml", yaml), registry)), plan(make_plan(experiment, registry)) {
+  }
 
   Plan shard(unsigned index, unsigned of) const {
     Plan part = plan;
@@ -48,19 +51,28 @@ struct Sweep {
 };
 
 CellResult result_of(const Cell& cell) {
-  CellResult result{.cell = cell, .repetitions = {}, .facts = {{"rays", 1000}, {"triangles", 500}, {"wrong_answers", 0}, {"sah_cost", 20.25}}};
+  CellResult result{.cell = cell,
+                    .repetitions = {},
+                    .facts = {{"rays", 1000}, {"triangles", 500}, {"wrong_answers", 0}, {"sah_cost", 20.25}}};
   for (unsigned i = 0; i < 3; ++i)
-    result.repetitions.push_back({.index = i, .iterations = 3, .wall_seconds = 0.1 + 0.01 * i, .cpu_seconds = 0.1, .phases = {{"collapse", 0.02}}});
+    result.repetitions.push_back({.index = i,
+                                  .iterations = 3,
+                                  .wall_seconds = 0.1 + 0.01 * i,
+                                  .cpu_seconds = 0.1,
+                                  .phases = {{"collapse", 0.02}}});
   return result;
 }
 
 Json machine() {
-  return {{"cpu", "a processor"}, {"cores", 2}, {"isa", {"sse", "avx2"}}, {"compiler", "GNU"}, {"compiler_flags", "-O3"}, {"git_revision", "0123456789abcdef"}, {"git_dirty", false},
-          {"command", "arboretum run sweep.yaml --shard 1/2 --out x"}};
+  return {{"cpu", "a processor"},    {"cores", 2},
+          {"isa", {"sse", "avx2"}},  {"compiler", "GNU"},
+          {"compiler_flags", "-O3"}, {"git_revision", "0123456789abcdef"},
+          {"git_dirty", false},      {"command", "arboretum run sweep.yaml --shard 1/2 --out x"}};
 }
 
 /// What `run` leaves of a shard; `most`: it was cut off after so many cells.
-fs::path write_part(const Sweep& sweep, const std::string& name, const Shard& shard, const Json& context = machine(), std::size_t most = SIZE_MAX) {
+fs::path write_part(const Sweep& sweep, const std::string& name, const Shard& shard, const Json& context = machine(),
+                    std::size_t most = SIZE_MAX) {
   const fs::path folder = sweep.folder.path / name;
   fs::create_directories(folder);
   const std::string hash = configuration_hash(sweep.experiment);
@@ -116,7 +128,8 @@ TEST_CASE("shards are the same on machines that lack an instruction set") {
   CHECK(all.plan.elsewhere.empty());
   for (const Sweep* sweep : {&least, &some}) {
     for (unsigned of : {2u, 5u, 9u}) {
-      const auto here = split_plan(sweep->experiment, sweep->plan, of), there = split_plan(all.experiment, all.plan, of);
+      const auto here = split_plan(sweep->experiment, sweep->plan, of),
+                 there = split_plan(all.experiment, all.plan, of);
       CHECK(here == there);
     }
   }
@@ -152,7 +165,8 @@ TEST_CASE("a filter comes before the split: shards share what is left") {
 TEST_CASE("shards that make no sense are one line") {
   CHECK(parse_shard("2/8") == Shard{2, 8});
   CHECK(parse_shard("1/1").is_whole());
-  for (const char* text : {"", "/", "1", "1/", "/2", "0/2", "3/2", "-1/2", "1/2/3", "1/2 ", " 1/2", "1.5/2", "a/b", "1/0", "1/100001", "99999999999/99999999999"})
+  for (const char* text : {"", "/", "1", "1/", "/2", "0/2", "3/2", "-1/2", "1/2/3", "1/2 ", " 1/2", "1.5/2", "a/b",
+                           "1/0", "1/100001", "99999999999/99999999999"})
     CHECK(error_of([&] { (void)parse_shard(text); }).find("as in --shard 2/8") != std::string::npos);
 }
 
@@ -167,7 +181,8 @@ TEST_CASE("merged shards are the whole run's results") {
   CHECK(missing_line(all).empty());
   RunOutcome outcome;
   for (const CellResult& r : whole.cells) outcome.results.push_back(r);
-  const Json expected = Json::parse(results_json(outcome, sweep.plan, {})), found = Json::parse(results_json(all.outcome, all.plan, {}));
+  const Json expected = Json::parse(results_json(outcome, sweep.plan, {})),
+             found = Json::parse(results_json(all.outcome, all.plan, {}));
   CHECK(found["benchmarks"] == expected["benchmarks"]);
   CHECK(found["skipped"] == expected["skipped"]);
   CHECK(found["context"]["skipped_cells"] == expected["context"]["skipped_cells"]);
@@ -186,9 +201,11 @@ TEST_CASE("what is missing of a merge is known by name; a run that was cut off g
   CHECK(some.outcome.results.size() == sweep.shard(1, 3).cells.size() + 5);
   CHECK(some.outcome.results.size() + some.missing.size() == sweep.plan.cells.size());
   const std::string line = missing_line(some);
-  CHECK(line.find(fmt::format("{} of shard 2/3, {} of shard 3/3", sweep.shard(2, 3).cells.size() - 5, sweep.shard(3, 3).cells.size())) != std::string::npos);
+  CHECK(line.find(fmt::format("{} of shard 2/3, {} of shard 3/3", sweep.shard(2, 3).cells.size() - 5,
+                              sweep.shard(3, 3).cells.size())) != std::string::npos);
   CHECK(Json::parse(results_json(some.outcome, some.plan, {}))["missing"].size() == some.missing.size());
-  CHECK(some.plan.skipped.size() == sweep.plan.skipped.size());  // known from plan.json, whoever would have reported them
+  // Known from plan.json, whoever would have reported them
+  CHECK(some.plan.skipped.size() == sweep.plan.skipped.size());
 }
 
 TEST_CASE("parts that do not belong together are refused, or merged when told to") {
@@ -212,11 +229,15 @@ TEST_CASE("parts that do not belong together are refused, or merged when told to
   Json elsewhere = machine();
   elsewhere["cpu"] = "another processor";
   const fs::path far = write_part(sweep, "far", {2, 2}, elsewhere);
-  CHECK(error_of([&] { (void)merged({one, far}); }).find("CPU: a processor against another processor") != std::string::npos);
+  CHECK(error_of([&] {
+          (void)merged({one, far});
+        }).find("CPU: a processor against another processor") != std::string::npos);
   const Merged mixed = merged({one, far}, {.allow_different_machines = true});
   CHECK(mixed.context["cpu"] == "a processor | another processor");
   CHECK(mixed.outcome.warnings.at(0).find("different machines") != std::string::npos);
-  CHECK(mixed.outcome.results.front().facts["part"].get<int>() + mixed.outcome.results.back().facts["part"].get<int>() == 3);
+  CHECK(mixed.outcome.results.front().facts["part"].get<int>() +
+            mixed.outcome.results.back().facts["part"].get<int>() ==
+        3);
 
   Json later = machine();
   later["git_revision"] = "fedcba9876543210";
@@ -232,9 +253,11 @@ TEST_CASE("parts that do not belong together are refused, or merged when told to
 TEST_CASE("a folder that holds no results names the nearest that does; damaged files are named") {
   const Sweep sweep;
   const fs::path part = write_part(sweep, "shard-one", {1, 2});
-  CHECK(error_of([&] { (void)read_result_folder(sweep.folder.path / "shard-onw"); }).find("shard-one'") != std::string::npos);
+  CHECK(error_of([&] { (void)read_result_folder(sweep.folder.path / "shard-onw"); }).find("shard-one'") !=
+        std::string::npos);
   CHECK(error_of([&] { (void)read_result_folder(sweep.folder.path); }).find("shard-one'") != std::string::npos);
-  CHECK(error_of([&] { (void)read_result_folder(part / "results.json"); }).find("give the folder") != std::string::npos);
+  CHECK(error_of([&] { (void)read_result_folder(part / "results.json"); }).find("give the folder") !=
+        std::string::npos);
   std::ofstream(part / "cells.jsonl", std::ios::app) << "{\"name\": \"torn";  // by a kill
   CHECK(read_result_folder(part).cells.size() == sweep.shard(1, 2).cells.size());
   std::ofstream(part / "cells.jsonl", std::ios::app) << "\nno json\n";
@@ -284,11 +307,14 @@ TEST_CASE("a run gone on with keeps what was measured, whatever its filter, its 
     CHECK(found == expected);
     CHECK(std::ranges::count_if(plan.cells, [](const Cell& cell) { return cell.isa == Isa::avx512; }) > 0);
     CHECK(std::ranges::none_of(plan.skipped, [&](const SkippedCell& cell) { return done.contains(cell.name); }));
-    CHECK(std::ranges::none_of(record.skipped, [&](const PlanRecord::Entry& entry) { return done.contains(entry.name); }));
+    CHECK(std::ranges::none_of(record.skipped,
+                               [&](const PlanRecord::Entry& entry) { return done.contains(entry.name); }));
     std::map<std::string, unsigned> recorded;
     for (const PlanRecord::Entry& entry : record.cells) recorded.emplace(entry.name, entry.shard);
     for (const std::string& name : found) CHECK(recorded.at(name) == of);
-    if (of == 1) CHECK(plan.filtered == filtered - std::size_t(std::ranges::count_if(here.plan.cells, [&](const Cell& c) { return done.contains(c.name()); })));
+    if (of == 1)
+      CHECK(plan.filtered == filtered - std::size_t(std::ranges::count_if(
+                                            here.plan.cells, [&](const Cell& c) { return done.contains(c.name()); })));
     CHECK(record.filtered == plan.filtered);
   }
 }

@@ -22,18 +22,10 @@ namespace {
 
 using Bits = std::uint32_t;
 
-float as_float(Bits b) {
-  return std::bit_cast<float>(b);
-}
-Bits bits(float x) {
-  return std::bit_cast<Bits>(x);
-}
-std::int32_t as_int(Bits b) {
-  return std::bit_cast<std::int32_t>(b);
-}
-Bits bits(std::int32_t x) {
-  return std::bit_cast<Bits>(x);
-}
+float as_float(Bits b) { return std::bit_cast<float>(b); }
+Bits bits(float x) { return std::bit_cast<Bits>(x); }
+std::int32_t as_int(Bits b) { return std::bit_cast<std::int32_t>(b); }
+Bits bits(std::int32_t x) { return std::bit_cast<Bits>(x); }
 
 struct Lanes {
   int width, lane;
@@ -91,7 +83,12 @@ const std::map<std::string, Reference>& references() {
       {"unfused_mul_sub", {arithmetic, [](L l) { return bits(product(l.fa(), l.fb()) - l.fc()); }}},
       {"unfused_mul_add", {arithmetic, [](L l) { return bits(product(l.fa(), l.fb()) + l.fc()); }}},
       {"scalar_mul_sub", {arithmetic, [](L l) { return bits(product(l.fa(), l.fb()) - l.fc()); }}},
-      {"transposed_row", {exact, [](L l) { const Bits* row[] = {l.a, l.b, l.c, l.a}; return l.lane < 4 ? row[l.lane][l.c[0] & 3u] : 0u; }}},
+      {"transposed_row",
+       {exact,
+        [](L l) {
+          const Bits* row[] = {l.a, l.b, l.c, l.a};
+          return l.lane < 4 ? row[l.lane][l.c[0] & 3u] : 0u;
+        }}},
       {"bytes_with_bit",
        {exact,
         [](L l) {
@@ -160,8 +157,7 @@ const std::map<std::string, Reference>& references() {
           return bits(m);
         }}},
       {"dot",
-       {arithmetic,
-        [](L l) { return bits(l.madd(l.fa(), l.fb(), l.madd(l.fb(), l.fc(), product(l.fc(), l.fa())))); }}},
+       {arithmetic, [](L l) { return bits(l.madd(l.fa(), l.fb(), l.madd(l.fb(), l.fc(), product(l.fc(), l.fa())))); }}},
       {"cross_x", {arithmetic, [](L l) { return bits(l.madd(l.fb(), l.fa(), -product(l.fc(), l.fc()))); }}},
       {"cross_y", {arithmetic, [](L l) { return bits(l.madd(l.fc(), l.fb(), -product(l.fa(), l.fa()))); }}},
       {"cross_z", {arithmetic, [](L l) { return bits(l.madd(l.fa(), l.fc(), -product(l.fb(), l.fb()))); }}},
@@ -181,7 +177,8 @@ const std::map<std::string, Reference>& references() {
         }}},
       {"permute_lanes", {exact, [](L l) { return l.a[l.b[l.lane] & Bits(l.width - 1)]; }}},
       {"or_in_lanes", {exact, [](L l) { return (l.c[l.lane] & 1u) ? l.a[l.lane] | l.b[l.lane] : l.a[l.lane]; }}},
-      {"sort_lanes_down", {exact, [](L l) { return sorted_down(std::vector<Bits>(l.a, l.a + l.width))[std::size_t(l.lane)]; }}},
+      {"sort_lanes_down",
+       {exact, [](L l) { return sorted_down(std::vector<Bits>(l.a, l.a + l.width))[std::size_t(l.lane)]; }}},
       {"sort_first_lanes_down",
        {exact,
         [](L l) {
@@ -198,8 +195,7 @@ bool agrees(const std::string& name, const Reference& reference, const Lanes& l,
   if (name == "compress" && l.lane >= std::popcount(l.mask(l.c))) return true;
   if (got == want) return true;
   if (reference.compare == Compare::exact) return false;
-  if (reference.compare == Compare::arithmetic)
-    return std::isnan(as_float(got)) && std::isnan(as_float(want));
+  if (reference.compare == Compare::arithmetic) return std::isnan(as_float(got)) && std::isnan(as_float(want));
   for (int i = 0; i < l.width; ++i)
     if (std::isnan(as_float(l.a[i]))) return true;
   return as_float(got) == as_float(want);
@@ -210,8 +206,7 @@ const std::vector<Bits>& special_values() {
     std::vector<Bits> v{0x7fc00000u, 0xffc00000u, 0x7fc12345u, 0x7f800001u, 0x00000001u, 0x80000001u,
                         0x007fffffu, 0x00800000u, 0x7f7fffffu, 0xff7fffffu, 0x4f000000u, 0xcf000000u,
                         0x4effffffu, 0xcf000001u, 0x7fffffffu, 0xffffffffu, 0x3f7fffffu, 0x3f800001u};
-    for (float x : {0.0f, -0.0f, 1.0f, -1.0f, 0.1f, 0.5f, -2.5f, 3e38f, INFINITY, -INFINITY})
-      v.push_back(bits(x));
+    for (float x : {0.0f, -0.0f, 1.0f, -1.0f, 0.1f, 0.5f, -2.5f, 3e38f, INFINITY, -INFINITY}) v.push_back(bits(x));
     return v;
   }();
   return values;
@@ -233,14 +228,10 @@ Bits input(std::uint64_t sample, int dimension) {
 
 OperationTable operations(Isa isa, int width) {
   switch (isa) {
-    case Isa::scalar:
-      return operations_scalar(width);
-    case Isa::sse:
-      return operations_sse(width);
-    case Isa::avx2:
-      return operations_avx2(width);
-    case Isa::avx512:
-      return operations_avx512(width);
+    case Isa::scalar: return operations_scalar(width);
+    case Isa::sse: return operations_sse(width);
+    case Isa::avx2: return operations_avx2(width);
+    case Isa::avx512: return operations_avx512(width);
   }
   return {};
 }
@@ -277,8 +268,8 @@ TEST_CASE("every operation of simd/ agrees with plain C++, lane by lane") {
             const Lanes lanes{width, lane, &a[1], &b[1], &c[1], table.has_fma};
             if (agrees(operation.name, reference->second, lanes, out[lane + 1])) continue;
             ++failures;
-            UNSCOPED_INFO(std::hex << "lane " << lane << ": a " << lanes.a[lane] << " b " << lanes.b[lane]
-                                   << " c " << lanes.c[lane] << " gave " << out[lane + 1] << ", want "
+            UNSCOPED_INFO(std::hex << "lane " << lane << ": a " << lanes.a[lane] << " b " << lanes.b[lane] << " c "
+                                   << lanes.c[lane] << " gave " << out[lane + 1] << ", want "
                                    << reference->second.lane(lanes));
           }
         }
@@ -289,8 +280,7 @@ TEST_CASE("every operation of simd/ agrees with plain C++, lane by lane") {
 }
 
 TEST_CASE("NaN and ties give the second operand of min_x86 and max_x86, on every ISA") {
-  const Bits nan = 0x7fc00000u, other_nan = 0xffc12345u, one = bits(1.0f), zero = 0u,
-             minus_zero = 0x80000000u;
+  const Bits nan = 0x7fc00000u, other_nan = 0xffc12345u, one = bits(1.0f), zero = 0u, minus_zero = 0x80000000u;
   const struct {
     Bits a, b, want;
   } cases[] = {{nan, one, one},
@@ -320,8 +310,7 @@ TEST_CASE("the reference tells a fused operation from an unfused one") {
   // Otherwise the checks of madd and of -ffp-contract=off above could not fail.
   int different = 0;
   for (std::uint64_t sample = 0; sample < 6000; ++sample) {
-    const float a = as_float(input(sample, 0)), b = as_float(input(sample, 1)),
-                c = as_float(input(sample, 2));
+    const float a = as_float(input(sample, 0)), b = as_float(input(sample, 1)), c = as_float(input(sample, 2));
     volatile float product = a * b;
     different += std::isfinite(a * b) && std::fma(a, b, -c) != product - c;
   }

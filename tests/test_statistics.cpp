@@ -61,9 +61,7 @@ class HandMade final : public Accel {
   StructureInfo info_;
 };
 
-Branch leaf(std::vector<std::uint32_t> primitives) {
-  return {{}, std::move(primitives)};
-}
+Branch leaf(std::vector<std::uint32_t> primitives) { return {{}, std::move(primitives)}; }
 
 /// Two triangles of area 2 in z = 0; each has an area of 0.5 in the other's box (2 by 2). All of it is 3
 /// by 2.
@@ -89,21 +87,18 @@ TriangleMesh random_mesh(std::uint32_t count, float size) {
 /// Halves the triangles by the first corner, axis after axis.
 Branch halved(const TriangleMesh& mesh, std::vector<std::uint32_t> ids, std::size_t axis = 0) {
   if (ids.size() <= 2) return leaf(ids);
-  std::sort(ids.begin(), ids.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return mesh.corners(a)[0][axis] < mesh.corners(b)[0][axis];
-  });
+  std::sort(ids.begin(), ids.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return mesh.corners(a)[0][axis] < mesh.corners(b)[0][axis]; });
   const auto middle = ids.begin() + static_cast<std::ptrdiff_t>(ids.size() / 2);
-  return {{halved(mesh, {ids.begin(), middle}, (axis + 1) % 3),
-           halved(mesh, {middle, ids.end()}, (axis + 1) % 3)},
-          {}};
+  return {{halved(mesh, {ids.begin(), middle}, (axis + 1) % 3), halved(mesh, {middle, ids.end()}, (axis + 1) % 3)}, {}};
 }
 
 /// The records of a hand-made tree, as end_point_overlap takes them.
 std::uint32_t write_records(const TriangleMesh& mesh, const Branch& branch, std::vector<TreeRecord>& records,
                             std::vector<std::uint32_t>& references) {
   const std::size_t index = records.size();
-  records.push_back({bounds_of(mesh, branch), branch.children.empty() ? 1.0 * branch.primitives.size() : 1.0,
-                     0, static_cast<std::uint32_t>(references.size()), 0, branch.children.empty()});
+  records.push_back({bounds_of(mesh, branch), branch.children.empty() ? 1.0 * branch.primitives.size() : 1.0, 0,
+                     static_cast<std::uint32_t>(references.size()), 0, branch.children.empty()});
   references.insert(references.end(), branch.primitives.begin(), branch.primitives.end());
   for (const Branch& child : branch.children) write_records(mesh, child, records, references);
   records[index].end = static_cast<std::uint32_t>(records.size());
@@ -143,8 +138,7 @@ TEST_CASE("a node over two leaves, by hand") {
   BuilderParameters costs;
   costs.traversal_cost = 1.5f;
   costs.intersection_cost = 2.0f;
-  const StructureStatistics s =
-      compute_statistics(HandMade(mesh, {{leaf({0}), leaf({1})}, {}}), mesh, costs, true);
+  const StructureStatistics s = compute_statistics(HandMade(mesh, {{leaf({0}), leaf({1})}, {}}), mesh, costs, true);
   CHECK(s.available);
   CHECK(s.nodes == 1);
   CHECK(s.leaves == 2);
@@ -182,8 +176,7 @@ TEST_CASE("a root that is a leaf, an empty structure, one that shows nothing") {
   CHECK(empty.available);
   CHECK(empty.sah_cost == 0.0);
   CHECK(empty.epo == 0.0);
-  const StructureStatistics hidden =
-      compute_statistics(HandMade(mesh, leaf({0, 1}), false), mesh, costs, true);
+  const StructureStatistics hidden = compute_statistics(HandMade(mesh, leaf({0, 1}), false), mesh, costs, true);
   CHECK_FALSE(hidden.available);
   CHECK(hidden.bytes == 1234);
 }
@@ -192,14 +185,13 @@ TEST_CASE("a shared triangle belongs to both leaves and counts once against othe
   TriangleMesh mesh = two_that_overlap();
   const BuilderParameters costs;
   // Triangle 1 in both leaves: only the second leaf has something foreign, triangle 0.
-  const StructureStatistics s =
-      compute_statistics(HandMade(mesh, {{leaf({0, 1}), leaf({1})}, {}}), mesh, costs, true);
+  const StructureStatistics s = compute_statistics(HandMade(mesh, {{leaf({0, 1}), leaf({1})}, {}}), mesh, costs, true);
   CHECK(s.duplication == 1.5);
   CHECK(s.epo == Approx(0.5 / 4.0));
   // A third, far from the others, twice within the root's box: it is foreign to neither box.
   add_triangle(mesh, {0, 0, 10}, {1, 0, 10}, {0, 1, 10});
-  const StructureStatistics t = compute_statistics(
-      HandMade(mesh, {{{{leaf({0}), leaf({1})}, {}}, leaf({2}), leaf({2})}, {}}), mesh, costs, true);
+  const StructureStatistics t =
+      compute_statistics(HandMade(mesh, {{{{leaf({0}), leaf({1})}, {}}, leaf({2}), leaf({2})}, {}}), mesh, costs, true);
   CHECK(t.epo == Approx((0.5 + 0.5) / 4.5));
   CHECK(t.depth_histogram == std::vector<std::size_t>{0, 2, 2});
   CHECK(t.children_per_node == 2.5);
@@ -221,8 +213,7 @@ TEST_CASE("a scene without area has costs, not NaN") {
   TriangleMesh line;
   add_triangle(line, {0, 0, 0}, {1, 0, 0}, {2, 0, 0});
   add_triangle(line, {5, 0, 0}, {6, 0, 0}, {7, 0, 0});
-  const StructureStatistics s =
-      compute_statistics(HandMade(line, {{leaf({0}), leaf({1})}, {}}), line, {}, true);
+  const StructureStatistics s = compute_statistics(HandMade(line, {{leaf({0}), leaf({1})}, {}}), line, {}, true);
   CHECK(s.sah_cost == 3.0);
   CHECK(s.epo == 0.0);
 }
@@ -263,7 +254,8 @@ TEST_CASE("leaf-count variability: its mean is the SAH's leaf share, its deviati
     CHECK(counts.mean == 1.0);
     CHECK(counts.deviation == 0.0);
     CHECK(counts.lines == 4096);
-    const std::vector<TreeRecord> same{{box, 1.0, 3, 0, 2, false}, {box, 1.0, 2, 0, 1, true}, {box, 1.0, 3, 1, 2, true}};
+    const std::vector<TreeRecord> same{
+        {box, 1.0, 3, 0, 2, false}, {box, 1.0, 2, 0, 1, true}, {box, 1.0, 3, 1, 2, true}};
     CHECK(leaf_counts(same).mean == 2.0);
     CHECK(leaf_counts(same).deviation == 0.0);
   }
@@ -272,7 +264,7 @@ TEST_CASE("leaf-count variability: its mean is the SAH's leaf share, its deviati
                                          {{{0, 0, 0}, {1, 2, 2}}, 1.0, 2, 0, 1, true},
                                          {{{1, 0, 0}, {2, 2, 2}}, 1.0, 3, 1, 2, true}};
     const LeafCounts counts = leaf_counts(halves);
-    CHECK(counts.mean == Approx(4.0 / 3.0).margin(0.03));       // 2 * 16 / 24
+    CHECK(counts.mean == Approx(4.0 / 3.0).margin(0.03));                // 2 * 16 / 24
     CHECK(counts.deviation == Approx(std::sqrt(2.0) / 3).margin(0.02));  // of 1 or 2 with chances 2/3 and 1/3
   }
   SECTION("a box without thickness and one without area") {
@@ -317,7 +309,8 @@ TEST_CASE("every structure: nodes and leaves take no more bytes than the whole")
   for (const StructureEntry& entry : all_structures()) {
     if (entry.info.name == "embree") continue;  // shows nothing
     for (std::string_view builder : entry.info.builders) {
-      if (entry.info.takes_below && builder != "binned_sah") continue;  // handed on; the default structure below has not all
+      // Handed on; the default structure below has not all
+      if (entry.info.takes_below && builder != "binned_sah") continue;
       for (std::string_view leaf : entry.info.leaves) {
         for (const int triangles : {0, 1, 2, 3, 5, 8, 13, 60, 61, 62, 63, 64, 200}) {
           TriangleMesh mesh;
@@ -332,7 +325,8 @@ TEST_CASE("every structure: nodes and leaves take no more bytes than the whole")
           const auto accel = build_structure(entry.info.name, mesh, settings, report);
           const StructureStatistics s = compute_statistics(*accel, mesh, {}, false);
           if (!s.available) continue;
-          INFO(entry.info.name << " " << builder << " " << leaf << " of " << triangles << " triangles: " << s.node_bytes << " + " << s.leaf_bytes);
+          INFO(entry.info.name << " " << builder << " " << leaf << " of " << triangles << " triangles: " << s.node_bytes
+                               << " + " << s.leaf_bytes);
           CHECK(s.node_bytes + s.leaf_bytes <= s.bytes);
           ++seen;
         }

@@ -17,7 +17,8 @@ TEST_CASE("every structure has combinations, and each of them rows that trace it
   CHECK(structures >= 5);
   for (const Combination& c : combinations()) {
     INFO(c.name());
-    CHECK(std::ranges::any_of(c.rows, [](const KernelRow* row) { return row->box == "padded" && row->intersector == "watertight"; }));
+    CHECK(std::ranges::any_of(
+        c.rows, [](const KernelRow* row) { return row->box == "padded" && row->intersector == "watertight"; }));
   }
 }
 
@@ -26,18 +27,25 @@ TEST_CASE("B01: an empty scene builds, every ray misses, nothing is shown with b
   vertices_alone.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<Ray> rays = generic_rays(random_triangles(5, 0.5f, 1), 50, 2);
   for (const TriangleMesh& mesh : {TriangleMesh{}, vertices_alone}) {
-    for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
-      CHECK(statistics.references == 0);
-      struct Bounds final : StructureVisitor {
-        void node(const NodeView& node) override { all.extend(node.bounds); for (const Bounds3f& b : node.child_bounds) all.extend(b); }
-        void leaf(const LeafView& leaf) override { if (!leaf.primitives.empty()) all.extend(leaf.bounds); }
-        Bounds3f all;
-      } bounds;
-      REQUIRE(accel.visit(bounds));
-      CHECK(bounds.all.empty());
-      for (const KernelRow* row : combination.rows)
-        for (const Hit& hit : closest_hit(*row, accel, rays)) CHECK(same_bits(std::span(&hit, 1), std::vector<Hit>{Hit{}}));
-    });
+    for_each_combination(
+        mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
+          CHECK(statistics.references == 0);
+          struct Bounds final : StructureVisitor {
+            void node(const NodeView& node) override {
+              all.extend(node.bounds);
+              for (const Bounds3f& b : node.child_bounds) all.extend(b);
+            }
+            void leaf(const LeafView& leaf) override {
+              if (!leaf.primitives.empty()) all.extend(leaf.bounds);
+            }
+            Bounds3f all;
+          } bounds;
+          REQUIRE(accel.visit(bounds));
+          CHECK(bounds.all.empty());
+          for (const KernelRow* row : combination.rows)
+            for (const Hit& hit : closest_hit(*row, accel, rays))
+              CHECK(same_bits(std::span(&hit, 1), std::vector<Hit>{Hit{}}));
+        });
   }
 }
 
@@ -53,13 +61,18 @@ TEST_CASE("B02: one triangle is one leaf with one reference") {
   const TriangleMesh mesh = random_triangles(1, 0.8f, 4);
   std::vector<Ray> rays = generic_rays(mesh, 100, 1);
   for (const Ray& ray : aimed_rays(mesh, {3, 4, 5}, 100, 2)) rays.push_back(ray);
-  for_each_combination(mesh, rays, [&](const Combination& combination, const Accel&, const StructureStatistics& statistics) {
-    CHECK(statistics.references >= 1);
-    if (std::ranges::any_of(kExceptions, [&](const Exception& e) { return combination.entry->info.name.starts_with(e.structure); })) return;
-    CHECK(statistics.nodes == 0);
-    CHECK(statistics.leaves == 1);
-    CHECK(statistics.references == 1);
-  }, Silhouettes::aimed_at);
+  for_each_combination(
+      mesh, rays,
+      [&](const Combination& combination, const Accel&, const StructureStatistics& statistics) {
+        CHECK(statistics.references >= 1);
+        if (std::ranges::any_of(
+                kExceptions, [&](const Exception& e) { return combination.entry->info.name.starts_with(e.structure); }))
+          return;
+        CHECK(statistics.nodes == 0);
+        CHECK(statistics.leaves == 1);
+        CHECK(statistics.references == 1);
+      },
+      Silhouettes::aimed_at);
 }
 
 TEST_CASE("B03: two triangles of a square with its corner in the origin") {
@@ -68,7 +81,9 @@ TEST_CASE("B03: two triangles of a square with its corner in the origin") {
   mesh.vertices = {{0, 0, 0}, {0, -s, 0}, {s, -s, 0}, {s, 0, 0}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   std::vector<Ray> rays;
-  for (std::uint64_t i = 0; i < 200; ++i) rays.push_back(through({0.03f, -0.05f, 1}, uniform_point(3, i, 0, {{0.001f, 0.001f - s, 0}, {s - 0.001f, -0.001f, 0}})));
+  for (std::uint64_t i = 0; i < 200; ++i)
+    rays.push_back(
+        through({0.03f, -0.05f, 1}, uniform_point(3, i, 0, {{0.001f, 0.001f - s, 0}, {s - 0.001f, -0.001f, 0}})));
   for (const Vec3f& v : mesh.vertices) rays.push_back({v + Vec3f{0, 0, 1}, 0, {0, 0, -1}, kInfinity});
   rays.push_back({{s / 2, -s / 2, 1}, 0, {0, 0, -1}, kInfinity});
   for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
@@ -94,15 +109,16 @@ TEST_CASE("B05: k copies of one triangle: ends, and the lowest id answers") {
     const auto c = mesh.corners(0);
     std::vector<Ray> rays = generic_rays(mesh, 40, 1);
     rays.push_back(through({3, 2, 1}, (c[0] + c[1] + c[2]) * (1.0f / 3)));
-    for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
-      CHECK(statistics.references >= k);
-      CHECK(statistics.depth <= 64);
-      for (const KernelRow* row : combination.rows) {
-        if (row->box != "padded") continue;
-        INFO(name_of(*row));
-        CHECK(closest_hit(*row, accel, std::span(rays).last(1))[0].primitive == 0);
-      }
-    });
+    for_each_combination(
+        mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
+          CHECK(statistics.references >= k);
+          CHECK(statistics.depth <= 64);
+          for (const KernelRow* row : combination.rows) {
+            if (row->box != "padded") continue;
+            INFO(name_of(*row));
+            CHECK(closest_hit(*row, accel, std::span(rays).last(1))[0].primitive == 0);
+          }
+        });
   }
 }
 

@@ -36,18 +36,19 @@ TEST_CASE("B08: a flat grid: hits at nodes, edge midpoints and cell centres, and
       rays.push_back({{half(0), half(1), i % 2 ? 1.0f : -2.0f}, 0, {0, 0, i % 2 ? -1.0f : 1.0f}, kInfinity});
       if (i % 3 == 0) rays.back().direction = {-0.0f, -0.0f, rays.back().direction.z};
     }
-    for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
-      for (const KernelRow* row : combination.rows) {
-        if (row->intersector != "watertight" || row->box != "padded") continue;
-        for (const Hit& hit : closest_hit(*row, accel, rays)) REQUIRE(hit.is_hit());
-      }
-      if (combination.is("brute_force")) return;
-      const Counters c = counted(combination, accel, rays);
-      const double count = double(rays.size());
-      CAPTURE(double(c.nodes) / count, double(c.leaves) / count, double(c.triangles) / count);
-      CHECK(double(c.nodes + c.leaves) / count <= 12.0 * (1.0 + std::log2(double(mesh.size()))));
-      CHECK(double(c.triangles) / count <= 300.0);
-    });
+    for_each_combination(mesh, rays,
+                         [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
+                           for (const KernelRow* row : combination.rows) {
+                             if (row->intersector != "watertight" || row->box != "padded") continue;
+                             for (const Hit& hit : closest_hit(*row, accel, rays)) REQUIRE(hit.is_hit());
+                           }
+                           if (combination.is("brute_force")) return;
+                           const Counters c = counted(combination, accel, rays);
+                           const double count = double(rays.size());
+                           CAPTURE(double(c.nodes) / count, double(c.leaves) / count, double(c.triangles) / count);
+                           CHECK(double(c.nodes + c.leaves) / count <= 12.0 * (1.0 + std::log2(double(mesh.size()))));
+                           CHECK(double(c.triangles) / count <= 300.0);
+                         });
   }
 }
 
@@ -85,24 +86,29 @@ TEST_CASE("B10: long diagonal slivers whose boxes all overlap") {
   }
   std::vector<Ray> rays = aimed_rays(mesh, {2, -1, 0.5f}, 60, 5);
   for (const Ray& ray : generic_rays(mesh, 60, 6)) rays.push_back(ray);
-  for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
-    const Counters c = counted(combination, accel, rays);
-    CHECK(c.triangles <= rays.size() * std::max(statistics.references, mesh.size()));
-  }, Silhouettes::aimed_at);
+  for_each_combination(
+      mesh, rays,
+      [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
+        const Counters c = counted(combination, accel, rays);
+        CHECK(c.triangles <= rays.size() * std::max(statistics.references, mesh.size()));
+      },
+      Silhouettes::aimed_at);
 }
 
 TEST_CASE("B11: triangles that all straddle every plane through the middle: bounded depth and memory") {
   TriangleMesh mesh;
   for (std::uint64_t i = 0; i < 1500; ++i) {
-    const Vec3f a = uniform_point(7, i, 0, {{-1, -1, -1}, {1, 1, 1}}), b = uniform_point(7, i, 3, {{-1, -1, -1}, {1, 1, 1}});
+    const Vec3f a = uniform_point(7, i, 0, {{-1, -1, -1}, {1, 1, 1}}),
+                b = uniform_point(7, i, 3, {{-1, -1, -1}, {1, 1, 1}});
     add_triangle(mesh, a, a * -1.0f + b * 0.01f, b * 0.02f);
   }
-  for_each_combination(mesh, generic_rays(mesh, 100, 6), [&](const Combination&, const Accel& accel, const StructureStatistics& statistics) {
-    CAPTURE(statistics.references, statistics.depth, accel.bytes());
-    CHECK(statistics.depth <= 64);
-    CHECK(statistics.references <= 64 * mesh.size());
-    CHECK(accel.bytes() <= 8192 * mesh.size());
-  });
+  for_each_combination(mesh, generic_rays(mesh, 100, 6),
+                       [&](const Combination&, const Accel& accel, const StructureStatistics& statistics) {
+                         CAPTURE(statistics.references, statistics.depth, accel.bytes());
+                         CHECK(statistics.depth <= 64);
+                         CHECK(statistics.references <= 64 * mesh.size());
+                         CHECK(accel.bytes() <= 8192 * mesh.size());
+                       });
 }
 
 TEST_CASE("B12: point triangles by the thousand and one real: costs free of NaN, the real one is hit") {
@@ -118,22 +124,26 @@ TEST_CASE("B12: point triangles by the thousand and one real: costs free of NaN,
   const TriangleMesh mesh = scene(20000);
   std::vector<Ray> rays = generic_rays(mesh, 100, 4);
   rays.push_back({{0.2f, 0.3f, -1}, 0, {0, 0, 1}, kInfinity});
-  for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
-    CHECK(std::isfinite(statistics.sah_cost));
-    for (const KernelRow* row : combination.rows)
-      if (row->box == "padded") CHECK(closest_hit(*row, accel, std::span(rays).last(1))[0].primitive == mesh.size() - 1);
-  });
+  for_each_combination(mesh, rays,
+                       [&](const Combination& combination, const Accel& accel, const StructureStatistics& statistics) {
+                         CHECK(std::isfinite(statistics.sah_cost));
+                         for (const KernelRow* row : combination.rows)
+                           if (row->box == "padded")
+                             CHECK(closest_hit(*row, accel, std::span(rays).last(1))[0].primitive == mesh.size() - 1);
+                       });
   // A million of them, for the default builder of each structure.
   const TriangleMesh million = scene(1000000);
   std::string_view last;
   for (const Combination& combination : combinations()) {
     if (combination.entry->info.name == last || combination.is("brute_force")) continue;
-    if (combination.entry->info.name.starts_with("bvh") && !combination.is("bvh8")) continue;  // one of the wide BVHs: they share the builder
+    // One of the wide BVHs: they share the builder
+    if (combination.entry->info.name.starts_with("bvh") && !combination.is("bvh8")) continue;
     last = combination.entry->info.name;
     INFO(combination.name());
     const auto accel = combination.build(million);
     for (const KernelRow* row : combination.rows)
-      if (row->box == "padded") CHECK(closest_hit(*row, *accel, std::span(rays).last(1))[0].primitive == million.size() - 1);
+      if (row->box == "padded")
+        CHECK(closest_hit(*row, *accel, std::span(rays).last(1))[0].primitive == million.size() - 1);
   }
 }
 
@@ -142,7 +152,8 @@ TEST_CASE("B13: one vertex at 1e12 beside eight thousand unit triangles") {
   add_triangle(mesh, {1e12f, 0, 0}, {0, 2, 0}, {0, 2, 0.5f});
   std::vector<Ray> rays;
   const Bounds3f near{{-2, -2, -2}, {2, 2, 2}};
-  for (std::uint64_t i = 0; i < 120; ++i) rays.push_back(through(uniform_point(5, i, 0, near), uniform_point(5, i, 3, near)));
+  for (std::uint64_t i = 0; i < 120; ++i)
+    rays.push_back(through(uniform_point(5, i, 0, near), uniform_point(5, i, 3, near)));
   for (float x : {1e3f, 1e6f, 1e9f, 5e11f}) rays.push_back({{x, 2 - 2 * x / 1e12f, -1}, 0, {0, 0, 1}, kInfinity});
   for_each_combination(mesh, rays);
 }
@@ -157,7 +168,8 @@ TEST_CASE("B14: a teapot in a stadium a thousand times its size") {
   }
   Reference reference(scene.mesh, rays);
   const AnswerCheck check = reference.check(reference.brute_force("watertight"));
-  std::cout << "B14: t of watertight is off by " << check.t_error_ulp_p99 << " ulps at p99, " << check.t_error_ulp_max << " at most\n";
+  std::cout << "B14: t of watertight is off by " << check.t_error_ulp_p99 << " ulps at p99, " << check.t_error_ulp_max
+            << " at most\n";
   CHECK(check.t_error_ulp_p99 <= 64.0);
   for_each_combination(scene.mesh, rays);
 }
@@ -176,7 +188,8 @@ TEST_CASE("B15: coordinates beside a bin's border: no triangle is lost by splits
   }
   std::vector<Ray> rays = aimed_rays(mesh, {100, -50, 20}, 150, 3);
   for (const Ray& ray : generic_rays(mesh, 150, 4)) rays.push_back(ray);
-  for_each_combination(mesh, rays, Silhouettes::aimed_at);  // the reference of each triangle is looked for in the leaves
+  // The reference of each triangle is looked for in the leaves
+  for_each_combination(mesh, rays, Silhouettes::aimed_at);
 }
 
 TEST_CASE("B16: a cluster within one Morton cell of the scene") {
@@ -185,7 +198,8 @@ TEST_CASE("B16: a cluster within one Morton cell of the scene") {
   add_triangle(mesh, {-1, -1, -1}, {-0.9f, -1, -1}, {-1, -0.9f, -1});
   std::vector<Ray> rays = generic_rays(mesh, 60, 4);
   const Bounds3f cluster{{-1e-7f, -1e-7f, -1e-7f}, {1e-7f, 1e-7f, 1e-7f}};
-  for (std::uint64_t i = 0; i < 100; ++i) rays.push_back(through(uniform_point(5, i, 0, cluster), uniform_point(5, i, 3, cluster)));
+  for (std::uint64_t i = 0; i < 100; ++i)
+    rays.push_back(through(uniform_point(5, i, 0, cluster), uniform_point(5, i, 3, cluster)));
   for_each_combination(mesh, rays);
 }
 
@@ -213,8 +227,9 @@ TEST_CASE("B18: vertices of random bits: refused as they are; sanitised, the val
   for (std::uint64_t i = 0; i < 200; ++i) {
     const auto c = scene.mesh.corners(random_bits(5, i, 0) % scene.mesh.size());
     const float size = std::max({length(c[1] - c[0]), length(c[2] - c[0]), 1e-20f});
-    rays.push_back(through((c[0] + c[1] + c[2]) * (1.0f / 3) + uniform_point(5, i, 1, {{-1, -1, -1}, {1, 1, 1}}) * size * 3.0f,
-                           (c[0] + c[1] + c[2]) * (1.0f / 3)));
+    rays.push_back(
+        through((c[0] + c[1] + c[2]) * (1.0f / 3) + uniform_point(5, i, 1, {{-1, -1, -1}, {1, 1, 1}}) * size * 3.0f,
+                (c[0] + c[1] + c[2]) * (1.0f / 3)));
   }
   // Beyond the extents that float32 predicates are safe for brute_force errs too: compared is where it does not.
   Reference reference(scene.mesh, rays);

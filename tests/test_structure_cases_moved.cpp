@@ -19,7 +19,8 @@ std::vector<std::uint32_t> shuffled(std::uint32_t n, std::uint64_t seed) {
 
 /// f(row, hits on one mesh, hits on another) for every combination's padded rows.
 template <class F>
-void compare(const TriangleMesh& one, std::span<const Ray> rays, const TriangleMesh& other, std::span<const Ray> other_rays, F&& f) {
+void compare(const TriangleMesh& one, std::span<const Ray> rays, const TriangleMesh& other,
+             std::span<const Ray> other_rays, F&& f) {
   for (const Combination& combination : combinations()) {
     const auto a = combination.build(one), b = combination.build(other);
     for (const KernelRow* row : combination.rows) {
@@ -61,18 +62,22 @@ TEST_CASE("B28: rotated corners and turned windings change neither hit nor t") {
 TEST_CASE("B29: moved by exact offsets the hits are the same, scaled by powers of two t scales exactly") {
   // Coordinates are multiples of 2^-8 below 2, so that sums with the offset are exact.
   TriangleMesh mesh = random_triangles(600, 0.2f, 3);
-  const auto snap = [](Vec3f v) { return Vec3f{std::round(v.x * 256) / 256, std::round(v.y * 256) / 256, std::round(v.z * 256) / 256}; };
+  const auto snap = [](Vec3f v) {
+    return Vec3f{std::round(v.x * 256) / 256, std::round(v.y * 256) / 256, std::round(v.z * 256) / 256};
+  };
   for (Vec3f& v : mesh.vertices) v = snap(v);
   std::vector<Ray> rays;
   for (std::uint64_t i = 0; i < 300; ++i) {
-    Ray ray = through(snap(uniform_point(4, i, 0, {{-2, -2, -2}, {2, 2, 2}})), snap(uniform_point(4, i, 3, {{-1, -1, -1}, {1, 1, 1}})));
+    Ray ray = through(snap(uniform_point(4, i, 0, {{-2, -2, -2}, {2, 2, 2}})),
+                      snap(uniform_point(4, i, 3, {{-1, -1, -1}, {1, 1, 1}})));
     if (i % 5 == 0) ray.tfar = 0.75f;
     rays.push_back(ray);
   }
   const Vec3f offset{512, -1024, 256};
   std::vector<Ray> moved_rays = rays;
   for (Ray& ray : moved_rays) ray.origin = ray.origin + offset;
-  compare(mesh, rays, moved(mesh, 1.0f, offset), moved_rays, [](const std::vector<Hit>& a, const std::vector<Hit>& b) { REQUIRE(same_bits(a, b)); });
+  compare(mesh, rays, moved(mesh, 1.0f, offset), moved_rays,
+          [](const std::vector<Hit>& a, const std::vector<Hit>& b) { REQUIRE(same_bits(a, b)); });
   for (const int k : {-24, -3, 5, 24}) {
     INFO("scaled by 2^" << k);
     const float s = std::ldexp(1.0f, k);
@@ -90,7 +95,9 @@ TEST_CASE("B29: moved by exact offsets the hits are the same, scaled by powers o
 
 TEST_CASE("B30: triangles in another order: the same t, and of equal ones the lowest id") {
   TriangleMesh mesh = random_triangles(500, 0.2f, 3);
-  for (const Triangle& t : std::vector<Triangle>(mesh.triangles.begin(), mesh.triangles.begin() + 200)) mesh.triangles.push_back(t);  // twins
+  // Twins
+  for (const Triangle& t : std::vector<Triangle>(mesh.triangles.begin(), mesh.triangles.begin() + 200))
+    mesh.triangles.push_back(t);
   TriangleMesh other = mesh;
   const std::vector<std::uint32_t> order = shuffled(std::uint32_t(mesh.size()), 9);
   for (std::uint32_t i = 0; i < order.size(); ++i) other.triangles[i] = mesh.triangles[order[i]];

@@ -43,7 +43,8 @@ void add_cylinder(TriangleMesh& mesh, float radius, std::uint32_t n) {
   const auto first = std::uint32_t(mesh.vertices.size());
   for (std::uint32_t i = 0; i < n; ++i) {
     const double a = 2 * 3.14159265358979323846 * i / n;
-    for (const float z : {-1.0f, 0.0f, 1.0f}) mesh.vertices.push_back({radius * float(std::cos(a)), radius * float(std::sin(a)), z});
+    for (const float z : {-1.0f, 0.0f, 1.0f})
+      mesh.vertices.push_back({radius * float(std::cos(a)), radius * float(std::sin(a)), z});
   }
   for (std::uint32_t i = 0; i < n; ++i) {
     for (std::uint32_t row = 0; row < 2; ++row) {
@@ -59,10 +60,12 @@ TEST_CASE("B17: inside a sphere far from the origin no ray gets out") {
   const Vec3f center{148376, 1234, -223423};
   const TriangleMesh mesh = moved(sphere(20), 2.0f, center);
   std::vector<Ray> rays = aimed_rays(mesh, center, 400, 3);
-  for (std::uint64_t i = 0; i < 600; ++i) rays.push_back({center, 0, uniform_point(4, i, 0, {{-1, -1, -1}, {1, 1, 1}}), kInfinity});
-  for_each_crack_free(mesh, rays, [&](const Combination&, const KernelRow&, const Accel&, const std::vector<Hit>& hits) {
-    CHECK(std::ranges::all_of(hits, &Hit::is_hit));
-  });
+  for (std::uint64_t i = 0; i < 600; ++i)
+    rays.push_back({center, 0, uniform_point(4, i, 0, {{-1, -1, -1}, {1, 1, 1}}), kInfinity});
+  for_each_crack_free(mesh, rays,
+                      [&](const Combination&, const KernelRow&, const Accel&, const std::vector<Hit>& hits) {
+                        CHECK(std::ranges::all_of(hits, &Hit::is_hit));
+                      });
   for_each_combination(mesh, rays);
 }
 
@@ -122,7 +125,8 @@ TEST_CASE("B21: eight rays to eight octants answer together as each does alone, 
   for (std::uint64_t i = 0; i < 64; ++i) {
     for (unsigned octant = 0; octant < 8; ++octant) {
       const Vec3f d = uniform_point(8, i, 4 * octant, {{0.05f, 0.05f, 0.05f}, {1, 1, 1}});
-      rays.push_back({{0, 0, 0}, 0, {octant & 1 ? d.x : -d.x, octant & 2 ? d.y : -d.y, octant & 4 ? d.z : -d.z}, kInfinity});
+      rays.push_back(
+          {{0, 0, 0}, 0, {octant & 1 ? d.x : -d.x, octant & 2 ? d.y : -d.y, octant & 4 ? d.z : -d.z}, kInfinity});
     }
   }
   for (const Combination& combination : combinations()) {
@@ -165,7 +169,10 @@ TEST_CASE("B22: with 0 to 64 active rays of 64, every traversal gives the single
 TEST_CASE("B23: poles where thousands of triangles meet: rays to vertices do not get out") {
   const Vec3f inside{0.03f, -0.02f, 0.11f};
   const auto rays_of = [&](const TriangleMesh& mesh, std::uint32_t n) {
-    std::vector<Ray> rays{through(inside, {0, 0, 1}), through(inside, {0, 0, -1}), {{0, 0, 0}, 0, {0, 0, 1}, kInfinity}, {{0, 0, 0}, 0, {-0.0f, 0, -1}, kInfinity}};
+    std::vector<Ray> rays{through(inside, {0, 0, 1}),
+                          through(inside, {0, 0, -1}),
+                          {{0, 0, 0}, 0, {0, 0, 1}, kInfinity},
+                          {{0, 0, 0}, 0, {-0.0f, 0, -1}, kInfinity}};
     for (const Ray& ray : aimed_rays(mesh, inside, 120, n)) rays.push_back(ray);
     return rays;
   };
@@ -173,12 +180,15 @@ TEST_CASE("B23: poles where thousands of triangles meet: rays to vertices do not
     INFO(n << " triangles a pole");
     const TriangleMesh mesh = bipyramid(n);
     const std::vector<Ray> rays = rays_of(mesh, n);
-    for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
-      for (const KernelRow* row : combination.rows)
-        if (crack_free(*row)) CHECK(std::ranges::all_of(closest_hit(*row, accel, rays), &Hit::is_hit));
-    });
+    for_each_combination(mesh, rays,
+                         [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
+                           for (const KernelRow* row : combination.rows)
+                             if (crack_free(*row))
+                               CHECK(std::ranges::all_of(closest_hit(*row, accel, rays), &Hit::is_hit));
+                         });
   }
-  // Far more of them, without the oracle, which would look at each exactly, and with the builders that do not clip each to every cell.
+  // Far more of them, without the oracle, which would look at each exactly, and with the builders that do not clip each
+  // to every cell.
   const TriangleMesh mesh = bipyramid(65536);
   const std::vector<Ray> rays = rays_of(mesh, 65536);
   for (const Combination& combination : combinations()) {
@@ -226,7 +236,8 @@ TEST_CASE("B25: a surface on integer coordinates under a grid of rays along -y h
   TriangleMesh mesh;
   for (std::uint32_t z = 0; z <= n; ++z)
     for (std::uint32_t x = 0; x <= n; ++x)
-      mesh.vertices.push_back({float(x), std::floor(9.0f * std::sin(0.31f * float(x)) * std::cos(0.23f * float(z))), float(z)});
+      mesh.vertices.push_back(
+          {float(x), std::floor(9.0f * std::sin(0.31f * float(x)) * std::cos(0.23f * float(z))), float(z)});
   for (std::uint32_t z = 0; z < n; ++z) {
     for (std::uint32_t x = 0; x < n; ++x) {
       const std::uint32_t a = z * (n + 1) + x, b = a + 1, c = a + n + 1, d = c + 1;
@@ -236,7 +247,8 @@ TEST_CASE("B25: a surface on integer coordinates under a grid of rays along -y h
   std::vector<Ray> rays;
   for (std::uint32_t i = 0; i <= 2 * n; i += 3)
     for (std::uint32_t j = 0; j <= 2 * n; j += 2)
-      rays.push_back({{0.5f * float(i), 100, 0.5f * float(j)}, 0, {i % 2 ? 0.0f : -0.0f, -1, j % 4 ? 0.0f : -0.0f}, kInfinity});
+      rays.push_back(
+          {{0.5f * float(i), 100, 0.5f * float(j)}, 0, {i % 2 ? 0.0f : -0.0f, -1, j % 4 ? 0.0f : -0.0f}, kInfinity});
   for_each_combination(mesh, rays, [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
     for (const KernelRow* row : combination.rows)
       if (crack_free(*row)) CHECK(std::ranges::all_of(closest_hit(*row, accel, rays), &Hit::is_hit));
@@ -272,21 +284,24 @@ TEST_CASE("B26: a light above a floor is seen at every scale, and hidden by what
     }
     std::vector<Ray> all = seen;
     all.insert(all.end(), hidden.begin(), hidden.end());
-    for_each_combination(mesh, all, [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
-      for (const KernelRow* row : combination.rows) {
-        if (!crack_free(*row)) continue;
-        INFO(name_of(*row));
-        for (const Hit& hit : closest_hit(*row, accel, seen)) CHECK((hit.primitive >= light && hit.primitive < light + 32));
-        std::vector<Ray> shadow = seen;
-        for (Ray& ray : shadow) ray.tfar = 0.999f;
-        for (const std::uint8_t any : any_hit(*row, accel, shadow)) CHECK(any == 0);
-        for (const std::uint8_t any : any_hit(*row, accel, hidden)) CHECK(any == 1);
-      }
-    });
+    for_each_combination(mesh, all,
+                         [&](const Combination& combination, const Accel& accel, const StructureStatistics&) {
+                           for (const KernelRow* row : combination.rows) {
+                             if (!crack_free(*row)) continue;
+                             INFO(name_of(*row));
+                             for (const Hit& hit : closest_hit(*row, accel, seen))
+                               CHECK((hit.primitive >= light && hit.primitive < light + 32));
+                             std::vector<Ray> shadow = seen;
+                             for (Ray& ray : shadow) ray.tfar = 0.999f;
+                             for (const std::uint8_t any : any_hit(*row, accel, shadow)) CHECK(any == 0);
+                             for (const std::uint8_t any : any_hit(*row, accel, hidden)) CHECK(any == 1);
+                           }
+                         });
   }
 }
 
-TEST_CASE("B27: rays that start 10^-k above a triangle: self-hits are those of the exact origin, whatever the structure") {
+TEST_CASE(
+    "B27: rays that start 10^-k above a triangle: self-hits are those of the exact origin, whatever the structure") {
   std::size_t below = 0, rays_in_all = 0;
   for (int scale = 0; scale <= 5; ++scale) {
     const float s = std::pow(10.0f, float(scale));

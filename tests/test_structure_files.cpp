@@ -1,5 +1,5 @@
-// Saving and loading built structures: equal answers and equal statistics after a round trip, for every structure that can
-// be saved; and every file that does not fit is refused in one line.
+// Saving and loading built structures: equal answers and equal statistics after a round trip, for every structure that
+// can be saved; and every file that does not fit is refused in one line.
 #include <boost/crc.hpp>
 
 #include <cstring>
@@ -26,8 +26,13 @@ namespace fs = std::filesystem;
 /// A folder of this test's own, gone at the end.
 class Folder {
  public:
-  Folder() : path_(fs::path(ARBORETUM_BINARY_DIR) / "test_structure_files") { fs::remove_all(path_), fs::create_directories(path_); }
-  ~Folder() { std::error_code ignored; fs::remove_all(path_, ignored); }
+  Folder() : path_(fs::path(ARBORETUM_BINARY_DIR) / "test_structure_files") {
+    fs::remove_all(path_), fs::create_directories(path_);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
   [[nodiscard]] fs::path operator/(const char* name) const { return path_ / name; }
 
  private:
@@ -90,9 +95,11 @@ TEST_CASE("a structure that was saved and loaded answers and measures as it did"
   std::size_t saved = 0;
   for (const std::size_t count : {0u, 1u, 700u}) {
     const TriangleMesh mesh = random_triangles(count, 0.2f, 11);
-    // The vertices of the loaded one lie elsewhere: an index leaf must not point to those of the mesh that was built from.
+    // The vertices of the loaded one lie elsewhere: an index leaf must not point to those of the mesh that was built
+    // from.
     const TriangleMesh again = mesh;
-    const std::vector<Ray> rays = count ? generic_rays(mesh, 400, 3) : std::vector<Ray>{Ray{{0, 0, -3}, 0, {0, 0, 1}, kInfinity}};
+    const std::vector<Ray> rays =
+        count ? generic_rays(mesh, 400, 3) : std::vector<Ray>{Ray{{0, 0, -3}, 0, {0, 0, 1}, kInfinity}};
     for (const StructureEntry& entry : all_structures()) {
       if (entry.info.name == "embree") continue;
       for (const std::string_view leaf : entry.info.leaves) {
@@ -109,7 +116,8 @@ TEST_CASE("a structure that was saved and loaded answers and measures as it did"
         const auto loaded = load_structure(entry.info.name, again, settings, file);
         CHECK(loaded->bytes() == built->bytes());
         const BuilderParameters costs;
-        const StructureStatistics a = compute_statistics(*built, mesh, costs, true), b = compute_statistics(*loaded, again, costs, true);
+        const StructureStatistics a = compute_statistics(*built, mesh, costs, true),
+                                  b = compute_statistics(*loaded, again, costs, true);
         CHECK(a.sah_cost == b.sah_cost);
         CHECK(a.epo == b.epo);
         CHECK(a.depth_histogram == b.depth_histogram);
@@ -134,7 +142,8 @@ TEST_CASE("every structure of the project but Embree can be saved") {
     const BuildSettings settings = settings_for(entry.info, entry.info.leaves.front());
     const auto built = build_structure(entry.info.name, mesh, settings, report);
     if (entry.info.name == "embree") {
-      CHECK_THROWS_WITH(save_structure(*built, mesh, settings, folder / "x"), "embree cannot be saved to a file; build it anew");
+      CHECK_THROWS_WITH(save_structure(*built, mesh, settings, folder / "x"),
+                        "embree cannot be saved to a file; build it anew");
       CHECK_FALSE(fs::exists(folder / "x"));
     } else {
       CHECK_NOTHROW(save_structure(*built, mesh, settings, folder / std::string(entry.info.name).c_str()));
@@ -212,7 +221,8 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
     CHECK_NOTHROW(load_structure("bvh4", mesh, settings, file, BuiltBy::this_program));
     write(other, by_another_program(whole));
     CHECK(refusal("bvh4", mesh, settings, other) == "");
-    CHECK_THROWS_WITH(load_structure("bvh4", mesh, settings, other, BuiltBy::this_program), Catch::Contains("was built by another build of the program"));
+    CHECK_THROWS_WITH(load_structure("bvh4", mesh, settings, other, BuiltBy::this_program),
+                      Catch::Contains("was built by another build of the program"));
   }
   SECTION("another mesh: fewer triangles, one moved by an ulp, two swapped; materials do not matter") {
     TriangleMesh changed = mesh;

@@ -1,4 +1,5 @@
-// What builders are for: trees of little cost, within their memory. Reinsertion, spatial splits, the order of a wide node's children.
+// What builders are for: trees of little cost, within their memory. Reinsertion, spatial splits, the order of a wide
+// node's children.
 #include <tbb/global_control.h>
 
 #include "core/error.h"
@@ -47,7 +48,10 @@ TEST_CASE("reinsertion of the top lowers the SAH cost where triangles differ in 
     INFO(builder);
     BuilderParameters with, without;
     with.reinsertion_top = 512, without.reinsertion_top = 0;
-    const auto hash = [&](unsigned threads) { return check_tree(build(builder, crowded, 8, threads, best_isa(), with), crowded, 8, splits_triangles(builder)).hash; };
+    const auto hash = [&](unsigned threads) {
+      return check_tree(build(builder, crowded, 8, threads, best_isa(), with), crowded, 8, splits_triangles(builder))
+          .hash;
+    };
     CHECK(hash(1) == hash(3));
     // Left to itself a builder from the top down does it.
     const bool does = builder == "binned_sah" || builder == "sweep_sah" || builder == "spatial_sah";
@@ -97,7 +101,8 @@ TriangleMesh needles(std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3f middle = uniform_point(21, i, 0, cube), along = 0.3f * uniform_point(21, i, 3, cube);
     const auto first = std::uint32_t(mesh.vertices.size());
-    mesh.vertices.insert(mesh.vertices.end(), {middle - along, middle + along, middle + along + 1e-3f * uniform_point(21, i, 6, cube)});
+    mesh.vertices.insert(mesh.vertices.end(),
+                         {middle - along, middle + along, middle + along + 1e-3f * uniform_point(21, i, 6, cube)});
     mesh.triangles.push_back({first, first + 1, first + 2});
   }
   return mesh;
@@ -124,13 +129,15 @@ TEST_CASE("spatial splits keep their budget") {
 TEST_CASE("more references than a tree can number are refused") {
   require_budget("spatial_sah", kMaxReferences, 0.0f);
   require_budget("embree_high", 214748364, 4.0f);
-  CHECK_THROWS_WITH(require_budget("spatial_sah", kMaxReferences + 1, 0.0f), Catch::Contains("spatial_sah: 1073741824 triangles") && Catch::Contains("2^30 - 1"));
+  CHECK_THROWS_WITH(require_budget("spatial_sah", kMaxReferences + 1, 0.0f),
+                    Catch::Contains("spatial_sah: 1073741824 triangles") && Catch::Contains("2^30 - 1"));
   CHECK_THROWS_AS(require_budget("embree_high", 214748365, 4.0f), UserError);
   CHECK_THROWS_AS(require_budget("spatial_sah", 1, -0.1f), UserError);
   BuilderParameters parameters;
   parameters.duplication_budget = 4.1f;
   for (const std::string_view builder : binary_builder_names()) {
-    if (splits_triangles(builder)) CHECK_THROWS_AS(build(builder, random_triangles(10, 0.1f, 1), 4, 1, best_isa(), parameters), UserError);
+    if (splits_triangles(builder))
+      CHECK_THROWS_AS(build(builder, random_triangles(10, 0.1f, 1), 4, 1, best_isa(), parameters), UserError);
   }
   BinaryTree large;
   large.node_count = std::size_t(LinkedNode::kLeaf) + 1;
@@ -180,12 +187,14 @@ TEST_CASE("a leaf does not hold a triangle twice") {
       for (const Costs& costs : {Costs{1.0f, 0.3f, 0.75f}, Costs{0.05f, 4.0f, 4.0f}}) {
         BuildSettings settings;
         settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa();
-        settings.parameters.traversal_cost = costs.traversal, settings.parameters.intersection_cost = costs.intersection;
+        settings.parameters.traversal_cost = costs.traversal,
+        settings.parameters.intersection_cost = costs.intersection;
         settings.parameters.duplication_budget = costs.budget;
         BuildReport report;
         Visitor visitor;
         REQUIRE(build_structure(structure, mesh, settings, report)->visit(visitor));
-        INFO(structure << " " << builder << ", a block at " << costs.intersection << " and a node at " << costs.traversal);
+        INFO(structure << " " << builder << ", a block at " << costs.intersection << " and a node at "
+                       << costs.traversal);
         CHECK(visitor.twice == 0);
         if (costs.intersection < costs.traversal) CHECK(visitor.most > 1);
       }
@@ -198,15 +207,19 @@ TEST_CASE("a triangle cut by a plane has the boxes of its two slabs") {
   for (std::uint64_t i = 0; i < 3000; ++i) {
     std::array<Vec3f, 3> c;
     for (unsigned k = 0; k < 3; ++k)
-      for (unsigned a = 0; a < 3; ++a) c[k][a] = i % 3 == 0 ? float(int(8 * random_float(91, 9 * i + 3 * k + a, 0))) : random_float(91, 9 * i + 3 * k + a, 0) - 0.5f;
+      for (unsigned a = 0; a < 3; ++a)
+        c[k][a] = i % 3 == 0 ? float(int(8 * random_float(91, 9 * i + 3 * k + a, 0)))
+                             : random_float(91, 9 * i + 3 * k + a, 0) - 0.5f;
     Bounds3f box;
     for (Vec3f p : c) box.extend(p);
     const int axis = int(i % 3);
-    for (float plane : {c[0][std::size_t(axis)], 0.3f * c[1][std::size_t(axis)] + 0.7f * c[2][std::size_t(axis)], box.upper[std::size_t(axis)] + 1.0f}) {
+    for (float plane : {c[0][std::size_t(axis)], 0.3f * c[1][std::size_t(axis)] + 0.7f * c[2][std::size_t(axis)],
+                        box.upper[std::size_t(axis)] + 1.0f}) {
       INFO("triangle " << i << ", plane " << plane);
       Bounds3f low, high;
       clip_by_plane(c, axis, plane, low, high);
-      const Bounds3f want_low = clip_to_slab(c, axis, box.lower[std::size_t(axis)], plane), want_high = clip_to_slab(c, axis, plane, box.upper[std::size_t(axis)]);
+      const Bounds3f want_low = clip_to_slab(c, axis, box.lower[std::size_t(axis)], plane),
+                     want_high = clip_to_slab(c, axis, plane, box.upper[std::size_t(axis)]);
       CHECK(low.empty() == want_low.empty());
       CHECK(high.empty() == want_high.empty());
       if (!want_low.empty()) CHECK(low == want_low);

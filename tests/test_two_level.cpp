@@ -1,5 +1,5 @@
-// two_level: what stands below answers bit for bit while nothing is transformed; with transforms the answers are those of the flat
-// mesh; prototypes are held once; what cannot stand below is refused in one line.
+// two_level: what stands below answers bit for bit while nothing is transformed; with transforms the answers are those
+// of the flat mesh; prototypes are held once; what cannot stand below is refused in one line.
 #include <cmath>
 
 #include "core/instances.h"
@@ -17,8 +17,8 @@ using namespace arboretum::test;
 
 namespace {
 
-std::unique_ptr<Accel> built(std::string_view name, const TriangleMesh& mesh, std::string_view leaf, const std::string& below = "bvh8",
-                             std::string builder = {}) {
+std::unique_ptr<Accel> built(std::string_view name, const TriangleMesh& mesh, std::string_view leaf,
+                             const std::string& below = "bvh8", std::string builder = {}) {
   BuildSettings settings;
   settings.leaf = leaf, settings.isa = best_isa(), settings.parameters.below = below;
   settings.builder = builder.empty() ? std::string(find_structure(name)->info.builders.front()) : builder;
@@ -30,7 +30,8 @@ std::unique_ptr<Accel> built(std::string_view name, const TriangleMesh& mesh, st
 std::vector<KernelRow> rows_over(std::string_view below) {
   std::vector<KernelRow> rows;
   for (const KernelRow& row : runnable_rows())
-    if (row.structure == "two_level" && find_kernel(below, row.leaf, row.intersector, row.box, row.traversal, row.isa)) rows.push_back(row);
+    if (row.structure == "two_level" && find_kernel(below, row.leaf, row.intersector, row.box, row.traversal, row.isa))
+      rows.push_back(row);
   return rows;
 }
 
@@ -44,7 +45,8 @@ TriangleMesh placed_meshes() {
   Layout layout;
   const std::uint32_t ball = layout.add_part(sphere(8)), soup = layout.add_part(random_triangles(60, 0.4f, 3));
   for (int i = 0; i < 12; ++i) {
-    layout.place(i % 3 ? ball : soup, map_of(0.7 * i, 0.3 + 0.1 * i, {float(i % 4) * 1.7f, float(i / 4) * 1.9f, 0.2f * float(i)}), 0);
+    layout.place(i % 3 ? ball : soup,
+                 map_of(0.7 * i, 0.3 + 0.1 * i, {float(i % 4) * 1.7f, float(i / 4) * 1.9f, 0.2f * float(i)}), 0);
   }
   AffineMap squashed = map_of(0.3, 1.0, {-2, 1, 0.5f});
   for (double& x : squashed.m[1]) x *= -0.25;
@@ -65,7 +67,8 @@ TEST_CASE("a scene without instances is answered by the structure below, bit for
     for (const KernelRow& row : rows_over(below)) {
       INFO(name_of(row) << " over " << below);
       const std::string builder(entry.info.builders.front());
-      const auto two = built("two_level", mesh, row.leaf, below, builder), one = built(below, mesh, row.leaf, below, builder);
+      const auto two = built("two_level", mesh, row.leaf, below, builder),
+                 one = built(below, mesh, row.leaf, below, builder);
       const KernelRow& direct = *find_kernel(below, row.leaf, row.intersector, row.box, row.traversal, row.isa);
       CHECK(same_bits(closest_hit(row, *two, rays), closest_hit(direct, *one, rays)));
       CHECK(any_hit(row, *two, rays) == any_hit(direct, *one, rays));
@@ -92,7 +95,8 @@ TEST_CASE("with transforms the answers are those of the flat mesh") {
     CHECK(check.wrong_answers() == 0);
     CHECK(oracle.check_any_hit(rays, any_truth, occluded).wrong_answers() == 0);
     // Where both find the same triangle t, u and v are the same bits.
-    const std::vector<Hit> want = closest_hit(*find_kernel("bvh8", row.leaf, row.intersector, row.box, "single", row.isa), *flat, rays);
+    const std::vector<Hit> want =
+        closest_hit(*find_kernel("bvh8", row.leaf, row.intersector, row.box, "single", row.isa), *flat, rays);
     std::size_t same = 0, hit = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       REQUIRE(occluded[i] == std::uint8_t(hits[i].is_hit()));
@@ -123,8 +127,9 @@ TEST_CASE("a forest: no wrong answer in any workload, and prototypes held once")
     for (const KernelRow& row : rows_over("bvh8")) {
       if (row.intersector != "watertight" || row.box != "padded" || row.leaf != "triangle4v") continue;
       const auto two = built("two_level", scene.mesh, row.leaf);
-      const AnswerCheck check = any ? oracle.check_any_hit(workload.rays, any_truth, any_hit(row, *two, workload.rays))
-                                    : oracle.check_closest_hit(workload.rays, truth, closest_hit(row, *two, workload.rays));
+      const AnswerCheck check =
+          any ? oracle.check_any_hit(workload.rays, any_truth, any_hit(row, *two, workload.rays))
+              : oracle.check_closest_hit(workload.rays, truth, closest_hit(row, *two, workload.rays));
       INFO(name << ": " << name_of(row));
       CAPTURE(check.missed_hits, check.false_hits, check.wrong_surface, check.rays);
       CHECK(check.wrong_answers() == 0);
@@ -172,9 +177,10 @@ TEST_CASE("primitive ids agree with the flat mesh when layout flattens triangles
   const Folder folder;
   // The second triangle is so thin that it has no area left 1e6 away, where it is dropped; near the origin it stays.
   folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 1e-3 0\nv 1 0 1e-3\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 6\n");
-  const Scene scene = load_file(folder.write("s.yaml",
-                                             "meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{translate: [0, 1e6, 0]}, {translate: [5, 0, 0]}, "
-                                             "{translate: [9, 1e6, 0]}, {scale: [1, 1, 1e-5]}]}]\n"));
+  const Scene scene = load_file(folder.write(
+      "s.yaml",
+      "meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{translate: [0, 1e6, 0]}, {translate: [5, 0, 0]}, "
+      "{translate: [9, 1e6, 0]}, {scale: [1, 1, 1e-5]}]}]\n"));
   REQUIRE(scene.mesh.instancing);
   const Instancing& instancing = *scene.mesh.instancing;
   CHECK(scene.report.degenerate == 2);
@@ -200,13 +206,15 @@ TEST_CASE("what cannot stand below is refused in one line") {
   const struct {
     std::string below, builder, leaf, message;
   } cases[] = {
-      {"two_level", "binned_sah", "triangle4", "two_level over two_level: two_level stands above other structures, not below one"},
+      {"two_level", "binned_sah", "triangle4",
+       "two_level over two_level: two_level stands above other structures, not below one"},
       {"bvh4_motion", "binned_sah", "triangle4i", "two_level over bvh4_motion: bvh4_motion is for moving scenes"},
       {"bvh88", "binned_sah", "triangle4", "two_level: below: there is no structure 'bvh88'"},
       {"brute_force", "binned_sah", "triangle4", "two_level over brute_force: brute_force has no builder binned_sah"},
   };
   for (const auto& c : cases) {
     INFO(c.below);
-    CHECK_THAT(error_of([&] { (void)built("two_level", mesh, c.leaf, c.below, c.builder); }), Catch::Contains(c.message));
+    CHECK_THAT(error_of([&] { (void)built("two_level", mesh, c.leaf, c.below, c.builder); }),
+               Catch::Contains(c.message));
   }
 }

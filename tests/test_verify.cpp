@@ -33,22 +33,27 @@ std::vector<VerifiedCell> promising_cells(const Registry& registry) {
     const StructureInfo& info = registry.structure(row.structure)->info;
     if (!promise.any() || !registry.has(row.isa) || info.needs_motion) continue;
     if (row.leaf != registry.default_leaf(row.structure, row.intersector, row.isa)) continue;
-    if (row.traversal != "single" && row.structure != "bvh8" && row.structure != "kdtree") continue;  // test_kernels holds the modes of all to their single rays
+    // test_kernels holds the modes of all to their single rays
+    if (row.traversal != "single" && row.structure != "bvh8" && row.structure != "kdtree") continue;
     Cell cell;
-    cell.structure = row.structure, cell.builder = info.builders.front(), cell.leaf = row.leaf, cell.intersector = row.intersector;
+    cell.structure = row.structure, cell.builder = info.builders.front(), cell.leaf = row.leaf,
+    cell.intersector = row.intersector;
     cell.box = row.box, cell.traversal = row.traversal, cell.isa = row.isa, cell.kernel = &row;
     cells.push_back({cell, promise, {}, {}});
   }
   return cells;
 }
 
-std::vector<VerifiedCell> only(std::vector<VerifiedCell> cells, std::string_view structure, std::string_view intersector) {
-  std::erase_if(cells, [&](const VerifiedCell& c) { return c.cell.structure != structure || c.cell.intersector != intersector; });
+std::vector<VerifiedCell> only(std::vector<VerifiedCell> cells, std::string_view structure,
+                               std::string_view intersector) {
+  std::erase_if(
+      cells, [&](const VerifiedCell& c) { return c.cell.structure != structure || c.cell.intersector != intersector; });
   return cells;
 }
 
 /// Fails with a literal case for each cell that breaks its promise.
-void check_promises(std::vector<VerifiedCell>& cells, const Registry& registry, const TriangleMesh& mesh, const HardRays& rays) {
+void check_promises(std::vector<VerifiedCell>& cells, const Registry& registry, const TriangleMesh& mesh,
+                    const HardRays& rays) {
   tbb::task_arena(1).execute([&] {  // too little work to share out
     const Oracle oracle(mesh);
     StructureShelf shelf(mesh, registry, 1);
@@ -59,7 +64,8 @@ void check_promises(std::vector<VerifiedCell>& cells, const Registry& registry, 
     c.tallies.clear();
     if (sum.broken == 0) continue;
     const auto part = reduce(c, registry, mesh, sum.first);
-    FAIL_CHECK(c.cell.name() << ": " << sum.first.what << "\n" << (part ? case_json("found", sum.first.what, *part, sum.first.given) : ""));
+    FAIL_CHECK(c.cell.name() << ": " << sum.first.what << "\n"
+                             << (part ? case_json("found", sum.first.what, *part, sum.first.given) : ""));
   }
 }
 
@@ -81,8 +87,8 @@ TEST_CASE("every intersector and box test of the table has a line in the promise
     CHECK((named || embree_only));
   }
   for (const IntersectorPromise& p : kIntersectorPromises) {
-    const std::string row = "| `" + std::string(p.intersector) + "` | " + to_words(promise_of("", p.intersector, "padded")) + " | " +
-                            std::string(p.remark) + " |";
+    const std::string row = "| `" + std::string(p.intersector) + "` | " +
+                            to_words(promise_of("", p.intersector, "padded")) + " | " + std::string(p.remark) + " |";
     INFO(row);
     CHECK(docs.find(row) != std::string::npos);
   }
@@ -108,7 +114,8 @@ TEST_CASE("hard rays are of their kinds, and the same in any batch") {
   std::vector<HardKind> kinds;
   for (std::size_t k = 0; k < kMadeKinds; ++k)
     if (maker.has(static_cast<HardKind>(k))) kinds.push_back(static_cast<HardKind>(k));
-  const HardRays all = maker.make(7, 0, 4000, kinds), part = maker.make(7, 1000, 500, kinds), other = maker.make(8, 0, 4000, kinds);
+  const HardRays all = maker.make(7, 0, 4000, kinds), part = maker.make(7, 1000, 500, kinds),
+                 other = maker.make(8, 0, 4000, kinds);
   CHECK(std::memcmp(part.rays.data(), all.rays.data() + 1000, 500 * sizeof(Ray)) == 0);
   CHECK(std::memcmp(other.rays.data(), all.rays.data(), 4000 * sizeof(Ray)) != 0);
 
@@ -125,7 +132,9 @@ TEST_CASE("hard rays are of their kinds, and the same in any batch") {
       CHECK((d.x != 0) + (d.y != 0) + (d.z != 0) == 1);
     }
   }
-  const auto share = [&](HardKind k) { return double(hits[static_cast<std::size_t>(k)]) / double(rays[static_cast<std::size_t>(k)]); };
+  const auto share = [&](HardKind k) {
+    return double(hits[static_cast<std::size_t>(k)]) / double(rays[static_cast<std::size_t>(k)]);
+  };
   CHECK(share(HardKind::interior) > 0.99);
   CHECK(share(HardKind::edge) > 0.7);
   CHECK(share(HardKind::vertex) > 0.6);
@@ -178,14 +187,16 @@ TEST_CASE("cells keep their promises on spheres, fans and boxes, near and far fr
   const Registry registry = this_registry();
   std::vector<VerifiedCell> cells = promising_cells(registry);
   REQUIRE(cells.size() > 10);
-  const std::array kinds{HardKind::vertex, HardKind::edge, HardKind::interior, HardKind::axis, HardKind::plane, HardKind::grazing,
-                         HardKind::surface, HardKind::far, HardKind::interval, HardKind::invalid};
+  const std::array kinds{HardKind::vertex,   HardKind::edge,    HardKind::interior, HardKind::axis,
+                         HardKind::plane,    HardKind::grazing, HardKind::surface,  HardKind::far,
+                         HardKind::interval, HardKind::invalid};
   const struct {
     const char* generator;
     std::size_t triangles;
     double offset;
     int exponent;
-  } scenes[] = {{"sphere", 300, 0, 0}, {"sphere", 300, 1e4, 0}, {"fan", 64, 0, 0}, {"fan", 256, 100, 0}, {"sphere", 300, 0, -20}, {"fan", 64, 1e5, 10}};
+  } scenes[] = {{"sphere", 300, 0, 0}, {"sphere", 300, 1e4, 0}, {"fan", 64, 0, 0},
+                {"fan", 256, 100, 0},  {"sphere", 300, 0, -20}, {"fan", 64, 1e5, 10}};
   for (const auto& s : scenes) {
     INFO(s.generator << " of " << s.triangles << ", offset " << s.offset << ", scaled by 2^" << s.exponent);
     const TriangleMesh mesh = moved_and_scaled(generate_scene(s.generator, s.triangles, 1).mesh, s.offset, s.exponent);
@@ -225,12 +236,14 @@ TEST_CASE("what the search once found stays mended") {
 namespace {
 
 /// What verify finds of the cell, by kind of ray, on rays aimed at the mesh.
-std::vector<VerifyTally> tallies_of(const VerifiedCell& verified, const Registry& registry, const TriangleMesh& mesh, std::size_t count, std::span<const HardKind> kinds) {
+std::vector<VerifyTally> tallies_of(const VerifiedCell& verified, const Registry& registry, const TriangleMesh& mesh,
+                                    std::size_t count, std::span<const HardKind> kinds) {
   const HardRays rays = HardRayMaker(mesh).make(1, 0, count, kinds);
   const Oracle oracle(mesh);
   StructureShelf shelf(mesh, registry, 1);
   std::vector<Hit> hits;
-  return verify_cell(verified.cell, shelf.get(verified.cell), {mesh, oracle, rays, oracle.closest_hit(rays.batch())}, hits, {});
+  return verify_cell(verified.cell, shelf.get(verified.cell), {mesh, oracle, rays, oracle.closest_hit(rays.batch())},
+                     hits, {});
 }
 
 }  // namespace
@@ -242,7 +255,9 @@ TEST_CASE("a kernel that leaks is told to leak, and a promise that it breaks is 
   // A kernel of moller_trumbore that calls itself watertight.
   const KernelRow* leaky = nullptr;
   for (const KernelRow& row : registry.kernels)
-    if (row.structure == "bvh8" && row.intersector == "moller_trumbore" && row.isa == cells[0].cell.isa && row.traversal == "single") leaky = &row;
+    if (row.structure == "bvh8" && row.intersector == "moller_trumbore" && row.isa == cells[0].cell.isa &&
+        row.traversal == "single")
+      leaky = &row;
   REQUIRE(leaky);
   VerifiedCell& liar = cells[0];
   liar.cell.kernel = leaky, liar.cell.leaf = leaky->leaf;

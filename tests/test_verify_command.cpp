@@ -126,7 +126,8 @@ TEST_CASE("the command's verdicts and words") {
 
 TEST_CASE("a scene of instances is moved only for structures that do not read them") {
   VerifyCommand command;
-  command.subject = "forest:2000", command.rays = 500, command.axes = {"isa=" + any_isa(), "structure=two_level,bvh8", "intersector=watertight"};
+  command.subject = "forest:2000", command.rays = 500,
+  command.axes = {"isa=" + any_isa(), "structure=two_level,bvh8", "intersector=watertight"};
   CHECK(verify(command).status == 0);
   command.offsets = {0}, command.scales = {0};
   CHECK(verify(command).status == 0);
@@ -145,7 +146,8 @@ TEST_CASE("a scene of instances is moved only for structures that do not read th
 
 TEST_CASE("cases files: right ones are checked, wrong ones are named") {
   const std::string isa = "isa=" + any_isa();
-  const std::string triangles = R"("triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0.25,0.25,0], "direction": [0,0,1])";
+  const std::string triangles =
+      R"("triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0.25,0.25,0], "direction": [0,0,1])";
   VerifyCommand command;
   command.axes = {isa, "structure=bvh8", "intersector=watertight"};
   const auto status_of = [&](const std::string& text, std::string* error = nullptr) {
@@ -166,8 +168,10 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
       {"{}", "holds no"},
       {R"({"cases": [3]})", "is no object"},
       {R"({"cases": [{"id": "q"}]})", "case q: has no triangles"},
-      {R"({"cases": [{"id": "q", "triangles": [[[0,0],[1,0,0],[0,1,0]]], "origin": [0,0,0], "direction": [0,0,1]}]})", "[x, y, z]"},
-      {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": ["big",0,0], "direction": [0,0,1]}]})", "is no number"},
+      {R"({"cases": [{"id": "q", "triangles": [[[0,0],[1,0,0],[0,1,0]]], "origin": [0,0,0], "direction": [0,0,1]}]})",
+       "[x, y, z]"},
+      {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": ["big",0,0], "direction": [0,0,1]}]})",
+       "is no number"},
       {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1], "hit": false}]})",
        "exact arithmetic finds a hit"},
       {R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1], "t": 2}]})",
@@ -188,9 +192,11 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
     INFO(error);
     CHECK(error.find(fault.error) != std::string::npos);
   }
-  // Each part of a wrong answer is told, whatever is given beside it: of two triangles at t = 1 and one behind them, and of a miss.
-  const std::string three = R"({"cases": [{"id": "q", "triangles": [[["nan",0,1],[0,0,1],[0,0,1]],[[0,0,1],[1,0,1],[0,1,1]],[[0,0,2],[1,0,2],[0,1,2]],[[0,0,1],[1,0,1],[0,1,1]]], )"
-                            R"("direction": [0,0,1], "origin": )";
+  // Each part of a wrong answer is told, whatever is given beside it: of two triangles at t = 1 and one behind them,
+  // and of a miss.
+  const std::string three =
+      R"({"cases": [{"id": "q", "triangles": [[["nan",0,1],[0,0,1],[0,0,1]],[[0,0,1],[1,0,1],[0,1,1]],[[0,0,2],[1,0,2],[0,1,2]],[[0,0,1],[1,0,1],[0,1,1]]], )"
+      R"("direction": [0,0,1], "origin": )";
   const std::string hit = three + "[0.25,0.25,0], ", miss = three + "[5,0,0], ";
   const struct {
     const std::string& base;
@@ -232,11 +238,13 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
     return out.substr(0, out.find('\n'));
   };
   const std::string flat = R"("triangles": [[["nan",0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1])";
-  const std::string none = R"({"cases": [{"id": "a", )" + flat + R"(}, {"id": "b", )" + flat + "}]}", one = R"({"cases": [{"id": "a", )" + flat + "}, {" + triangles + "}]}";
+  const std::string none = R"({"cases": [{"id": "a", )" + flat + R"(}, {"id": "b", )" + flat + "}]}",
+                    one = R"({"cases": [{"id": "a", )" + flat + "}, {" + triangles + "}]}";
   CHECK(rays_of(none, 100).find("2 cases, 2 rays") != std::string::npos);
   CHECK(rays_of(one, 100).find("2 cases and 2 random meshes, 100 rays") != std::string::npos);
   // tnear below 0: where 0 would have the same answer.
-  const std::string wall = R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "direction": [0,0,1], "tnear": )";
+  const std::string wall =
+      R"({"cases": [{"id": "q", "triangles": [[[0,0,1],[1,0,1],[0,1,1]]], "direction": [0,0,1], "tnear": )";
   const std::string refused = "case q: tnear -10 is below 0 and something lies there";
   std::string error;
   CHECK(status_of(wall + R"(-10, "origin": [0.25,0.25,0], "hit": true})" + "]}", &error) == 0);
@@ -251,12 +259,14 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
   VerifyCase behind;
   add_triangle(behind.mesh, {0, 0, 1}, {1, 0, 1}, {0, 1, 1});
   behind.ray = {{0.25f, 0.25f, 0}, -10.0f, {0, 0, 1}, 2.0f};
-  for (std::uint64_t i = 0; i < 20; ++i) CHECK(mutated_subject(behind.mesh, behind.ray, 1, i, 1).rays.rays[0].tnear == 0);
+  for (std::uint64_t i = 0; i < 20; ++i)
+    CHECK(mutated_subject(behind.mesh, behind.ray, 1, i, 1).rays.rays[0].tnear == 0);
   CHECK(read_case_file(kSource / "tests/hard_cases.json").size() == 96);
   // What is written is read back, the largest float included, whose shortest decimal lies beyond it.
   TriangleMesh mesh;
   add_triangle(mesh, {0.1f, 1e-30f, 1}, {1, 0, 1}, {0, 16777216, 1});
-  add_triangle(mesh, {std::numeric_limits<float>::max(), 0, 1}, {0, std::numeric_limits<float>::lowest(), 1}, {0x1p-149f, 0, 1});
+  add_triangle(mesh, {std::numeric_limits<float>::max(), 0, 1}, {0, std::numeric_limits<float>::lowest(), 1},
+               {0x1p-149f, 0, 1});
   const Ray ray{{0.3f, 0.7f, 0}, 0.0f, {0, 0, 1}, 0x1.fp120f};
   const auto path = written("back.json", R"({"cases": [)" + case_json("back", "why", mesh, ray) + "]}");
   const VerifyCase back = read_case_file(path).front();

@@ -41,8 +41,7 @@ bool same(const Ray& a, const Ray& b) {
   return a.origin == b.origin && a.direction == b.direction && a.tnear == b.tnear && a.tfar == b.tfar;
 }
 bool same(const std::vector<Ray>& a, const std::vector<Ray>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const Ray& x, const Ray& y) { return same(x, y); });
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Ray& x, const Ray& y) { return same(x, y); });
 }
 
 /// A flat floor with a camera above, moved `far` along x, so that float32 has few digits left for it.
@@ -109,16 +108,14 @@ TEST_CASE("every workload: counts, intervals, unit directions, and the same rays
       other.seed = 6;
       const bool random =
           workload_name == "ambient_occlusion" || workload_name == "diffuse" || workload_name == "random";
-      CHECK(same(workload.rays, make_workload(workload_name, scene, other, primary.rays, hits).rays) ==
-            !random);
+      CHECK(same(workload.rays, make_workload(workload_name, scene, other, primary.rays, hits).rays) == !random);
     }
   }
 }
 
 TEST_CASE("secondary rays start on the side that they leave for, and never meet their own triangle") {
   std::vector<Scene> scenes;
-  for (const char* name :
-       {"cornell_box", "sphere_flake", "teapot_in_stadium", "needles", "city", "random_triangles"})
+  for (const char* name : {"cornell_box", "sphere_flake", "teapot_in_stadium", "needles", "city", "random_triangles"})
     scenes.push_back(generate_scene(name, 300, 1));
   for (const float far : {0.0f, 1e4f, 1e7f, -3e5f}) scenes.push_back(floor_scene(far));
   for (const Scene& scene : scenes) {
@@ -144,8 +141,7 @@ TEST_CASE("secondary rays start on the side that they leave for, and never meet 
       }
       INFO(name);
       CHECK(wrong_side == 0);
-      if (std::string_view(name) != "shadow")
-        CHECK(behind == 0);  // a light may be behind the surface, nothing else
+      if (std::string_view(name) != "shadow") CHECK(behind == 0);  // a light may be behind the surface, nothing else
     }
   }
 }

@@ -1,11 +1,15 @@
 // `auto`: looks at a batch's rays, tile by tile, and hands runs of like tiles to the way of traversal that suits them.
 //
-// A tile of 64 rays is coherent when a sample of its rays leaves no wide cone: their directions lie close together. Such tiles go as packets,
-// whose interval test then decides for most rays at once; the others go as the structure's best way for rays that share little: the wide BVHs' streams, whose rays share nodes
-// as long as they can and hide each other's latency after that (on SSE rays in flight where they share too little, structures/bvh/bvh_streams_or_queue.h); rays in flight or single rays where there are none. In structures of small steps (kd-tree, octree, bounding interval hierarchy) packets are worth while
-// for rays that only start near each other, too. In the wide BVHs, whether packets are better than streams depends on the scene as well: where triangles are small, rays that are close together
-// meet different ones, and packets that let too many of their rays go on alone hand the tiles that follow to streams, for a while. What a mode
-// costs for the wrong rays is in docs/performance.md. Every way gives the same hits, so the choice changes no answer.
+// A tile of 64 rays is coherent when a sample of its rays leaves no wide cone: their directions lie close together.
+// Such tiles go as packets, whose interval test then decides for most rays at once; the others go as the structure's
+// best way for rays that share little: the wide BVHs' streams, whose rays share nodes as long as they can and hide each
+// other's latency after that (on SSE rays in flight where they share too little,
+// structures/bvh/bvh_streams_or_queue.h); rays in flight or single rays where there are none. In structures of small
+// steps (kd-tree, octree, bounding interval hierarchy) packets are worth while for rays that only start near each
+// other, too. In the wide BVHs, whether packets are better than streams depends on the scene as well: where triangles
+// are small, rays that are close together meet different ones, and packets that let too many of their rays go on alone
+// hand the tiles that follow to streams, for a while. What a mode costs for the wrong rays is in docs/performance.md.
+// Every way gives the same hits, so the choice changes no answer.
 #pragma once
 
 #include "traversal/packet_rows.h"
@@ -13,26 +17,32 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// `Family` as in traversal/packet_rows.h; `CompiledPackets`: a TypeList of the leaves that its packets have compiled in. `Incoherent` and `Alone` (traversal/kernel_rows.h): the other way, and
-/// the one for batches of a few rays. `MayFallApart`: packets that let too many of their rays go on alone lose to the other way, also where rays are coherent: to streams, not to rays in flight.
-template <class Family, class CompiledPackets, class Incoherent, class Alone = Incoherent, bool MayFallApart = !std::is_same_v<Incoherent, Alone>>
+/// `Family` as in traversal/packet_rows.h; `CompiledPackets`: a TypeList of the leaves that its packets have compiled
+/// in. `Incoherent` and `Alone` (traversal/kernel_rows.h): the other way, and the one for batches of a few rays.
+/// `MayFallApart`: packets that let too many of their rays go on alone lose to the other way, also where rays are
+/// coherent: to streams, not to rays in flight.
+template <class Family, class CompiledPackets, class Incoherent, class Alone = Incoherent,
+          bool MayFallApart = !std::is_same_v<Incoherent, Alone>>
 struct AutoFunctions {
   static constexpr std::size_t kTile = 64;
-  /// Of the directions' own length, the half extent of those that still count as coherent. Rays towards a light fan out the more the nearer it is, and
-  /// share their end all the same.
+  /// Of the directions' own length, the half extent of those that still count as coherent. Rays towards a light fan out
+  /// the more the nearer it is, and share their end all the same.
   static constexpr float kCone = 0.25f, kAnyHitCone = 0.5f;
   /// Of the extent of all origins of the batch, that of a tile's which start near each other.
   static constexpr float kNear = 0.125f;
-  /// So many rays in packets show how those do: at first, and at most while they do well. Where a ray goes on alone more often than this, the next rays take the other way, at first so many,
-  /// each time twice as many, and so many at most (docs/performance.md).
-  static constexpr std::size_t kProbe = 4 * kTile, kMostPackets = 4 * kProbe, kFirstOther = 8 * kProbe, kMostOther = 64 * kProbe;
+  /// So many rays in packets show how those do: at first, and at most while they do well. Where a ray goes on alone
+  /// more often than this, the next rays take the other way, at first so many, each time twice as many, and so many at
+  /// most (docs/performance.md).
+  static constexpr std::size_t kProbe = 4 * kTile, kMostPackets = 4 * kProbe, kFirstOther = 8 * kProbe,
+                               kMostOther = 64 * kProbe;
   static constexpr float kTimesAlone = 0.1f;
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
   static constexpr int kThreshold = 6;  ///< packet64's
   /// Smaller batches are too few to share anything; runs of tiles below the second too few for streams.
   static constexpr std::size_t kFew = 8, kShort = 96;
-  /// Of `count` rays' directions or origins, of which some `samples` are looked at: the largest extent along an axis, and the largest |coordinate|.
+  /// Of `count` rays' directions or origins, of which some `samples` are looked at: the largest extent along an axis,
+  /// and the largest |coordinate|.
   struct Spread {
     float extent, largest;
   };
@@ -55,7 +65,8 @@ struct AutoFunctions {
     return Family::kForNearRays && spread(rays, count, 8, &Ray::origin).extent <= near;
   }
 
-  /// Calls packets(begin, count), which returns how often a ray went on alone, and other(begin, count) for runs of tiles.
+  /// Calls packets(begin, count), which returns how often a ray went on alone, and other(begin, count) for runs of
+  /// tiles.
   template <class Packets, class Other>
   static void runs(RayBatch rays, float cone, const Packets& packets, const Other& other) {
     std::size_t begin = 0, other_way = 0, next_other = kFirstOther, next_packets = kProbe;
@@ -98,17 +109,33 @@ struct AutoFunctions {
 
   template <class Packets, RowFunctions (*Other)(), RowFunctions (*Few)()>
   struct Batch {
-    static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+    static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits,
+                            Counters* counters) {
       if (rays.size() < kFew) return Few().closest_hit(accel, row, rays, hits, counters);
       runs(
-          rays, kCone, [&](std::size_t begin, std::size_t count) { return Packets::closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters, int(kTile), kThreshold); },
-          [&](std::size_t begin, std::size_t count) { (count < kShort ? Few() : Other()).closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters); });
+          rays, kCone,
+          [&](std::size_t begin, std::size_t count) {
+            return Packets::closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters,
+                                        int(kTile), kThreshold);
+          },
+          [&](std::size_t begin, std::size_t count) {
+            (count < kShort ? Few() : Other())
+                .closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters);
+          });
     }
-    static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+    static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded,
+                        Counters* counters) {
       if (rays.size() < kFew) return Few().any_hit(accel, row, rays, occluded, counters);
       runs(
-          rays, kAnyHitCone, [&](std::size_t begin, std::size_t count) { return Packets::any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters, int(kTile), kThreshold); },
-          [&](std::size_t begin, std::size_t count) { (count < kShort ? Few() : Other()).any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters); });
+          rays, kAnyHitCone,
+          [&](std::size_t begin, std::size_t count) {
+            return Packets::any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters,
+                                    int(kTile), kThreshold);
+          },
+          [&](std::size_t begin, std::size_t count) {
+            (count < kShort ? Few() : Other())
+                .any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters);
+          });
     }
   };
 
@@ -120,12 +147,14 @@ struct AutoFunctions {
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
     using Packets = std::conditional_t<holds<Leaves>(CompiledPackets{}), Leaves, CalledLeaves>;
-    using B = Batch<PacketBatch<Family, kNative, Packets, NoCounters>, &Incoherent::template timed<Leaves, Padded>, &Alone::template timed<Leaves, Padded>>;
+    using B = Batch<PacketBatch<Family, kNative, Packets, NoCounters>, &Incoherent::template timed<Leaves, Padded>,
+                    &Alone::template timed<Leaves, Padded>>;
     return {&B::closest_hit, &B::any_hit};
   }
   template <bool Padded>
   static RowFunctions counting() {
-    using B = Batch<PacketBatch<Family, kNative, CalledLeaves, WithCounters>, &Incoherent::template counting<Padded>, &Alone::template counting<Padded>>;
+    using B = Batch<PacketBatch<Family, kNative, CalledLeaves, WithCounters>, &Incoherent::template counting<Padded>,
+                    &Alone::template counting<Padded>>;
     return {&B::closest_hit, &B::any_hit};
   }
 };

@@ -17,11 +17,12 @@ template <class F>
   }
 }
 
-/// Structures of arrays. The constants are computed W rays at a time by the operations of BoxRay, so they are the same bits, but for pads that are tight along the ray.
+/// Structures of arrays. The constants are computed W rays at a time by the operations of BoxRay, so they are the same
+/// bits, but for pads that are tight along the ray.
 struct BoxRays : LaneRays {
   alignas(64) float r[3][kMost], near[3][kMost], far[3][kMost];  ///< BoxRay's r, f, g
-  alignas(64) float first[kMost];  ///< distance from which boxes count
-  std::uint64_t overflown;         ///< those whose constants overflow, so that BoxRay mended them
+  alignas(64) float first[kMost];                                ///< distance from which boxes count
+  std::uint64_t overflown;  ///< those whose constants overflow, so that BoxRay mended them
 
   /// As LaneRays::prepare().
   template <int W, int N, class RayAt, class Each>
@@ -54,11 +55,13 @@ struct BoxRays : LaneRays {
     const auto origin = [&] { return largest_component(o[0], o[1], o[2]); };
     (max_x86(F::load(rays.tnear + k), F(0.0f)) * F(pad.before())).store(first + k);
     F reach[3], share[3];
-    for (int a = 0; a < 3; ++a) reach[a] = F(pad.max_coordinate), share[a] = F(pad.tight ? BoxPad::kBeside : BoxPad::kWide);
+    for (int a = 0; a < 3; ++a)
+      reach[a] = F(pad.max_coordinate), share[a] = F(pad.tight ? BoxPad::kBeside : BoxPad::kWide);
     if (pad.tight) {  // along the axis that largest_last() takes, of equal ones too
       const F x = abs(d[0]), y = abs(d[1]), z = abs(d[2]);
       const vm<W> by_x = (x > y) & (x > z), by_y = ~(x > y) & (y > z), along[3] = {by_x, by_y, ~(by_x | by_y)};
-      for (int a = 0; a < 3; ++a) reach[a] = select(along[a], F(0.0f), reach[a]), share[a] = select(along[a], F(BoxPad::kAlong), share[a]);
+      for (int a = 0; a < 3; ++a)
+        reach[a] = select(along[a], F(0.0f), reach[a]), share[a] = select(along[a], F(BoxPad::kAlong), share[a]);
     }
     vm<W> overflows(false);
     for (int a = 0; a < 3; ++a) {

@@ -1,31 +1,38 @@
 // Box tests: one ray against the N child boxes of a node.
 //
 // FastBox keeps no promise at all: rounding can lose a box that the exact ray touches only at a face, edge or corner.
-// PaddedBox never misses a box that the exact ray touches: its interval [near, far] holds the exact one, for every t (but see "tight" below).
+// PaddedBox never misses a box that the exact ray touches: its interval [near, far] holds the exact one, for every t
+// (but see "tight" below).
 //
 // With FMA (AVX2, AVX-512) a plane costs one fused multiply: t = plane * r - o * r. Padded: the constants are
-// o * r +- e with e = 2^-21 (M + |o|) |r|, M the scene's largest |coordinate|. Proof: r = (1/d)(1 + a), |a| <= u = 2^-24, so
-// plane * r - o * r is off by u (M + |o|)|r| from (plane - o)/d; rounding o * r, adding e, and the fused operation's own
-// rounding add less than u (|o| + |e| / |r| + M + |o|)|r| each: in all under 4 u (M + |o|)|r| = e / 2. A direction component below
-// 2^-60 of the largest gets r = 2^60 / |d|max: the ray moves by less than the pad along that axis wherever it can meet the
-// scene, and e alone is then larger than any such t, which is (M + |o|max) / |d|max at most. Where it is not, for a ray from more than some 2^39 M away, the axis is left out.
+// o * r +- e with e = 2^-21 (M + |o|) |r|, M the scene's largest |coordinate|. Proof: r = (1/d)(1 + a), |a| <= u =
+// 2^-24, so plane * r - o * r is off by u (M + |o|)|r| from (plane - o)/d; rounding o * r, adding e, and the fused
+// operation's own rounding add less than u (|o| + |e| / |r| + M + |o|)|r| each: in all under 4 u (M + |o|)|r| = e / 2.
+// A direction component below 2^-60 of the largest gets r = 2^60 / |d|max: the ray moves by less than the pad along
+// that axis wherever it can meet the scene, and e alone is then larger than any such t, which is (M + |o|max) / |d|max
+// at most. Where it is not, for a ray from more than some 2^39 M away, the axis is left out.
 //
-// Without FMA (scalar, SSE) t = (plane - o) * r with r = 1/d, infinite for 0; padded: the origin of the near planes is moved
-// by e = 2^-21 (M + |o|) along the direction, that of the far planes against it (as Woop, Benthin, Wald 2013 do), so both ends
-// of the interval are padded for the cost of none. Proof: the moved origin, the difference and the two factors round by less
-// than 4 u (M + |o| + e)|r| together, which is under e |r|. (Ize's pad is in ize_box.h.) 0 * inf is NaN in the fast test;
-// min_x86 and max_x86 keep their second operand, the running value, and so ignore it.
+// Without FMA (scalar, SSE) t = (plane - o) * r with r = 1/d, infinite for 0; padded: the origin of the near planes is
+// moved by e = 2^-21 (M + |o|) along the direction, that of the far planes against it (as Woop, Benthin, Wald 2013 do),
+// so both ends of the interval are padded for the cost of none. Proof: the moved origin, the difference and the two
+// factors round by less than 4 u (M + |o| + e)|r| together, which is under e |r|. (Ize's pad is in ize_box.h.) 0 * inf
+// is NaN in the fast test; min_x86 and max_x86 keep their second operand, the running value, and so ignore it.
 //
-// Tight along the ray (BoxPad): where the direction is largest, along z say, e is only c |o||r| with c = 2^-23 (1 + 2^-20) (FMA), or 0, and the interval's ends
-// are scaled by 1 -+ 2^-20 instead, once a ray and once a hit. No touched box is lost either. Proof (FMA): let the exact ray be in the box at T within the interval. The rounded
-// o * r and f are off by (2 u + u^2)|o r| together, which e, however it is rounded, makes good, so near_z <= T (1 + 2 u) and far_z >= T (1 - 2 u), up to u^2. The pads of x and y are
-// then e = 12 u (M + |o|)|r|, of which 4 u make good their own roundings; and (M + |o|)|r| >= T, since the ray is in the box at T: near_x <= T (1 - 8 u), far_x >= T (1 + 8 u). So an
-// entry in z is before an exit in x, and the other way round, also where r is subnormal and z off by 6 u; in z itself the two are the same rounded, so monotone, function of planes that are
-// in order; and the interval's own ends are scaled by 16 u. Without FMA z has three relative roundings, 3 u, and the rest is the same. Boxes that a ray starts on then do not count, where
-// wide pads reach back over any step that it may have taken off its surface.
-// Who may ask for it: intersectors that find nothing but what the exact ray meets (`exact`), or which a ray that is moved across z alone would meet, for what the pads of x and y
-// stand, and at a distance between those of the nearest and the farthest corner along z (`watertight`: kDepthBetweenCorners; its sheared x is off by 3 u (M + |o|) where shears are fused
-// and 4 u where not, the corners' errors being averaged as their depths are: with x's own 4 u and z's 2 or 3 u that is 9 or 11 u of the 12).
+// Tight along the ray (BoxPad): where the direction is largest, along z say, e is only c |o||r| with c = 2^-23 (1 +
+// 2^-20) (FMA), or 0, and the interval's ends are scaled by 1 -+ 2^-20 instead, once a ray and once a hit. No touched
+// box is lost either. Proof (FMA): let the exact ray be in the box at T within the interval. The rounded o * r and f
+// are off by (2 u + u^2)|o r| together, which e, however it is rounded, makes good, so near_z <= T (1 + 2 u) and far_z
+// >= T (1 - 2 u), up to u^2. The pads of x and y are then e = 12 u (M + |o|)|r|, of which 4 u make good their own
+// roundings; and (M + |o|)|r| >= T, since the ray is in the box at T: near_x <= T (1 - 8 u), far_x >= T (1 + 8 u). So
+// an entry in z is before an exit in x, and the other way round, also where r is subnormal and z off by 6 u; in z
+// itself the two are the same rounded, so monotone, function of planes that are in order; and the interval's own ends
+// are scaled by 16 u. Without FMA z has three relative roundings, 3 u, and the rest is the same. Boxes that a ray
+// starts on then do not count, where wide pads reach back over any step that it may have taken off its surface. Who may
+// ask for it: intersectors that find nothing but what the exact ray meets (`exact`), or which a ray that is moved
+// across z alone would meet, for what the pads of x and y stand, and at a distance between those of the nearest and the
+// farthest corner along z (`watertight`: kDepthBetweenCorners; its sheared x is off by 3 u (M + |o|) where shears are
+// fused and 4 u where not, the corners' errors being averaged as their depths are: with x's own 4 u and z's 2 or 3 u
+// that is 9 or 11 u of the 12).
 //
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once
@@ -41,17 +48,19 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// A ray's constants along an axis that are this large may overflow: the axis is left out of its tests.
 inline constexpr float kTooLarge = 0x1p124f;
 
-/// The pads e of axes, `parallel` those along which a ray does as good as not move: where such a pad may be less than a t in the scene, one by which the axis is left out. `origin` and
-/// `largest`: the largest |component| of the ray's origin and direction.
+/// The pads e of axes, `parallel` those along which a ray does as good as not move: where such a pad may be less than a
+/// t in the scene, one by which the axis is left out. `origin` and `largest`: the largest |component| of the ray's
+/// origin and direction.
 template <class F, class Mask>
 [[nodiscard]] ARBORETUM_INLINE F pad_or_leave_out(F e, Mask parallel, F max_coordinate, F origin, F largest) {
   return select(parallel & ~(e > F(2.0f) * ((max_coordinate + origin) / largest)), F(kTooLarge), e);
 }
 
-/// What padded boxes are padded by. Tight (above) is for many rays that are prepared together (box_rays.h): one ray alone loses by finding its largest axis what it gains
-/// (docs/performance.md).
+/// What padded boxes are padded by. Tight (above) is for many rays that are prepared together (box_rays.h): one ray
+/// alone loses by finding its largest axis what it gains (docs/performance.md).
 struct BoxPad {
-  static constexpr float kWide = 0x1p-21f, kBeside = 0x1.8p-21f, kAlong = kHasFma ? 0x1.00001p-23f : 0.0f;  ///< shares: of M + |o|, along other axes than a tight one, and of |o| along that
+  /// shares: of M + |o|, along other axes than a tight one, and of |o| along that
+  static constexpr float kWide = 0x1p-21f, kBeside = 0x1.8p-21f, kAlong = kHasFma ? 0x1.00001p-23f : 0.0f;
 
   float max_coordinate;  ///< the scene's largest
   bool tight = false;    ///< along the axis where the direction is largest
@@ -67,9 +76,9 @@ struct BoxRay {
   static constexpr int W = N < 4 ? 4 : N;
   static constexpr unsigned kSide = N * sizeof(float);
 
-  Vec3f r;  ///< reciprocal direction
-  Vec3f f;  ///< for the near planes: o * r (FMA) or the origin (no FMA), padded
-  Vec3f g;  ///< the same for the far planes
+  Vec3f r;          ///< reciprocal direction
+  Vec3f f;          ///< for the near planes: o * r (FMA) or the origin (no FMA), padded
+  Vec3f g;          ///< the same for the far planes
   unsigned octant;  ///< bit a: the direction is negative along axis a, or is -0
 
   /// The axes stand in lanes: some forty instructions fewer a ray than one axis after the other.
@@ -77,9 +86,13 @@ struct BoxRay {
     using F = vf<4>;
     const F o = F::load(&ray.origin), d = F::load(&ray.direction);
     F rs, fs, gs;
-    constants<Padded>(o, d, F(largest_component(ray.direction)), [&] { return F(largest_component(ray.origin)); }, F(max_coordinate), F(BoxPad::kWide), rs, fs, gs);
+    constants<Padded>(
+        o, d, F(largest_component(ray.direction)), [&] { return F(largest_component(ray.origin)); }, F(max_coordinate),
+        F(BoxPad::kWide), rs, fs, gs);
     r = axes(rs), f = axes(fs), g = axes(gs);
-    if (__builtin_expect((overflows(d, rs, fs, gs).bits() & 7u) != 0, 0)) leave_out(ray.direction.x, r.x, f.x, g.x), leave_out(ray.direction.y, r.y, f.y, g.y), leave_out(ray.direction.z, r.z, f.z, g.z);
+    if (__builtin_expect((overflows(d, rs, fs, gs).bits() & 7u) != 0, 0))
+      leave_out(ray.direction.x, r.x, f.x, g.x), leave_out(ray.direction.y, r.y, f.y, g.y),
+          leave_out(ray.direction.z, r.z, f.z, g.z);
     octant = sign_mask(rs) & 7u;
   }
   /// Of constants that are known: those of such a BoxRay.
@@ -91,10 +104,12 @@ struct BoxRay {
   ARBORETUM_INLINE unsigned near_y() const { return (2 + (octant >> 1 & 1u)) * kSide; }
   ARBORETUM_INLINE unsigned near_z() const { return (4 + (octant >> 2)) * kSide; }
 
-  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; the pad is a `share` of
-  /// max_coordinate + |o|.
+  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component|
+  /// of the ray's direction and origin; the pad is a `share` of max_coordinate + |o|.
   template <bool Pad, class F, class Origin>
-  static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin, [[maybe_unused]] F max_coordinate, [[maybe_unused]] F share, F& r, F& f, F& g) {
+  static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin,
+                                         [[maybe_unused]] F max_coordinate, [[maybe_unused]] F share, F& r, F& f,
+                                         F& g) {
     if constexpr (kHasFma) {
       r = F(1.0f) / d;
       // A branch, rarely taken: no division waits for `largest`.
@@ -102,7 +117,8 @@ struct BoxRay {
       if (__builtin_expect(any(tiny), 0)) r = select(tiny, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       f = g = o * r;
       if constexpr (Pad) {
-        F e = share * ((max_coordinate + abs(o)) * abs(r)) + F(0x1p-100f);  // in this order: 2^-21 of a tiny scene may be nothing
+        // In this order: 2^-21 of a tiny scene may be nothing
+        F e = share * ((max_coordinate + abs(o)) * abs(r)) + F(0x1p-100f);
         if (__builtin_expect(any(tiny), 0)) e = pad_or_leave_out(e, tiny, max_coordinate, origin(), largest);
         f = f + e, g = g - e;
       }
@@ -115,7 +131,8 @@ struct BoxRay {
       }
     }
   }
-  /// Where the constants of such directions are too large, or NaN, and must be mended; so is an infinite reciprocal of anything but 0.
+  /// Where the constants of such directions are too large, or NaN, and must be mended; so is an infinite reciprocal of
+  /// anything but 0.
   template <class F>
   static ARBORETUM_INLINE auto overflows(F d, F r, F f, F g) {
     const auto too_large = ~(abs(f) + abs(g) < F(kTooLarge));
@@ -129,8 +146,8 @@ struct BoxRay {
  private:
   static ARBORETUM_INLINE unsigned sign_bit(float a) { return __builtin_bit_cast(std::uint32_t, a) >> 31; }
   static ARBORETUM_INLINE Vec3f axes(vf<4> a) { return {lane<0>(a), lane<1>(a), lane<2>(a)}; }
-  /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN. Its interval becomes
-  /// all t for boxes that exist, and stays empty for others.
+  /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN.
+  /// Its interval becomes all t for boxes that exist, and stays empty for others.
   static void leave_out(float d, float& r, float& f, float& g) {
     const bool infinite = !kHasFma && __builtin_fabsf(r) == std::numeric_limits<float>::infinity() && d != 0.0f;
     if (!infinite && __builtin_fabsf(f) + __builtin_fabsf(g) < kTooLarge) return;
@@ -159,7 +176,8 @@ struct BoxLanes {
     return test_planes([node](unsigned offset) { return F::load(node + offset); }, tnear, tfar, entry);
   }
 
-  /// The same for planes that are made from the node: `planes(offset)` gives those that lie `offset` bytes behind its begin.
+  /// The same for planes that are made from the node: `planes(offset)` gives those that lie `offset` bytes behind its
+  /// begin.
   template <class Planes>
   ARBORETUM_INLINE unsigned test_planes(const Planes& planes, F tnear, F tfar, F& entry) const {
     const unsigned bits = meets(planes, tnear, tfar, entry).bits();
@@ -172,10 +190,12 @@ struct BoxLanes {
     if constexpr (kHasFma) {
       nx = msub(planes(near_x), rx, fx), ny = msub(planes(near_y), ry, fy), nz = msub(planes(near_z), rz, fz);
       const F hx = Padded ? gx : fx, hy = Padded ? gy : fy, hz = Padded ? gz : fz;
-      lx = msub(planes(near_x ^ kSide), rx, hx), ly = msub(planes(far(near_y, 2)), ry, hy), lz = msub(planes(far(near_z, 4)), rz, hz);
+      lx = msub(planes(near_x ^ kSide), rx, hx), ly = msub(planes(far(near_y, 2)), ry, hy),
+      lz = msub(planes(far(near_z, 4)), rz, hz);
     } else {
       nx = (planes(near_x) - fx) * rx, ny = (planes(near_y) - fy) * ry, nz = (planes(near_z) - fz) * rz;
-      lx = (planes(near_x ^ kSide) - gx) * rx, ly = (planes(far(near_y, 2)) - gy) * ry, lz = (planes(far(near_z, 4)) - gz) * rz;
+      lx = (planes(near_x ^ kSide) - gx) * rx, ly = (planes(far(near_y, 2)) - gy) * ry,
+      lz = (planes(far(near_z, 4)) - gz) * rz;
     }
     // Two levels instead of three. A NaN may take a neighbour's bound with it: the interval only grows.
     entry = max_x86(max_x86(nx, ny), max_x86(nz, tnear));
@@ -184,7 +204,9 @@ struct BoxLanes {
   }
 
  private:
-  static ARBORETUM_INLINE unsigned far(unsigned near, unsigned axis_planes) { return (2 * axis_planes + 1) * kSide - near; }
+  static ARBORETUM_INLINE unsigned far(unsigned near, unsigned axis_planes) {
+    return (2 * axis_planes + 1) * kSide - near;
+  }
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -31,7 +31,8 @@ struct WithCounters {
   struct Depth {
     unsigned value = 0;
   };
-  /// How deep the node at hand is, and what waits on a traversal stack: entry i of the stack is as deep as `waiting_[i]`.
+  /// How deep the node at hand is, and what waits on a traversal stack: entry i of the stack is as deep as
+  /// `waiting_[i]`.
   class Depths {
    public:
     explicit Depths(Depth root) noexcept : current_(root.value) {}

@@ -11,10 +11,11 @@ std::string_view resolve_structure(std::string_view structure, bool moves) noexc
   return moves ? "bvh4_motion" : "bvh8";
 }
 
-std::string_view resolve_intersector(std::string_view intersector, std::string_view structure, std::span<const KernelRow> kernels) {
+std::string_view resolve_intersector(std::string_view intersector, std::string_view structure,
+                                     std::span<const KernelRow> kernels) {
   if (!is_auto(intersector)) return intersector;
-  const bool has_watertight =
-      std::ranges::any_of(kernels, [&](const KernelRow& row) { return row.structure == structure && row.intersector == "watertight"; });
+  const bool has_watertight = std::ranges::any_of(
+      kernels, [&](const KernelRow& row) { return row.structure == structure && row.intersector == "watertight"; });
   return has_watertight ? "watertight" : "pluecker";
 }
 

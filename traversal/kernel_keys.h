@@ -1,5 +1,5 @@
-// What keys that stand for others mean: `auto` (also for none at all), `packet` and `hybrid`. The library, `render`, `verify` and the plans
-// of sweeps resolve them here, so that a key means the same wherever it is written.
+// What keys that stand for others mean: `auto` (also for none at all), `packet` and `hybrid`. The library, `render`,
+// `verify` and the plans of sweeps resolve them here, so that a key means the same wherever it is written.
 #pragma once
 
 #include <span>
@@ -18,10 +18,12 @@ inline constexpr std::string_view kAuto = "auto";
 /// `auto`: bvh8, or bvh4_motion for what moves.
 [[nodiscard]] std::string_view resolve_structure(std::string_view structure, bool moves) noexcept;
 /// `auto`: watertight, or pluecker where the structure has no kernels of it (embree).
-[[nodiscard]] std::string_view resolve_intersector(std::string_view intersector, std::string_view structure, std::span<const KernelRow> kernels);
+[[nodiscard]] std::string_view resolve_intersector(std::string_view intersector, std::string_view structure,
+                                                   std::span<const KernelRow> kernels);
 /// `auto`: padded for the tests that promise to lose no hit, fast for the others.
 [[nodiscard]] std::string_view resolve_box(std::string_view box, std::string_view intersector) noexcept;
-/// `packet` and `hybrid` stand for the width of the ISA's own registers: packet8 on avx2. Others as they are, `auto` too: a way of its own.
+/// `packet` and `hybrid` stand for the width of the ISA's own registers: packet8 on avx2. Others as they are, `auto`
+/// too: a way of its own.
 [[nodiscard]] std::string resolve_traversal(std::string_view traversal, Isa isa);
 
 }  // namespace arboretum

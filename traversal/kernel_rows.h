@@ -1,4 +1,5 @@
-// Making rows of the kernel table: every leaf and intersector that this instruction set has tests for, with both box tests.
+// Making rows of the kernel table: every leaf and intersector that this instruction set has tests for, with both box
+// tests.
 #pragma once
 
 #include "core/type_list.h"
@@ -16,8 +17,10 @@ void for_each_test(const Visit& visit) {
 }
 
 /// Adds the rows of one way of traversal. `Functions` makes a row's functions:
-///   template <class Leaves, bool Padded> static RowFunctions timed();   template <bool Padded> static RowFunctions counting();
-/// `Compiled...` are the CompiledLeaves (traversal/leaves.h) that get functions of their own; all others share those of CalledLeaves.
+///   template <class Leaves, bool Padded> static RowFunctions timed();   template <bool Padded> static RowFunctions
+///   counting();
+/// `Compiled...` are the CompiledLeaves (traversal/leaves.h) that get functions of their own; all others share those of
+/// CalledLeaves.
 template <class Structure, class Functions, class... Compiled>
 void add_rows(KernelRows& rows, std::string_view traversal, TypeList<Compiled...>) {
   const StructureInfo& info = Structure::static_info();
@@ -29,8 +32,8 @@ void add_rows(KernelRows& rows, std::string_view traversal, TypeList<Compiled...
         timed = Functions::template timed<Leaves, Padded>(), compiled_in = true;
     };
     (compiled(std::type_identity<Compiled>{}), ...);
-    rows.push_back({info.name, tests.leaf, tests.intersector, Padded ? "padded" : "fast", traversal, kIsa, &tests, timed,
-                    Functions::template counting<Padded>(), compiled_in});
+    rows.push_back({info.name, tests.leaf, tests.intersector, Padded ? "padded" : "fast", traversal, kIsa, &tests,
+                    timed, Functions::template counting<Padded>(), compiled_in});
   };
   for_each_test<Structure>([&](const LeafTests& tests) { add(tests, Value<false>{}), add(tests, Value<true>{}); });
 }

@@ -26,12 +26,12 @@ const std::map<Key, const KernelRow*>& index() {
 }
 
 /// Whether any row of the structure agrees with the given keys; an empty key agrees with all.
-[[nodiscard]] bool any_row(std::string_view structure, std::string_view leaf, std::string_view intersector, std::string_view box,
-                           std::string_view traversal, const Isa* isa) {
+[[nodiscard]] bool any_row(std::string_view structure, std::string_view leaf, std::string_view intersector,
+                           std::string_view box, std::string_view traversal, const Isa* isa) {
   const auto agrees = [](std::string_view wanted, std::string_view value) { return wanted.empty() || wanted == value; };
   return std::ranges::any_of(kernel_table(), [&](const KernelRow& r) {
-    return agrees(structure, r.structure) && agrees(leaf, r.leaf) && agrees(intersector, r.intersector) && agrees(box, r.box) &&
-           agrees(traversal, r.traversal) && (!isa || *isa == r.isa);
+    return agrees(structure, r.structure) && agrees(leaf, r.leaf) && agrees(intersector, r.intersector) &&
+           agrees(box, r.box) && agrees(traversal, r.traversal) && (!isa || *isa == r.isa);
   });
 }
 
@@ -52,7 +52,8 @@ template <class Wanted>
 template <int W>
 [[nodiscard]] bool takes_blocks(unsigned width) {
   bool takes = false;
-  for_each_type(BlocksOfWidth<EdgeBlock, W>{}, [&]<class Block>(std::type_identity<Block>) { takes = takes || unsigned(Block::kWidth) == width; });
+  for_each_type(BlocksOfWidth<EdgeBlock, W>{},
+                [&]<class Block>(std::type_identity<Block>) { takes = takes || unsigned(Block::kWidth) == width; });
   return takes;
 }
 
@@ -75,13 +76,17 @@ template <int W>
 }
 
 /// Of a leaf for which the structure has no row of that way of traversal on that instruction set.
-[[nodiscard]] std::string why_no_leaf(std::string_view structure, std::string_view leaf, std::string_view traversal, Isa isa) {
+[[nodiscard]] std::string why_no_leaf(std::string_view structure, std::string_view leaf, std::string_view traversal,
+                                      Isa isa) {
   const std::string s(structure), l(leaf), t(traversal);
   const StructureEntry* entry = find_structure(structure);
   const LeafForm* form = find_leaf_form(leaf);
   const bool taken = entry && std::ranges::find(entry->info.leaves, leaf) != entry->info.leaves.end();
-  if (taken && form && !takes_blocks(isa, form->width)) return s + " has " + l + " with" + isas_of_leaf(form->width) + " only";
-  const std::string leaves = values_of(&KernelRow::leaf, [&](const KernelRow& r) { return r.structure == structure && r.traversal == traversal && r.isa == isa; });
+  if (taken && form && !takes_blocks(isa, form->width))
+    return s + " has " + l + " with" + isas_of_leaf(form->width) + " only";
+  const std::string leaves = values_of(&KernelRow::leaf, [&](const KernelRow& r) {
+    return r.structure == structure && r.traversal == traversal && r.isa == isa;
+  });
   return s + " has no leaf " + l + (taken ? " for " + t + ": that has" : ": it has") + leaves;
 }
 
@@ -89,10 +94,12 @@ template <int W>
 [[nodiscard]] std::string why_no_traversal(std::string_view structure, std::string_view traversal) {
   if (const StructureEntry* entry = find_structure(structure)) {
     if (!entry->info.only_single_rays.empty()) return std::string(entry->info.only_single_rays);
-    const bool ours = traversal == "stream" || traversal == "stream_sorted" || traversal == "stream_lists";  // others are Embree's
+    // Others are Embree's
+    const bool ours = traversal == "stream" || traversal == "stream_sorted" || traversal == "stream_lists";
     if (ours && !entry->info.no_streams.empty()) return std::string(entry->info.no_streams);
   }
-  const std::string owners = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.traversal == traversal; });
+  const std::string owners =
+      values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.traversal == traversal; });
   return owners.empty() ? "no structure of this build has it on this machine" : "that is for" + owners;
 }
 
@@ -119,19 +126,20 @@ std::span<const KernelRow> kernel_table() {
   return rows;
 }
 
-const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector, std::string_view box,
-                             std::string_view traversal, Isa isa) {
+const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
+                             std::string_view box, std::string_view traversal, Isa isa) {
   const auto it = index().find(Key{structure, leaf, intersector, box, traversal, isa});
   return it == index().end() ? nullptr : it->second;
 }
 
 std::string_view default_leaf(std::string_view structure, std::string_view intersector, Isa isa) {
-  // Eight triangles a block trace 5 to 7 % faster than four where a register holds eight (docs/performance.md); edges where the
-  // intersector takes them, else vertices, else the form that was made for it.
+  // Eight triangles a block trace 5 to 7 % faster than four where a register holds eight (docs/performance.md); edges
+  // where the intersector takes them, else vertices, else the form that was made for it.
   const bool wide = native_width(isa) >= 8;
   const Isa* const of = cpu_supports(isa) ? &isa : nullptr;  // one that the machine lacks has no rows; leaves are alike
-  for (std::string_view leaf : {wide ? "triangle8" : "triangle4", wide ? "triangle8v" : "triangle4v", "triangle4", "triangle4v",
-                                wide ? "triangle8w" : "triangle4w", wide ? "triangle8h" : "triangle4h", wide ? "triangle8p" : "triangle4p"}) {
+  for (std::string_view leaf :
+       {wide ? "triangle8" : "triangle4", wide ? "triangle8v" : "triangle4v", "triangle4", "triangle4v",
+        wide ? "triangle8w" : "triangle4w", wide ? "triangle8h" : "triangle4h", wide ? "triangle8p" : "triangle4p"}) {
     if (any_row(structure, leaf, intersector, "", "", of)) return leaf;
   }
   for (const KernelRow& r : kernel_table()) {
@@ -140,14 +148,15 @@ std::string_view default_leaf(std::string_view structure, std::string_view inter
   return {};
 }
 
-std::string why_no_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector, std::string_view box,
-                          std::string_view traversal, Isa isa) {
+std::string why_no_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
+                          std::string_view box, std::string_view traversal, Isa isa) {
   if (find_kernel(structure, leaf, intersector, box, traversal, isa)) return {};
   if (!cpu_supports(isa)) return "no " + std::string(to_string(isa));
   const std::string s(structure), l(leaf), i(intersector), b(box), t(traversal), a(to_string(isa));
   if (!any_row(structure, "", "", "", "", nullptr)) return "no kernels for " + s;
   if (!any_row(structure, "", "", "", "", &isa)) return s + " has no " + a + " kernels";
-  if (!any_row(structure, "", "", "", traversal, nullptr)) return s + " has no " + t + " traversal: " + why_no_traversal(structure, traversal);
+  if (!any_row(structure, "", "", "", traversal, nullptr))
+    return s + " has no " + t + " traversal: " + why_no_traversal(structure, traversal);
   if (!any_row(structure, "", "", "", traversal, &isa)) return s + " has no " + t + " traversal on " + a;
   if (!any_row(structure, "", intersector, "", traversal, &isa)) return s + " has no " + i + " kernels for " + t;
   if (!any_row(structure, leaf, "", "", traversal, &isa)) return why_no_leaf(structure, leaf, traversal, isa);
@@ -166,8 +175,13 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   }
   // A box test that only some ways of traversal, or some structures, have.
   const bool elsewhere = !any_row(structure, "", "", box, traversal, nullptr);
-  if (const std::string ways = values_of(&KernelRow::traversal, [&](const KernelRow& r) { return r.box == box && r.structure == structure; }); elsewhere && !ways.empty()) return s + " has the box test " + b + " for" + ways + " alone, not for " + t;
-  if (const std::string others = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.box == box; }); elsewhere && !others.empty()) return s + " has no box test " + b + ":" + others + " have it";
+  if (const std::string ways = values_of(&KernelRow::traversal,
+                                         [&](const KernelRow& r) { return r.box == box && r.structure == structure; });
+      elsewhere && !ways.empty())
+    return s + " has the box test " + b + " for" + ways + " alone, not for " + t;
+  if (const std::string others = values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.box == box; });
+      elsewhere && !others.empty())
+    return s + " has no box test " + b + ":" + others + " have it";
   return s + " with " + l + " and " + i + " has no box test " + b + " for " + t;
 }
 

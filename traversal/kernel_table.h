@@ -1,7 +1,8 @@
 // The kernel table: every way of tracing rays that this build can do, one row a combination.
 //
-// Rows are made in one translation unit for each structure and instruction set (traversal/kernel_rows.h) from its ways of traversal and the
-// table of leaf tests (intersectors/leaf_tests.h). A function pointer takes a whole batch of rays: below it all is templates.
+// Rows are made in one translation unit for each structure and instruction set (traversal/kernel_rows.h) from its ways
+// of traversal and the table of leaf tests (intersectors/leaf_tests.h). A function pointer takes a whole batch of rays:
+// below it all is templates.
 #pragma once
 
 #include <array>
@@ -24,17 +25,18 @@ struct LeafTests;
 /// counts once for each of its rays that are there.
 struct Counters {
   std::uint64_t rays = 0;
-  std::uint64_t nodes = 0;          ///< inner nodes visited
-  std::uint64_t boxes = 0;          ///< child boxes tested (those that exist)
+  std::uint64_t nodes = 0;  ///< inner nodes visited
+  std::uint64_t boxes = 0;  ///< child boxes tested (those that exist)
   std::uint64_t boxes_hit = 0;
-  std::uint64_t leaves = 0;         ///< leaves visited
-  std::uint64_t blocks = 0;         ///< leaf blocks tested
-  std::uint64_t triangles = 0;      ///< ray/triangle tests, empty lanes not counted
-  std::uint64_t lanes = 0;          ///< SIMD lanes spent on boxes and triangles
-  std::uint64_t lanes_active = 0;   ///< of them, those that held a box or triangle that exists
+  std::uint64_t leaves = 0;        ///< leaves visited
+  std::uint64_t blocks = 0;        ///< leaf blocks tested
+  std::uint64_t triangles = 0;     ///< ray/triangle tests, empty lanes not counted
+  std::uint64_t lanes = 0;         ///< SIMD lanes spent on boxes and triangles
+  std::uint64_t lanes_active = 0;  ///< of them, those that held a box or triangle that exists
 
   std::array<std::uint64_t, 5> children_hit{};  ///< node visits in which the ray met 0, 1, 2, 3, 4 or more children
-  /// What nodes at one depth, the root's 0, were tested with: the rays of a packet, or the children that one ray is tested against.
+  /// What nodes at one depth, the root's 0, were tested with: the rays of a packet, or the children that one ray is
+  /// tested against.
   struct Depth {
     std::uint64_t visits = 0;  ///< by a packet or by one ray
     std::uint64_t lanes = 0, lanes_active = 0;
@@ -44,10 +46,10 @@ struct Counters {
 
   std::uint64_t packets = 0;
   std::uint64_t rays_in_packets = 0;
-  std::uint64_t switches = 0;        ///< times that a packet had its rays go on alone in a node
-  std::uint64_t rays_alone = 0;      ///< the rays that did, at all switches
-  std::uint64_t queue_rounds = 0;    ///< of rays in flight: once through the queue of nodes and that of leaves
-  std::uint64_t nodes_queued = 0;    ///< lengths of the queues when their turn comes, added up
+  std::uint64_t switches = 0;      ///< times that a packet had its rays go on alone in a node
+  std::uint64_t rays_alone = 0;    ///< the rays that did, at all switches
+  std::uint64_t queue_rounds = 0;  ///< of rays in flight: once through the queue of nodes and that of leaves
+  std::uint64_t nodes_queued = 0;  ///< lengths of the queues when their turn comes, added up
   std::uint64_t leaves_queued = 0;
   Counters& operator+=(const Counters& o) noexcept;
 };
@@ -56,7 +58,8 @@ struct KernelRow;
 /// hits[i] answers rays[i]; both spans have the same size. The structure must be of the row's structure and leaf.
 using ClosestHitFunction = void (*)(const Accel&, const KernelRow&, RayBatch rays, std::span<Hit> hits, Counters*);
 /// occluded[i] becomes 1 when anything lies within [tnear, tfar] of rays[i], else 0.
-using AnyHitFunction = void (*)(const Accel&, const KernelRow&, RayBatch rays, std::span<std::uint8_t> occluded, Counters*);
+using AnyHitFunction = void (*)(const Accel&, const KernelRow&, RayBatch rays, std::span<std::uint8_t> occluded,
+                                Counters*);
 
 struct RowFunctions {
   ClosestHitFunction closest_hit = nullptr;
@@ -69,13 +72,15 @@ struct KernelRow {
   const LeafTests* tests = nullptr;  ///< nullptr where the structure has its own (embree)
   RowFunctions timed{};              ///< ignore their Counters*
   RowFunctions counting{};           ///< same answers, add to the Counters; nullptr where there are none
-  bool leaves_compiled_in = false;   ///< `timed` has its leaf tests compiled in; else it calls `tests`, which costs a few per cent
+  /// `timed` has its leaf tests compiled in; else it calls `tests`, which costs a few per cent
+  bool leaves_compiled_in = false;
 
   /// With `counters`, by the counting functions, which must be there.
   void closest_hit(const Accel& accel, RayBatch rays, std::span<Hit> hits, Counters* counters = nullptr) const {
     (counters ? counting : timed).closest_hit(accel, *this, rays, hits, counters);
   }
-  void any_hit(const Accel& accel, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters = nullptr) const {
+  void any_hit(const Accel& accel, RayBatch rays, std::span<std::uint8_t> occluded,
+               Counters* counters = nullptr) const {
     (counters ? counting : timed).any_hit(accel, *this, rays, occluded, counters);
   }
   [[nodiscard]] bool counts() const noexcept { return counting.closest_hit != nullptr; }
@@ -87,8 +92,9 @@ using KernelRows = std::vector<KernelRow>;
 /// Every row of this executable whose instruction set this machine runs, those that ARBORETUM_ISA leaves out included.
 [[nodiscard]] std::span<const KernelRow> kernel_table();
 /// nullptr where there is none.
-[[nodiscard]] const KernelRow* find_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
-                                           std::string_view box, std::string_view traversal, Isa isa);
+[[nodiscard]] const KernelRow* find_kernel(std::string_view structure, std::string_view leaf,
+                                           std::string_view intersector, std::string_view box,
+                                           std::string_view traversal, Isa isa);
 /// The leaf that a cell uses when the configuration names none; empty when the structure has no kernel for the rest.
 [[nodiscard]] std::string_view default_leaf(std::string_view structure, std::string_view intersector, Isa isa);
 /// One line: why there is no such row ("pluecker needs vertices: leaf triangle4v", ...). Empty when there is one.

@@ -16,15 +16,16 @@ struct LaneRays {
   std::uint64_t negative[3];   ///< by axis: the direction is negative, or -0
 
  protected:
-  /// Of `count` rays, 1 to kMost, of which `ray_at(i)` is the i-th; lanes up to the next multiple of W hold no ray. `each(k)` is called for k = 0, W, 2 W ...
-  /// when the W rays from k on stand in `rays`.
+  /// Of `count` rays, 1 to kMost, of which `ray_at(i)` is the i-th; lanes up to the next multiple of W hold no ray.
+  /// `each(k)` is called for k = 0, W, 2 W ... when the W rays from k on stand in `rays`.
   template <int W, class RayAt, class Each>
   ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, const Each& each) {
     place(count, ray_at);
     valid = negative[0] = negative[1] = negative[2] = 0;
     for (int k = 0; k < count; k += W) {
       valid |= std::uint64_t(are_rays<W>(k).bits()) << k;
-      for (int a = 0; a < 3; ++a) negative[a] |= std::uint64_t((sign_bits(vf<W>::load(rays.direction[a] + k)) < vi<W>(0)).bits()) << k;
+      for (int a = 0; a < 3; ++a)
+        negative[a] |= std::uint64_t((sign_bits(vf<W>::load(rays.direction[a] + k)) < vi<W>(0)).bits()) << k;
       each(k);
     }
     valid &= count == kMost ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
@@ -57,7 +58,8 @@ struct LaneRays {
     vm<W> finite = F::load(rays.tnear + k) <= F::load(t + k), moves(false);
     for (int a = 0; a < 3; ++a) {
       const F d = F::load(rays.direction[a] + k);
-      finite = finite & (abs(F::load(rays.origin[a] + k)) < infinity) & (abs(d) < infinity), moves = moves | (d != F(0.0f));
+      finite = finite & (abs(F::load(rays.origin[a] + k)) < infinity) & (abs(d) < infinity),
+      moves = moves | (d != F(0.0f));
     }
     return finite & moves;
   }

@@ -1,7 +1,9 @@
-// How a kernel tests its leaves: by the functions of the table of leaf tests, or with one block's and intersector's compiled in.
+// How a kernel tests its leaves: by the functions of the table of leaf tests, or with one block's and intersector's
+// compiled in.
 //
-// A call costs a kernel what it keeps in registers, since none survives one: 1 to 2 % of a ray in bvh8 on AVX2, 6 to 8 % in bvh16 on AVX-512, whose
-// 32 registers otherwise hold a ray throughout (docs/performance.md). Compiling everything in would cost minutes of build time.
+// A call costs a kernel what it keeps in registers, since none survives one: 1 to 2 % of a ray in bvh8 on AVX2, 6 to 8
+// % in bvh16 on AVX-512, whose 32 registers otherwise hold a ray throughout (docs/performance.md). Compiling everything
+// in would cost minutes of build time.
 #pragma once
 
 #include "intersectors/leaf_block.h"
@@ -21,7 +23,8 @@ struct CalledLeaves {
     tests->prepare(ray, data);
     return data;
   }
-  ARBORETUM_INLINE bool closest_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, NearestHit& best) const {
+  ARBORETUM_INLINE bool closest_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear,
+                                    NearestHit& best) const {
     return tests->closest_hit(data, blocks, count, vertices, tnear, best);
   }
   ARBORETUM_INLINE bool any_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, float tfar) const {
@@ -46,7 +49,8 @@ struct CompiledLeaves {
 
   CompiledLeaves(const KernelRow&, const Vec3f* mesh_vertices) : vertices(mesh_vertices) {}
   ARBORETUM_INLINE RayData prepare(const Ray& ray) const { return RayData(ray); }
-  ARBORETUM_INLINE bool closest_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, NearestHit& best) const {
+  ARBORETUM_INLINE bool closest_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear,
+                                    NearestHit& best) const {
     return Tests::closest_hit(data, blocks, count, vertices, tnear, best);
   }
   ARBORETUM_INLINE bool any_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, float tfar) const {
@@ -65,27 +69,36 @@ struct CompiledLeaves {
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
 
-/// Tests a leaf with `rays`, a bit each: one ray after the other, or one block after the other where that is better. `ray(i)` and `data(i)`: the i-th ray and what
-/// the intersector keeps for it. Of any hit `hit(i)` is called once, for one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
+/// Tests a leaf with `rays`, a bit each: one ray after the other, or one block after the other where that is better.
+/// `ray(i)` and `data(i)`: the i-th ray and what the intersector keeps for it. Of any hit `hit(i)` is called once, for
+/// one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
 template <bool AnyHit, class Leaves, class Counting, class RayAt, class DataOf, class BestOf, class OnHit>
-ARBORETUM_INLINE void test_leaf(const Leaves& leaves, [[maybe_unused]] const LeafForm& form, [[maybe_unused]] const Counting& counting, const std::byte* blocks, unsigned count, std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best,
+ARBORETUM_INLINE void test_leaf(const Leaves& leaves, [[maybe_unused]] const LeafForm& form,
+                                [[maybe_unused]] const Counting& counting, const std::byte* blocks, unsigned count,
+                                std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best,
                                 const OnHit& hit) {
   if constexpr (Leaves::kBlockByBlock) {
-    test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks), count, rays, ray, data, best, hit);
+    test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks),
+                                                              count, rays, ray, data, best, hit);
   } else {
     for (; rays; rays &= rays - 1) {
       const int i = __builtin_ctzll(rays);
       if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
       const Ray& r = ray(i);
       auto&& of_ray = data(i);
-      if (AnyHit ? leaves.any_hit(of_ray, blocks, count, r.tnear, r.tfar) : leaves.closest_hit(of_ray, blocks, count, r.tnear, best(i))) hit(i);
+      if (AnyHit ? leaves.any_hit(of_ray, blocks, count, r.tnear, r.tfar)
+                 : leaves.closest_hit(of_ray, blocks, count, r.tnear, best(i)))
+        hit(i);
     }
   }
 }
 
-/// Where the intersector can finish the hits of several rays together (intersectors/round_later.h), what they wait in; else nothing.
+/// Where the intersector can finish the hits of several rays together (intersectors/round_later.h), what they wait in;
+/// else nothing.
 template <class Leaves>
-inline constexpr bool kFinishesLater = requires { typename Leaves::Intersector::Unfinished; };
+inline constexpr bool kFinishesLater = requires {
+  typename Leaves::Intersector::Unfinished;
+};
 struct NothingUnfinished {};
 template <class Leaves, bool Later = kFinishesLater<Leaves>>
 struct UnfinishedOf {

@@ -1,11 +1,13 @@
 // Which triangles of a block no ray of a packet can hit, found for all rays at once.
 //
-// With C = v0 - o, A = e2 x C, B = e1 x C, N = e2 x e1 (as in intersectors/moller_trumbore.h) a ray of direction d meets the triangle only where
-// A.d, B.d and (N - A - B).d have the sign of N.d or are zero. Origins and directions are boxes: centre and half extent. Each of these products then lies
-// within a radius about its value at the centres; where all of one is beyond zero on the wrong side no ray of the packet meets the triangle. What an
-// intersector computes is off the exact value by some 20 u (|C| + |e|)^2 |d|, u = 2^-24, whether its form is this one or the sheared one
-// of intersectors/watertight.h; the radius is widened by 2^-17 of the same. The products do not change along a line, so any point of each ray may stand for its origin
-// as long as that width is of the origin's C. So no triangle is left out that an intersector would hit.
+// With C = v0 - o, A = e2 x C, B = e1 x C, N = e2 x e1 (as in intersectors/moller_trumbore.h) a ray of direction d
+// meets the triangle only where A.d, B.d and (N - A - B).d have the sign of N.d or are zero. Origins and directions are
+// boxes: centre and half extent. Each of these products then lies within a radius about its value at the centres; where
+// all of one is beyond zero on the wrong side no ray of the packet meets the triangle. What an intersector computes is
+// off the exact value by some 20 u (|C| + |e|)^2 |d|, u = 2^-24, whether its form is this one or the sheared one of
+// intersectors/watertight.h; the radius is widened by 2^-17 of the same. The products do not change along a line, so
+// any point of each ray may stand for its origin as long as that width is of the origin's C. So no triangle is left out
+// that an intersector would hit.
 #pragma once
 
 #include "intersectors/triangle_hits.h"
@@ -16,7 +18,8 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Origins and directions of a packet by axis: centre and half extent, rounded up.
 struct PacketInterval {
   float origin[3], origin_half[3], direction[3], direction_half[3];
-  float reach = 0.0f;  ///< how far the rays' origins are at most (sum over the axes) from points on their lines that stand in `origin` instead
+  float reach = 0.0f;  ///< how far the rays' origins are at most (sum over the axes) from points on their lines that
+                       ///< stand in `origin` instead
 
   void set_axis(int a, float o_low, float o_high, float d_low, float d_high) {
     const auto half = [](float low, float high, float centre) {
@@ -40,7 +43,9 @@ template <class Block>
   const auto sum = [](V a) { return a.x + a.y + a.z; };
   const auto plus = [](V a, V b) { return V{a.x + b.x, a.y + b.y, a.z + b.z}; };
   /// |a x b| at most, for |a| and |b|.
-  const auto cross_bound = [](V a, V b) { return V{a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x}; };
+  const auto cross_bound = [](V a, V b) {
+    return V{a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x};
+  };
 
   const V v0 = load(block.v0);
   V e1, e2;

@@ -1,6 +1,6 @@
-// Up to 64 rays as structures of arrays with what they have met, and how those of a mask meet a leaf: one ray after the other, or, where the
-// intersector can, the leaf's triangles against many rays in lanes, those first left out that no ray of the packet can hit
-// (traversal/packet_interval.h). Each ray gets the bits that it would get alone.
+// Up to 64 rays as structures of arrays with what they have met, and how those of a mask meet a leaf: one ray after the
+// other, or, where the intersector can, the leaf's triangles against many rays in lanes, those first left out that no
+// ray of the packet can hit (traversal/packet_interval.h). Each ray gets the bits that it would get alone.
 #pragma once
 
 #include "traversal/lane_rays.h"
@@ -17,7 +17,8 @@ class PacketLeaves {
   static constexpr int kMost = LaneRays::kMost;
   using Mask = std::uint64_t;
 
-  PacketLeaves(const KernelRow& row, const Vec3f* vertices, Counting counting) : leaves_(row, vertices), form_(*row.tests->form), counting_(counting) {}
+  PacketLeaves(const KernelRow& row, const Vec3f* vertices, Counting counting)
+      : leaves_(row, vertices), form_(*row.tests->form), counting_(counting) {}
 
   [[nodiscard]] const NearestHit& best(int i) const { return best_[i]; }
   /// Of all packets so far, how often a ray went on alone.
@@ -27,10 +28,12 @@ class PacketLeaves {
   using F = vf<W>;
   static constexpr unsigned kAll = (1u << W) - 1u;
 
-  /// Traces `count` rays, 1 to kMost; their hits are then in best(). `prepare(ray_at, each)` hands these to the prepare() of lanes_; `traverse(mask, octant)` is called
-  /// for the valid rays of each octant that has some. Where no more than `threshold` rays are in a node they may go on alone.
+  /// Traces `count` rays, 1 to kMost; their hits are then in best(). `prepare(ray_at, each)` hands these to the
+  /// prepare() of lanes_; `traverse(mask, octant)` is called for the valid rays of each octant that has some. Where no
+  /// more than `threshold` rays are in a node they may go on alone.
   template <class Prepare, class Traverse>
-  ARBORETUM_INLINE void trace(const Ray* rays, int count, int threshold, const Prepare& prepare, const Traverse& traverse) {
+  ARBORETUM_INLINE void trace(const Ray* rays, int count, int threshold, const Prepare& prepare,
+                              const Traverse& traverse) {
     threshold_ = threshold;
     if constexpr (Counting::kCounting) ++counting_.counters.packets, rays_of_packet_ = unsigned(count);
     load(rays, count, prepare);
@@ -45,7 +48,8 @@ class PacketLeaves {
   /// Too few rays for the packet to go on with.
   ARBORETUM_INLINE bool few(Mask mask) const { return __builtin_popcountll(mask) <= threshold_; }
 
-  /// The rays of `mask` leave the packet: search(i, data) is ray i's search of what is left, as single rays' is, and returns whether it is occluded.
+  /// The rays of `mask` leave the packet: search(i, data) is ray i's search of what is left, as single rays' is, and
+  /// returns whether it is occluded.
   template <class Search>
   ARBORETUM_INLINE void go_on_alone(Mask mask, const Search& search) {
     const auto count = unsigned(__builtin_popcountll(mask));
@@ -71,7 +75,8 @@ class PacketLeaves {
     if constexpr (!Leaves::kRaysInLanes) {
       for (Mask rest = lanes_.valid; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
-        new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(rays_[i]));
+        new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData)))
+            std::remove_const_t<RayData>(leaves_.prepare(rays_[i]));
       }
     }
   }
@@ -110,9 +115,10 @@ class PacketLeaves {
     return high;
   }
 
-  /// Before leaves are met by rays of `group`: for each axis, the interval of their origins, or of points on their lines that are no farther from those than
-  /// `spread_.reach`.
-  void set_axis([[maybe_unused]] int axis, [[maybe_unused]] float o_low, [[maybe_unused]] float o_high, [[maybe_unused]] Mask group) {
+  /// Before leaves are met by rays of `group`: for each axis, the interval of their origins, or of points on their
+  /// lines that are no farther from those than `spread_.reach`.
+  void set_axis([[maybe_unused]] int axis, [[maybe_unused]] float o_low, [[maybe_unused]] float o_high,
+                [[maybe_unused]] Mask group) {
     if constexpr (Leaves::kRaysInLanes) {
       float d_low, d_high;
       range(lanes_.rays.direction[axis], group, d_low, d_high);
@@ -122,7 +128,8 @@ class PacketLeaves {
 
   static ARBORETUM_INLINE unsigned lanes_of(Mask mask, int chunk) { return unsigned(mask >> (chunk * W)) & kAll; }
 
-  /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever it is asked for.
+  /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever
+  /// it is asked for.
   ARBORETUM_INLINE decltype(auto) data(int i) {
     if constexpr (Leaves::kRaysInLanes) {
       return packet_.alone(rays_[i], i);
@@ -140,7 +147,8 @@ class PacketLeaves {
       Mask others = 0;
       for (int c = 0; c < chunks_; ++c) {
         vm<W> same(true);
-        for (const auto& origin : lanes_.rays.origin) same = same & (vi<W>::load(origin + c * W) == vi<W>(__builtin_bit_cast(std::int32_t, origin[origin_of_])));
+        for (const auto& origin : lanes_.rays.origin)
+          same = same & (vi<W>::load(origin + c * W) == vi<W>(__builtin_bit_cast(std::int32_t, origin[origin_of_])));
         others |= ~same.bits() & lanes_of(group, c);
       }
       common_origin_ = others == 0;
@@ -179,8 +187,9 @@ class PacketLeaves {
         lanes_.t[i] = best_[i].t;
       }
     };
-    test_leaf<AnyHit>(leaves_, form_, counting_, blocks, count, mask, [this](int i) -> const Ray& { return rays_[i]; }, [this](int i) -> decltype(auto) { return data(i); },
-                      [this](int i) -> NearestHit& { return best_[i]; }, hit);
+    test_leaf<AnyHit>(
+        leaves_, form_, counting_, blocks, count, mask, [this](int i) -> const Ray& { return rays_[i]; },
+        [this](int i) -> decltype(auto) { return data(i); }, [this](int i) -> NearestHit& { return best_[i]; }, hit);
   }
 
   /// One block against the rays of `mask`, those of its triangles left out that none of them can hit.
@@ -196,12 +205,14 @@ class PacketLeaves {
           for (; rays; rays &= rays - 1) {
             const int i = __builtin_ctzll(rays);
             auto&& ray = data(i);
-            if (closest_hit_block<typename Leaves::Intersector>(ray, seen, rays_[i].tnear, best_[i])) lanes_.t[i] = best_[i].t;
+            if (closest_hit_block<typename Leaves::Intersector>(ray, seen, rays_[i].tnear, best_[i]))
+              lanes_.t[i] = best_[i].t;
           }
         });
       }
     }
-    test_triangles(block, triangles, mask, [&](Mask rays) { one_by_one(reinterpret_cast<const std::byte*>(&block), 1, rays); });
+    test_triangles(block, triangles, mask,
+                   [&](Mask rays) { one_by_one(reinterpret_cast<const std::byte*>(&block), 1, rays); });
   }
 
   /// The triangles in lanes for each ray, or rays in lanes for each triangle, whichever is less work.
@@ -209,7 +220,8 @@ class PacketLeaves {
   ARBORETUM_INLINE void test_triangles(const Block& block, unsigned triangles, Mask mask, const OneByOne& each_alone) {
     int chunks = 0;
     for (int c = 0; c < chunks_; ++c) chunks += lanes_of(mask, c) != 0;
-    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth)) return each_alone(mask);
+    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth))
+      return each_alone(mask);
     Mask again = 0;
     for (; triangles; triangles &= triangles - 1) {
       const int i = __builtin_ctz(triangles);
@@ -231,10 +243,12 @@ class PacketLeaves {
       if (in == 0) continue;
       TriangleHits<W> hits;
       vm<W> redo;
-      const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, block, triangle, hits, redo);
+      const vm<W> inside =
+          Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, block, triangle, hits, redo);
       again |= Mask(redo.bits() & in) << k;
       if ((inside.bits() & in) == 0) continue;
-      unsigned hit = in & (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
+      unsigned hit =
+          in & (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
       if (hit == 0) continue;
       alignas(64) float t[W], u[W], v[W], denominator[W];
       hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
@@ -244,7 +258,8 @@ class PacketLeaves {
           occluded(i);
         } else {
           NearestHit& best = best_[i];
-          if (t[lane] < best.t || id < best.primitive) best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, lanes_.t[i] = t[lane];
+          if (t[lane] < best.t || id < best.primitive)
+            best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, lanes_.t[i] = t[lane];
         }
       }
     }
@@ -255,9 +270,9 @@ class PacketLeaves {
   const LeafForm& form_;
   Counting counting_;
   const Ray* rays_ = nullptr;
-  int chunks_ = 0;       ///< registers that the rays take
+  int chunks_ = 0;               ///< registers that the rays take
   unsigned rays_of_packet_ = 0;  ///< where they are counted
-  Mask active_ = 0;      ///< rays whose search is not over (any hit)
+  Mask active_ = 0;              ///< rays whose search is not over (any hit)
   Rays lanes_;
   NearestHit best_[kMost];
 
@@ -267,7 +282,8 @@ class PacketLeaves {
   struct PacketOf {
     using type = typename L::Intersector::PacketData;
   };
-  using Packet = typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
+  using Packet =
+      typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
   alignas(64) std::byte data_[Leaves::kRaysInLanes ? 1 : kMost * sizeof(RayData)];
   Packet packet_;
   bool common_origin_ = false;

@@ -7,22 +7,31 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone. `Family::Packets<W, Leaves, AnyHit, Counting>` is the
-/// class for packets of W rays a register through a `Family::Structure`.
+/// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone.
+/// `Family::Packets<W, Leaves, AnyHit, Counting>` is the class for packets of W rays a register through a
+/// `Family::Structure`.
 template <class Family, int W, class Leaves, class Counting>
 struct PacketBatch {
-  static __attribute__((noinline)) std::size_t closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters, int rays_each, int threshold) {
-    return packets<false>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+  static __attribute__((noinline)) std::size_t closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays,
+                                                           std::span<Hit> hits, Counters* counters, int rays_each,
+                                                           int threshold) {
+    return packets<false>(accel, row, rays, counters, rays_each, threshold,
+                          [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
   }
-  static __attribute__((noinline)) std::size_t any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters, int rays_each,
-                                                int threshold) {
-    return packets<true>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
+  static __attribute__((noinline)) std::size_t any_hit(const Accel& accel, const KernelRow& row, RayBatch rays,
+                                                       std::span<std::uint8_t> occluded, Counters* counters,
+                                                       int rays_each, int threshold) {
+    return packets<true>(accel, row, rays, counters, rays_each, threshold, [&](std::size_t i, const NearestHit& best) {
+      occluded[i] = best.primitive != NearestHit::kNone;
+    });
   }
 
  private:
   template <bool AnyHit, class Report>
-  static ARBORETUM_INLINE std::size_t packets(const Accel& accel, const KernelRow& row, RayBatch rays, Counters* counters, int rays_each, int threshold, const Report& report) {
-    typename Family::template Packets<W, Leaves, AnyHit, Counting> packet(static_cast<const typename Family::Structure&>(accel), row, Counting(counters));
+  static ARBORETUM_INLINE std::size_t packets(const Accel& accel, const KernelRow& row, RayBatch rays,
+                                              Counters* counters, int rays_each, int threshold, const Report& report) {
+    typename Family::template Packets<W, Leaves, AnyHit, Counting> packet(
+        static_cast<const typename Family::Structure&>(accel), row, Counting(counters));
     for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
       const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
       packet.trace(&rays[begin], count, threshold);
@@ -33,22 +42,29 @@ struct PacketBatch {
   }
 };
 
-/// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone. Of `Hybrid` ones the batch may set it.
+/// Packets of `Rays` rays; with no more than `Threshold` of them in a node they go on alone. Of `Hybrid` ones the batch
+/// may set it.
 template <class Family, int Rays, int Threshold, bool Hybrid = false>
 struct PacketFunctions {
   static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
 
   template <class Batch>
   static RowFunctions functions() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) { Batch::closest_hit(a, row, rays, hits, c, Rays, threshold(rays)); },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* c) { Batch::any_hit(a, row, rays, occluded, c, Rays, threshold(rays)); }};
+    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) {
+              Batch::closest_hit(a, row, rays, hits, c, Rays, threshold(rays));
+            },
+            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* c) {
+              Batch::any_hit(a, row, rays, occluded, c, Rays, threshold(rays));
+            }};
   }
   static int threshold(const RayBatch& rays) {
-    return Hybrid ? int(std::min(TraversalSettings::chosen(rays.settings.hybrid_threshold, Threshold), unsigned(Rays))) : Threshold;
+    return Hybrid ? int(std::min(TraversalSettings::chosen(rays.settings.hybrid_threshold, Threshold), unsigned(Rays)))
+                  : Threshold;
   }
   template <class Leaves, bool>
   static RowFunctions timed() {
-    return functions<PacketBatch<Family, Family::kFewerLanes && Rays < kNative ? Rays : kNative, Leaves, NoCounters>>();
+    return functions < PacketBatch < Family, Family::kFewerLanes && Rays < kNative ? Rays : kNative, Leaves,
+           NoCounters >> ();
   }
   /// What is visited does not depend on the lanes.
   template <bool>
@@ -57,7 +73,8 @@ struct PacketFunctions {
   }
 };
 
-/// `Compiled`: what packet32 and packet64 have compiled in. `Family::kFewerLanes`: packets of fewer rays than a register holds have narrower registers.
+/// `Compiled`: what packet32 and packet64 have compiled in. `Family::kFewerLanes`: packets of fewer rays than a
+/// register holds have narrower registers.
 template <class Structure, class Family, class Compiled>
 void add_packet_rows(KernelRows& rows, Compiled compiled) {
   add_rows<Structure, PacketFunctions<Family, 4, 0>>(rows, "packet4", TypeList<>{});

@@ -1,7 +1,9 @@
-// From many rays in flight to the functions and rows of the kernel table: how many are in flight, and the counting pass.
+// From many rays in flight to the functions and rows of the kernel table: how many are in flight, and the counting
+// pass.
 //
-// Queue<Leaves, Padded, AnyHit> has a constructor (const Accel&, const KernelRow&, RayBatch, unsigned in_flight) and run(report, counting), which
-// reports each ray's index and nearest hit and counts the lengths of its queues (traversal/counting.h).
+// Queue<Leaves, Padded, AnyHit> has a constructor (const Accel&, const KernelRow&, RayBatch, unsigned in_flight) and
+// run(report, counting), which reports each ray's index and nearest hit and counts the lengths of its queues
+// (traversal/counting.h).
 #pragma once
 
 #include "traversal/kernel_rows.h"
@@ -14,41 +16,50 @@ inline constexpr unsigned kMostInFlight = 64;
 
 /// Queue is of closest hit.
 template <class Queue, class Counting>
-void queued_closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<Hit> hits, Counters* counters) {
+void queued_closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight,
+                        std::span<Hit> hits, Counters* counters) {
   Queue queue(accel, row, rays, in_flight);
   queue.run([&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); }, Counting(counters));
 }
 
 /// Queue is of any hit.
 template <class Queue, class Counting>
-void queued_any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight, std::span<std::uint8_t> occluded, Counters* counters) {
+void queued_any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight,
+                    std::span<std::uint8_t> occluded, Counters* counters) {
   Queue queue(accel, row, rays, in_flight);
-  queue.run([&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; }, Counting(counters));
+  queue.run([&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; },
+            Counting(counters));
 }
 
-/// `Closest` and `Any` rays in flight for the two kinds of query, or as many as the batch sets where it `Chooses`. A ray visits the same nodes and
-/// leaves in the same order as alone, so the counting functions of `Single` count those.
-template <template <class, bool, bool> class Queue, class Single, unsigned Closest, unsigned Any = Closest, bool Chooses = false>
+/// `Closest` and `Any` rays in flight for the two kinds of query, or as many as the batch sets where it `Chooses`. A
+/// ray visits the same nodes and leaves in the same order as alone, so the counting functions of `Single` count those.
+template <template <class, bool, bool> class Queue, class Single, unsigned Closest, unsigned Any = Closest,
+          bool Chooses = false>
 struct QueuedFunctions {
   /// How many rays are in flight is all that the rows differ in: the loops are compiled once.
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
     return {[](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters*) {
-              queued_closest_hit<Queue<Leaves, Padded, false>, NoCounters>(accel, row, rays, in_flight(rays, Closest), hits, nullptr);
+              queued_closest_hit<Queue<Leaves, Padded, false>, NoCounters>(accel, row, rays, in_flight(rays, Closest),
+                                                                           hits, nullptr);
             },
             [](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters*) {
-              queued_any_hit<Queue<Leaves, Padded, true>, NoCounters>(accel, row, rays, in_flight(rays, Any), occluded, nullptr);
+              queued_any_hit<Queue<Leaves, Padded, true>, NoCounters>(accel, row, rays, in_flight(rays, Any), occluded,
+                                                                      nullptr);
             }};
   }
   template <bool Padded>
   static RowFunctions counting() {
     return {[](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
               Single::template counting<Padded>().closest_hit(accel, row, rays, hits, counters);
-              queued_closest_hit<Queue<CalledLeaves, Padded, false>, WithCounters>(accel, row, rays, in_flight(rays, Closest), hits, counters);
+              queued_closest_hit<Queue<CalledLeaves, Padded, false>, WithCounters>(
+                  accel, row, rays, in_flight(rays, Closest), hits, counters);
             },
-            [](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+            [](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded,
+               Counters* counters) {
               Single::template counting<Padded>().any_hit(accel, row, rays, occluded, counters);
-              queued_any_hit<Queue<CalledLeaves, Padded, true>, WithCounters>(accel, row, rays, in_flight(rays, Any), occluded, counters);
+              queued_any_hit<Queue<CalledLeaves, Padded, true>, WithCounters>(accel, row, rays, in_flight(rays, Any),
+                                                                              occluded, counters);
             }};
   }
 
@@ -58,7 +69,8 @@ struct QueuedFunctions {
   }
 };
 
-/// `queued` with the numbers of rays in flight that paid most (docs/performance.md) or that the batch sets, and rows with fixed numbers.
+/// `queued` with the numbers of rays in flight that paid most (docs/performance.md) or that the batch sets, and rows
+/// with fixed numbers.
 template <class Structure, template <class, bool, bool> class Queue, class Single, class... Compiled>
 void add_queued_rows(KernelRows& rows, TypeList<Compiled...> leaves) {
   add_rows<Structure, QueuedFunctions<Queue, Single, 32, 64, true>>(rows, "queued", leaves);

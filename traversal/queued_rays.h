@@ -1,21 +1,20 @@
 // Queued traversal: K rays of a batch in flight, their next steps in two queues, one of nodes, one of leaves.
 //
-// A step of one ray waits some fifty cycles for memory and mispredicted branches. Here a step only says what the ray needs next:
-// the target's cache lines are asked for and {ray, target} is put on the queue of its kind, so that by the time it is its turn the
-// lines are there, and the steps of a queue are independent of each other and all of one kind. Every ray keeps its own stack and
-// visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however many rays are in flight.
+// A step of one ray waits some fifty cycles for memory and mispredicted branches. Here a step only says what the ray
+// needs next: the target's cache lines are asked for and {ray, target} is put on the queue of its kind, so that by the
+// time it is its turn the lines are there, and the steps of a queue are independent of each other and all of one kind.
+// Every ray keeps its own stack and visits nodes in the very order of single-ray traversal: the answers are the same to
+// the bit, however many rays are in flight.
 //
 // What a structure brings is a Walk:
 //   static constexpr bool kAnyHit; using Target, Entry (of a ray's stack), State, Leaves
 //   Walk(const Accel&, const KernelRow&)
 //   std::size_t stack_entries() const;
-//   void start(void* state, const Ray&, Entry* stack) const;      makes a State with members `best` (NearestHit) and `data` (Leaves::RayData)
-//   Target first(State&) const;
-//   static unsigned kind(Target);                                   0 a node, 1 a leaf, 2 nothing is left
-//   void prefetch(Target) const;
-//   Target node(State&, Target) const;                              what comes after this step
-//   Target leaf(State&, Target, Entry* stack) const;
-//   void finish(State&) const;                                      before a ray's closest hit is reported
+//   void start(void* state, const Ray&, Entry* stack) const;      makes a State with members `best` (NearestHit) and
+//   `data` (Leaves::RayData) Target first(State&) const; static unsigned kind(Target); 0 a node, 1 a leaf, 2 nothing is
+//   left void prefetch(Target) const; Target node(State&, Target) const;                              what comes after
+//   this step Target leaf(State&, Target, Entry* stack) const; void finish(State&) const; before a ray's closest hit is
+//   reported
 #pragma once
 
 #include "traversal/queued_functions.h"
@@ -28,7 +27,8 @@ class QueuedRays {
  public:
   /// `in_flight`: 1 to kMostInFlight.
   QueuedRays(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight)
-      : in_flight_(in_flight), walk_(accel, row), rays_(rays), stride_(stride_of(walk_.stack_entries())), stacks_(stride_ * in_flight) {}
+      : in_flight_(in_flight), walk_(accel, row), rays_(rays), stride_(stride_of(walk_.stack_entries())),
+        stacks_(stride_ * in_flight) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report, class Counting>
@@ -62,7 +62,8 @@ class QueuedRays {
     Target target;
   };
 
-  /// Stacks lie an odd number of cache lines apart where entries fill lines, and nearly so where they do not, so that they do not share sets of the cache.
+  /// Stacks lie an odd number of cache lines apart where entries fill lines, and nearly so where they do not, so that
+  /// they do not share sets of the cache.
   [[nodiscard]] static std::size_t stride_of(std::size_t entries) {
     static_assert(sizeof(Entry) <= 64);
     constexpr std::size_t line = 64 / sizeof(Entry);
@@ -75,7 +76,8 @@ class QueuedRays {
   struct Tails {
     QueuedRays& q;
     unsigned node, leaf, done;
-    ARBORETUM_INLINE explicit Tails(QueuedRays& queued) : q(queued), node(queued.counts_[0]), leaf(queued.counts_[1]), done(queued.counts_[2]) {}
+    ARBORETUM_INLINE explicit Tails(QueuedRays& queued)
+        : q(queued), node(queued.counts_[0]), leaf(queued.counts_[1]), done(queued.counts_[2]) {}
     ARBORETUM_INLINE ~Tails() { q.counts_[0] = node, q.counts_[1] = leaf, q.counts_[2] = done; }
 
     /// Asks for the lines of the target and puts the step on the queue of its kind.
@@ -109,7 +111,8 @@ class QueuedRays {
     Step steps[kMostInFlight];
     std::memcpy(steps, queues_[0], count * sizeof(Step));
     Tails tails(*this);
-    for (unsigned i = 0; i < count; ++i) tails.route(steps[i].slot, walk_.node(slot_of(steps[i].slot).state, steps[i].target));
+    for (unsigned i = 0; i < count; ++i)
+      tails.route(steps[i].slot, walk_.node(slot_of(steps[i].slot).state, steps[i].target));
   }
 
   void step_leaves() {

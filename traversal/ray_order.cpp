@@ -15,7 +15,8 @@ namespace {
 constexpr unsigned kCellBits = 8, kIndexBits = 32;
 
 std::uint32_t octant_of(Vec3f d) noexcept {
-  return std::uint32_t(std::signbit(d.x)) << 2 | std::uint32_t(std::signbit(d.y)) << 1 | std::uint32_t(std::signbit(d.z));
+  return std::uint32_t(std::signbit(d.x)) << 2 | std::uint32_t(std::signbit(d.y)) << 1 |
+         std::uint32_t(std::signbit(d.z));
 }
 
 }  // namespace
@@ -36,7 +37,8 @@ std::vector<std::uint32_t> ray_order(RayBatch rays) {
   MeteredVector<std::uint64_t> keys(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Vec3f o = rays[i].origin;
-    const std::uint64_t place = morton_code(cell(o.x, origins.lower.x), cell(o.y, origins.lower.y), cell(o.z, origins.lower.z));
+    const std::uint64_t place =
+        morton_code(cell(o.x, origins.lower.x), cell(o.y, origins.lower.y), cell(o.z, origins.lower.z));
     keys[i] = (std::uint64_t(octant_of(rays[i].direction)) << 3 * kCellBits | place) << kIndexBits | i;
   }
   tbb::task_arena(1).execute([&] { radix_sort(keys, kIndexBits, kIndexBits + 3 * kCellBits + 3); });

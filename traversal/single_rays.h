@@ -1,9 +1,10 @@
 // One ray after the other: from a kernel that traces one ray to the functions and rows of the kernel table.
 //
-// Kernel<Leaves, Padded, Counting> has a constructor (const Accel&, const KernelRow&, Counting), called once a batch, and
+// Kernel<Leaves, Padded, Counting> has a constructor (const Accel&, const KernelRow&, Counting), called once a batch,
+// and
 //   template <bool AnyHit> bool trace(const Ray& ray, float time, NearestHit& best)
-// for valid rays: any hit returns whether there is one, closest hit updates `best`. It may have settle(Hit&), the hit of the ray just traced, and
-// finish_all(): t, u and v of hits are then final when that has been called.
+// for valid rays: any hit returns whether there is one, closest hit updates `best`. It may have settle(Hit&), the hit
+// of the ray just traced, and finish_all(): t, u and v of hits are then final when that has been called.
 #pragma once
 
 #include "traversal/leaves.h"
@@ -13,7 +14,8 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 template <class Kernel, class Counting>
 struct SingleRays {
-  static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+  static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits,
+                          Counters* counters) {
     const Counting counting(counters);
     Kernel kernel(accel, row, counting);
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -25,7 +27,8 @@ struct SingleRays {
     if constexpr (requires { kernel.finish_all(); }) kernel.finish_all();
     if constexpr (Counting::kCounting) counters->rays += rays.size();
   }
-  static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+  static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded,
+                      Counters* counters) {
     const Counting counting(counters);
     Kernel kernel(accel, row, counting);
     for (std::size_t i = 0; i < rays.size(); ++i) {

@@ -36,18 +36,14 @@ struct DoubleDouble {
   return {p, ((ah * bh - p) + ah * bl + al * bh) + al * bl};
 }
 
-[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a) noexcept {
-  return {-a.hi, -a.lo};
-}
+[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a) noexcept { return {-a.hi, -a.lo}; }
 
 [[nodiscard]] inline DoubleDouble operator+(DoubleDouble a, DoubleDouble b) noexcept {
   const DoubleDouble s = two_sum(a.hi, b.hi), t = two_sum(a.lo, b.lo);
   const DoubleDouble v = fast_two_sum(s.hi, s.lo + t.hi);
   return fast_two_sum(v.hi, t.lo + v.lo);
 }
-[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a, DoubleDouble b) noexcept {
-  return a + -b;
-}
+[[nodiscard]] inline DoubleDouble operator-(DoubleDouble a, DoubleDouble b) noexcept { return a + -b; }
 
 [[nodiscard]] inline DoubleDouble operator*(DoubleDouble a, DoubleDouble b) noexcept {
   const DoubleDouble p = two_product(a.hi, b.hi);

@@ -55,9 +55,7 @@ IntegerTriple difference(const IntegerTriple& a, const IntegerTriple& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-int sign_of(const ExactInteger& x) {
-  return x.sign() > 0 ? 1 : x.sign() < 0 ? -1 : 0;
-}
+int sign_of(const ExactInteger& x) { return x.sign() > 0 ? 1 : x.sign() < 0 ? -1 : 0; }
 
 /// Points in multiples of 2^point_exponent, the direction in multiples of 2^direction_exponent: small common
 /// scales keep the integers of ordinary scenes within a few machine words.
@@ -95,8 +93,7 @@ int compare_scaled(const ExactInteger& a, int a_exponent, const ExactInteger& b,
 int compare(const ExactFraction& a, const ExactFraction& b) {
   const int sign_a = sign_of(a.numerator), sign_b = sign_of(b.numerator);
   if (sign_a != sign_b) return sign_a < sign_b ? -1 : 1;
-  const int c =
-      compare_scaled(a.numerator * b.denominator, a.exponent, b.numerator * a.denominator, b.exponent);
+  const int c = compare_scaled(a.numerator * b.denominator, a.exponent, b.numerator * a.denominator, b.exponent);
   return c > 0 ? 1 : c < 0 ? -1 : 0;
 }
 

@@ -34,7 +34,8 @@ struct ExactFraction {
 /// Correctly rounded, ties to even; infinity beyond the float32 range.
 [[nodiscard]] float round_to_float(const ExactFraction& a);
 
-/// The line that a ray lies on. The origin may have more digits than float32 has, but is on its grid: a multiple of 2^-149 below 2^128.
+/// The line that a ray lies on. The origin may have more digits than float32 has, but is on its grid: a multiple of
+/// 2^-149 below 2^128.
 struct ExactLine {
   std::array<double, 3> origin;
   Vec3f direction;

@@ -1,8 +1,8 @@
-// Error bounds. u = 2^-53. Every operand is a float32, a multiple of 2^-149 below 2^128 in size (an origin with more digits is
-// one too, and whatever is said of differences holds for it: they are rounded once, and exact as double-doubles); so every
-// value of degree three here is 0 or between 2^-447 and 2^390, a quotient of two such between 2^-840 and
-// 2^840, and the low parts of double-doubles are multiples of the same grids: nothing under- or overflows and
-// relative bounds hold throughout.
+// Error bounds. u = 2^-53. Every operand is a float32, a multiple of 2^-149 below 2^128 in size (an origin with more
+// digits is one too, and whatever is said of differences holds for it: they are rounded once, and exact as
+// double-doubles); so every value of degree three here is 0 or between 2^-447 and 2^390, a quotient of two such between
+// 2^-840 and 2^840, and the low parts of double-doubles are multiples of the same grids: nothing under- or overflows
+// and relative bounds hold throughout.
 //
 // det[p, q, r] in doubles: p and q are differences of float32 numbers (one rounding each), then there are
 // five roundings on the longest way (determinant.h): each of the six products carries at most seven factors
@@ -25,9 +25,7 @@ constexpr double kDoubleBound = 56 * 0x1p-53;
 constexpr double kDoubleDoubleBound = 0x1p-96;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Triple<double> widen(Vec3f p) {
-  return {p.x, p.y, p.z};
-}
+Triple<double> widen(Vec3f p) { return {p.x, p.y, p.z}; }
 
 Triple<double> operator-(const Triple<double>& a, const Triple<double>& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -38,16 +36,12 @@ Triple<DoubleDouble> difference(const Triple<double>& a, const Triple<double>& b
   return {two_sum(a[0], -b[0]), two_sum(a[1], -b[1]), two_sum(a[2], -b[2])};
 }
 
-double size_of(const Triple<double>& a) {
-  return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])});
-}
+double size_of(const Triple<double>& a) { return std::max({std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2])}); }
 double size_of(const Triple<DoubleDouble>& a) {
   return std::max({std::fabs(a[0].hi), std::fabs(a[1].hi), std::fabs(a[2].hi)});
 }
 
-int sign_beyond(double value, double bound) {
-  return value > bound ? 1 : value < -bound ? -1 : 0;
-}
+int sign_beyond(double value, double bound) { return value > bound ? 1 : value < -bound ? -1 : 0; }
 
 /// a * b == c * d exactly: the two parts of a product are unique.
 bool equal_products(double a, double b, double c, double d) {
@@ -55,12 +49,8 @@ bool equal_products(double a, double b, double c, double d) {
   return p.hi == q.hi && p.lo == q.lo;
 }
 
-double down(double x) {
-  return std::nextafter(x, -kInfinity);
-}
-double up(double x) {
-  return std::nextafter(x, kInfinity);
-}
+double down(double x) { return std::nextafter(x, -kInfinity); }
+double up(double x) { return std::nextafter(x, kInfinity); }
 
 /// Half the width of an interval around numerator / denominator, given the errors of both, rounding of the
 /// quotient not counted: (n + dn) / (d + dd) - n / d = (dn - (n / d) dd) / (d + dd). Infinite where the
@@ -68,8 +58,7 @@ double up(double x) {
 double quotient_error(double quotient, double numerator_error, double denominator, double denominator_error) {
   const double size = std::fabs(denominator);
   if (!(size > 2 * denominator_error)) return kInfinity;
-  return (numerator_error + std::fabs(quotient) * denominator_error) / (size - denominator_error) *
-         (1 + 0x1p-48);
+  return (numerator_error + std::fabs(quotient) * denominator_error) / (size - denominator_error) * (1 + 0x1p-48);
 }
 
 }  // namespace
@@ -95,18 +84,15 @@ struct ExactPredicate::Approximate {
 ExactPredicate::ExactPredicate(const Ray& ray) noexcept : ExactPredicate(ray, widen(ray.origin)) {}
 
 ExactPredicate::ExactPredicate(const Ray& ray, const std::array<double, 3>& origin) noexcept
-    : line_{origin, ray.direction},
-      origin_(origin),
-      direction_(widen(ray.direction)),
-      tnear_(ray.tnear),
-      tfar_(ray.tfar),
-      direction_size_(size_of(direction_)) {}
+    : line_{origin, ray.direction}, origin_(origin), direction_(widen(ray.direction)), tnear_(ray.tnear),
+      tfar_(ray.tfar), direction_size_(size_of(direction_)) {}
 
 bool ExactPredicate::surely_on_line(Vec3f point) const {
   const Triple<DoubleDouble> s = difference(widen(point), origin_);
   if (s[0].lo != 0 || s[1].lo != 0 || s[2].lo != 0) return false;
   const Triple<double>& d = direction_;
-  return equal_products(s[0].hi, d[1], s[1].hi, d[0]) && equal_products(s[1].hi, d[2], s[2].hi, d[1]) && equal_products(s[2].hi, d[0], s[0].hi, d[2]);
+  return equal_products(s[0].hi, d[1], s[1].hi, d[0]) && equal_products(s[1].hi, d[2], s[2].hi, d[1]) &&
+         equal_products(s[2].hi, d[0], s[0].hi, d[2]);
 }
 
 bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
@@ -123,10 +109,12 @@ bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
   ++counts_.in_double;
   if (mixed()) return false;
   if (sign[0] == 0 || sign[1] == 0 || sign[2] == 0) {
-    // A corner on the line: both its edges are exactly 0. So it is for all triangles of a fan, where whole numbers would take their time.
+    // A corner on the line: both its edges are exactly 0. So it is for all triangles of a fan, where whole numbers
+    // would take their time.
     bool zero[3] = {false, false, false};
     for (int k = 0; k < 3; ++k)
-      if (sign[k] == 0 && sign[(k + 2) % 3] == 0 && surely_on_line(corners[static_cast<std::size_t>(k)])) zero[k] = zero[(k + 2) % 3] = true;
+      if (sign[k] == 0 && sign[(k + 2) % 3] == 0 && surely_on_line(corners[static_cast<std::size_t>(k)]))
+        zero[k] = zero[(k + 2) % 3] = true;
     Triple<DoubleDouble> p[3];
     for (int k = 0; k < 3; ++k) p[k] = difference(widen(corners[static_cast<std::size_t>(k)]), origin_);
     bool all_certain = true;
@@ -151,8 +139,7 @@ bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
 
 int ExactPredicate::edge_sign_in_double_double(const Triple<DoubleDouble>& p, const Triple<DoubleDouble>& q,
                                                double scale, bool& certain) const {
-  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]},
-                               DoubleDouble{direction_[2]}};
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
   const int sign = sign_beyond(determinant(p, q, d).hi, kDoubleDoubleBound * scale * size_of(p) * size_of(q));
   certain = sign != 0;
   return sign;
@@ -162,8 +149,7 @@ ExactPredicate::Approximate ExactPredicate::approximate_t(const Corners& corners
   const Triple<double> pa = widen(corners[0]);
   const Triple<DoubleDouble> a = difference(pa, origin_), e1 = difference(widen(corners[1]), pa),
                              e2 = difference(widen(corners[2]), pa);
-  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]},
-                               DoubleDouble{direction_[2]}};
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
   const Triple<DoubleDouble> normal = cross(e1, e2);
   const double scale = kDoubleDoubleBound * size_of(e1) * size_of(e2);
   return Approximate::quotient(dot(normal, a), scale * size_of(a), dot(normal, d), scale * direction_size_);
@@ -198,12 +184,8 @@ bool ExactPredicate::within_interval(const Corners& corners, Enclosure& t) {
   const ExactFraction exact = exact_point(line_, corners).t;
   const double rounded = to_double(exact);
   t = rounded == 0.0 ? Enclosure{0.0, 0.0} : Enclosure{down(rounded), up(rounded)};
-  const auto not_below = [&](double limit) {
-    return std::isinf(limit) ? limit < 0 : compare(exact, limit) >= 0;
-  };
-  const auto not_above = [&](double limit) {
-    return std::isinf(limit) ? limit > 0 : compare(exact, limit) <= 0;
-  };
+  const auto not_below = [&](double limit) { return std::isinf(limit) ? limit < 0 : compare(exact, limit) >= 0; };
+  const auto not_above = [&](double limit) { return std::isinf(limit) ? limit > 0 : compare(exact, limit) <= 0; };
   return not_below(tnear_) && not_above(tfar_);
 }
 
@@ -211,7 +193,8 @@ int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
   if (first == second) return 0;
   // A corner of both on the line is where it meets both.
   for (const Vec3f& corner : first)
-    if (std::find(second.begin(), second.end(), corner) != second.end() && surely_on_line(corner)) return ++counts_.in_double_double, 0;
+    if (std::find(second.begin(), second.end(), corner) != second.end() && surely_on_line(corner))
+      return ++counts_.in_double_double, 0;
   const Approximate p = approximate_t(first), q = approximate_t(second);
   if (p.usable() && q.usable()) {
     const DoubleDouble difference = p.value - q.value;
@@ -224,12 +207,10 @@ int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
 }
 
 RoundedPoint ExactPredicate::round(const Corners& corners) {
-  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]},
-                               DoubleDouble{direction_[2]}};
+  const Triple<DoubleDouble> d{DoubleDouble{direction_[0]}, DoubleDouble{direction_[1]}, DoubleDouble{direction_[2]}};
   const Triple<double> pa = widen(corners[0]), pb = widen(corners[1]), pc = widen(corners[2]);
-  const Triple<DoubleDouble> a = difference(pa, origin_), b = difference(pb, origin_),
-                             c = difference(pc, origin_), e1 = difference(pb, pa), e2 = difference(pc, pa),
-                             normal = cross(e1, e2);
+  const Triple<DoubleDouble> a = difference(pa, origin_), b = difference(pb, origin_), c = difference(pc, origin_),
+                             e1 = difference(pb, pa), e2 = difference(pc, pa), normal = cross(e1, e2);
   const double scale = kDoubleDoubleBound * size_of(e1) * size_of(e2);
   const DoubleDouble denominator = dot(normal, d);
   const double denominator_error = scale * direction_size_;
@@ -251,8 +232,7 @@ RoundedPoint ExactPredicate::round(const Corners& corners) {
               static_cast<float>(e.lower) == static_cast<float>(e.upper);
     rounded[k] = certain ? static_cast<float>(e.lower) : 0.0f;
   }
-  if (certain)
-    return ++counts_.in_double_double, RoundedPoint{point[0].value.hi, rounded[0], rounded[1], rounded[2]};
+  if (certain) return ++counts_.in_double_double, RoundedPoint{point[0].value.hi, rounded[0], rounded[1], rounded[2]};
   ++counts_.in_integers;
   const ExactPoint exact = exact_point(line_, corners);
   return {to_double(exact.t), round_to_float(exact.t), round_to_float(exact.u), round_to_float(exact.v)};

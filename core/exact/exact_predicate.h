@@ -21,8 +21,7 @@ namespace arboretum {
 struct DecisionCounts {
   std::uint64_t in_double = 0, in_double_double = 0, in_integers = 0;
   DecisionCounts& operator+=(const DecisionCounts& other) noexcept {
-    in_double += other.in_double, in_double_double += other.in_double_double,
-        in_integers += other.in_integers;
+    in_double += other.in_double, in_double_double += other.in_double_double, in_integers += other.in_integers;
     return *this;
   }
 };
@@ -63,7 +62,8 @@ class ExactPredicate {
   [[nodiscard]] int edge_sign_in_double_double(const Triple<DoubleDouble>& p, const Triple<DoubleDouble>& q,
                                                double scale, bool& certain) const;
   [[nodiscard]] Approximate approximate_t(const Corners& corners) const;
-  /// Whether the ray's line passes through the point; false also where doubles cannot hold the point as seen from the origin.
+  /// Whether the ray's line passes through the point; false also where doubles cannot hold the point as seen from the
+  /// origin.
   [[nodiscard]] bool surely_on_line(Vec3f point) const;
   [[nodiscard]] bool within_interval(const Corners& corners, Enclosure& t);
 

@@ -1,9 +1,10 @@
 // The level in doubles. With e1 = b - a, e2 = c - a, s = o - a (one rounding each of float32 differences, u = 2^-53),
-//   det = e1.(d x e2),  t = e2.(s x e1) / det,  weights s.(d x e2) / det and d.(s x e1) / det  (Moeller and Trumbore, JGT 1997).
-// Each of the six products of a determinant carries at most eight factors (1 + e), |e| <= u: three rounded differences, the
-// product, its difference, the second product, two sums; so with |.| the largest component it is off by less than
-// 6 * 8.01 u |.||.||.|, and kBound = 56 u leaves room for the roundings of that bound. As in exact_predicate.cpp nothing can
-// under- or overflow.
+//   det = e1.(d x e2),  t = e2.(s x e1) / det,  weights s.(d x e2) / det and d.(s x e1) / det  (Moeller and Trumbore,
+//   JGT 1997).
+// Each of the six products of a determinant carries at most eight factors (1 + e), |e| <= u: three rounded differences,
+// the product, its difference, the second product, two sums; so with |.| the largest component it is off by less than
+// 6 * 8.01 u |.||.||.|, and kBound = 56 u leaves room for the roundings of that bound. As in exact_predicate.cpp
+// nothing can under- or overflow.
 #include "core/exact/hit_arithmetic.h"
 
 #include <algorithm>
@@ -31,12 +32,8 @@ Pair3 operator-(const Pair3& a, const Pair3& b) {
 Pair3 pair(Vec3f low, Vec3f high) {
   return {_mm_setr_pd(low.x, high.x), _mm_setr_pd(low.y, high.y), _mm_setr_pd(low.z, high.z)};
 }
-__m128d swapped(__m128d a) {
-  return _mm_shuffle_pd(a, a, 1);
-}
-Pair3 swapped(const Pair3& a) {
-  return {swapped(a.x), swapped(a.y), swapped(a.z)};
-}
+__m128d swapped(__m128d a) { return _mm_shuffle_pd(a, a, 1); }
+Pair3 swapped(const Pair3& a) { return {swapped(a.x), swapped(a.y), swapped(a.z)}; }
 __m128d difference_of_products(__m128d a, __m128d b, __m128d c, __m128d d) {
   return _mm_sub_pd(_mm_mul_pd(a, b), _mm_mul_pd(c, d));
 }
@@ -51,24 +48,20 @@ __m128d size_of(const Pair3& a) {
   const __m128d sign = _mm_set1_pd(-0.0);
   return _mm_max_pd(_mm_max_pd(_mm_andnot_pd(sign, a.x), _mm_andnot_pd(sign, a.y)), _mm_andnot_pd(sign, a.z));
 }
-double low(__m128d a) {
-  return _mm_cvtsd_f64(a);
-}
-double high(__m128d a) {
-  return _mm_cvtsd_f64(_mm_unpackhi_pd(a, a));
-}
+double low(__m128d a) { return _mm_cvtsd_f64(a); }
+double high(__m128d a) { return _mm_cvtsd_f64(_mm_unpackhi_pd(a, a)); }
 
-/// t within `radius` of the exact one, infinite where the determinant may be near 0; weights of the second and third corner within
-/// `weight_radius`.
+/// t within `radius` of the exact one, infinite where the determinant may be near 0; weights of the second and third
+/// corner within `weight_radius`.
 struct DoublePoint {
   double t, radius, u, v, weight_radius;
 };
 
 inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
   const Vec3f a = corners[0];
-  const Pair3 e = pair(corners[1], corners[2]) - pair(a, a);                // e1, e2
-  const Pair3 ds = pair(ray.direction, ray.origin) - pair(Vec3f{}, a);      // d, s
-  const Pair3 pq = cross(ds, swapped(e));                                   // d x e2, s x e1
+  const Pair3 e = pair(corners[1], corners[2]) - pair(a, a);            // e1, e2
+  const Pair3 ds = pair(ray.direction, ray.origin) - pair(Vec3f{}, a);  // d, s
+  const Pair3 pq = cross(ds, swapped(e));                               // d x e2, s x e1
   const __m128d det_t = dot(e, pq), weights = dot(swapped(ds), pq);
   const __m128d size_e = size_of(e), size_ds = size_of(ds);
   const __m128d det = _mm_unpacklo_pd(det_t, det_t);
@@ -82,9 +75,7 @@ inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
           scale * size_d * size_s * std::max(size_1, size_2) + det_error + 0x1p-50};
 }
 
-float weight(double w) {
-  return static_cast<float>(std::clamp(w, 0.0, 1.0));
-}
+float weight(double w) { return static_cast<float>(std::clamp(w, 0.0, 1.0)); }
 
 }  // namespace
 

@@ -1,5 +1,6 @@
-// A sphere of triangles and the rays of a picture of it, traced one at a time, in packets of 16 and as one batch: the three give
-// the same hits, bit for bit. Prints what each way costs against the batch. Exit status 1 where anything is wrong.
+// A sphere of triangles and the rays of a picture of it, traced one at a time, in packets of 16 and as one batch: the
+// three give the same hits, bit for bit. Prints what each way costs against the batch. Exit status 1 where anything is
+// wrong.
 //
 // usage: sphere [rings] [structure]
 #include <arboretum/arboretum.h>
@@ -61,11 +62,13 @@ double thread_seconds() {
   return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
-void one_at_a_time(const arboretum::Tracer& tracer, const std::vector<arboretum::Ray>& rays, std::vector<arboretum::Hit>& hits) {
+void one_at_a_time(const arboretum::Tracer& tracer, const std::vector<arboretum::Ray>& rays,
+                   std::vector<arboretum::Hit>& hits) {
   for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = tracer.closest_hit(rays[i]);
 }
 
-void in_packets(const arboretum::Tracer& tracer, const std::vector<arboretum::Ray>& rays, std::vector<arboretum::Hit>& hits) {
+void in_packets(const arboretum::Tracer& tracer, const std::vector<arboretum::Ray>& rays,
+                std::vector<arboretum::Hit>& hits) {
   for (std::size_t i = 0; i < rays.size(); i += kPacket) {
     std::array<arboretum::Ray, kPacket> packet;
     std::copy_n(&rays[i], kPacket, packet.begin());
@@ -79,9 +82,10 @@ int run(unsigned rings, const char* structure) {
   settings.structure = structure;
   if (settings.structure == "embree") settings.intersector = "pluecker";
   const arboretum::Tracer tracer(make_sphere(rings), settings);
-  std::printf("%zu triangles in %s (%s, %s, %s boxes, %s): %.1f MiB, built in %.1f ms\n", tracer.mesh().size(), structure,
-              tracer.settings().leaf.c_str(), tracer.settings().intersector.c_str(), tracer.settings().box.c_str(),
-              tracer.settings().isa.c_str(), double(tracer.structure().bytes()) / 0x1p20, tracer.report().seconds * 1e3);
+  std::printf("%zu triangles in %s (%s, %s, %s boxes, %s): %.1f MiB, built in %.1f ms\n", tracer.mesh().size(),
+              structure, tracer.settings().leaf.c_str(), tracer.settings().intersector.c_str(),
+              tracer.settings().box.c_str(), tracer.settings().isa.c_str(), double(tracer.structure().bytes()) / 0x1p20,
+              tracer.report().seconds * 1e3);
 
   const std::vector<arboretum::Ray> rays = make_rays();
   std::array<std::vector<arboretum::Hit>, 3> hits;
@@ -99,7 +103,8 @@ int run(unsigned rings, const char* structure) {
   }
   for (auto& s : seconds) std::nth_element(s.begin(), s.begin() + 3, s.end());
   std::printf("batch %.1f Mray/s; time against it: packets of %zu %.2f, one ray at a time %.2f\n",
-              1e-6 * double(rays.size()) / seconds[0][3], kPacket, seconds[1][3] / seconds[0][3], seconds[2][3] / seconds[0][3]);
+              1e-6 * double(rays.size()) / seconds[0][3], kPacket, seconds[1][3] / seconds[0][3],
+              seconds[2][3] / seconds[0][3]);
 
   int wrong = 0;
   std::size_t found = 0;
@@ -112,7 +117,8 @@ int run(unsigned rings, const char* structure) {
     ++found;
     wrong += std::abs(length(rays[i].origin + hit.t * rays[i].direction) - 1.0f) > chord;
   }
-  // The sphere covers the pixels within sin(angle) = 1/3: a disc of radius tan(asin(1/3)) = 0.35355 of the picture's 0.4.
+  // The sphere covers the pixels within sin(angle) = 1/3: a disc of radius tan(asin(1/3)) = 0.35355 of the picture's
+  // 0.4.
   const double expected = std::acos(-1.0) * 0.125 / (4 * 0.16) * kSize * kSize;
   wrong += std::abs(double(found) - expected) > 0.02 * expected;
   std::printf("%zu of %zu rays hit, %d wrong\n", found, rays.size(), wrong);

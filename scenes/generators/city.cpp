@@ -30,8 +30,7 @@ Scene generate_city(std::size_t triangles, std::uint64_t seed) {
     const double from_center = std::min(1.0, (x * x + z * z) / (half * half));
     double height = draw(0.4, 1.2) + draw(0.0, 1.0) * 5.0 * (1.0 - from_center) * (1.0 - from_center);
     // Lots that come round again (the grid is full, boxes are left) get roof structures that start higher up.
-    double base = lot < side * side ? -0.02 : 0.3,
-           width = lot < side * side ? draw(0.36, 0.47) : draw(0.05, 0.2);
+    double base = lot < side * side ? -0.02 : 0.3, width = lot < side * side ? draw(0.36, 0.47) : draw(0.05, 0.2);
     const std::uint16_t material = std::uint16_t(1 + std::uint64_t(draw(0.0, 3.0)));
     for (std::size_t i = 0; i < storeys; ++i) {
       const double depth = width * draw(0.75, 1.0);
@@ -47,8 +46,8 @@ Scene generate_city(std::size_t triangles, std::uint64_t seed) {
   scene.materials.push_back(Material{.name = "asphalt", .diffuse = {0.2f, 0.2f, 0.22f}});
   scene.materials.push_back(Material{.name = "concrete", .diffuse = {0.6f, 0.58f, 0.55f}});
   scene.materials.push_back(Material{.name = "brick", .diffuse = {0.5f, 0.25f, 0.18f}});
-  scene.materials.push_back(Material{
-      .name = "glass_front", .diffuse = {0.1f, 0.13f, 0.16f}, .specular = {0.6f, 0.6f, 0.65f}, .illum = 3});
+  scene.materials.push_back(
+      Material{.name = "glass_front", .diffuse = {0.1f, 0.13f, 0.16f}, .specular = {0.6f, 0.6f, 0.65f}, .illum = 3});
   const auto f = [](double a) { return float(a); };
   scene.camera = Camera{.position = {f(half * 0.55), f(2.5 + half * 0.35), f(half * 1.15 + 2.0)},
                         .look_at = {0, 1, 0},

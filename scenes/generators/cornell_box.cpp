@@ -45,8 +45,7 @@ void add_ball(MeshBuilder& builder, const Ball& ball, std::size_t count) {
   builder.add_closed(count, 0.5, ball.color, [&ball](double v, double turns) {
     const UnitCircle latitude(0.5 * v), longitude(turns);
     return ball.center +
-           Vec3d{latitude.sine * longitude.cosine, -latitude.cosine, -latitude.sine * longitude.sine} *
-               ball.radius;
+           Vec3d{latitude.sine * longitude.cosine, -latitude.cosine, -latitude.sine * longitude.sine} * ball.radius;
   });
 }
 
@@ -58,16 +57,14 @@ Scene generate_cornell_box(std::size_t triangles, std::uint64_t) {
   std::size_t left = triangles - 1, weights = kFloor.weight;
   std::array<std::size_t, kWalls.size()> walls{};
   std::array<std::size_t, kBalls.size()> balls{};
-  for (std::size_t i = 0; i < kWalls.size() && left >= 2; ++i)
-    walls[i] = 2, left -= 2, weights += kWalls[i].weight;
+  for (std::size_t i = 0; i < kWalls.size() && left >= 2; ++i) walls[i] = 2, left -= 2, weights += kWalls[i].weight;
   for (std::size_t i = 0; i < kBalls.size() && left >= kSmallestBall; ++i)
     balls[i] = kSmallestBall, left -= kSmallestBall, weights += kBallWeight;
   std::size_t boxes = 0;
   for (; boxes < 2 && left >= kBox; ++boxes) left -= kBox;
   const std::size_t shared = left;
   for (std::size_t i = 0; i < kWalls.size(); ++i)
-    if (walls[i] > 0)
-      walls[i] += shared * kWalls[i].weight / weights, left -= shared * kWalls[i].weight / weights;
+    if (walls[i] > 0) walls[i] += shared * kWalls[i].weight / weights, left -= shared * kWalls[i].weight / weights;
   for (std::size_t& ball : balls) {
     if (ball == 0) continue;
     const std::size_t more = shared * kBallWeight / weights & ~std::size_t{1};
@@ -92,11 +89,7 @@ Scene generate_cornell_box(std::size_t triangles, std::uint64_t) {
       Material{.name = "lamp", .diffuse = {0.8f, 0.8f, 0.8f}, .emission = {15, 13, 10}},
       Material{.name = "glass", .diffuse = {0, 0, 0}, .specular = {1, 1, 1}, .ior = 1.5f, .illum = 7},
       Material{.name = "mirror", .diffuse = {0, 0, 0}, .specular = {0.9f, 0.9f, 0.9f}, .illum = 3},
-      Material{.name = "metal",
-               .diffuse = {0, 0, 0},
-               .specular = {0.8f, 0.6f, 0.4f},
-               .roughness = 0.2f,
-               .illum = 3},
+      Material{.name = "metal", .diffuse = {0, 0, 0}, .specular = {0.8f, 0.6f, 0.4f}, .roughness = 0.2f, .illum = 3},
   };
   // Off the middle: from there the room's edges would run through pixel centres.
   scene.camera = Camera{.position = {0.05f, 1.04f, 3.9f}, .look_at = {0.02f, 1, 0}, .vertical_fov = 40};

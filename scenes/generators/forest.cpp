@@ -23,7 +23,8 @@ TriangleMesh tree(std::size_t kind, std::size_t count) {
   for (std::size_t i = 0; i < cones; ++i) {
     const std::size_t left = count - builder.size();
     const std::size_t own = i + 1 == cones ? left : MeshBuilder::closed_count(left / (cones - i));
-    const double base = height * (0.25 + 0.5 * double(i) / double(cones)), top = base + height * (0.75 - 0.1 * double(i)) / double(cones) + 0.4;
+    const double base = height * (0.25 + 0.5 * double(i) / double(cones)),
+                 top = base + height * (0.75 - 0.1 * double(i)) / double(cones) + 0.4;
     const double radius = width * (1.0 - 0.25 * double(i));
     builder.add_closed(own, 1.0, std::uint16_t(1 + kind % 2), [&](double v, double turns) {
       const UnitCircle around(-turns), waves(turns * double(5 + 2 * kind) + 0.3 * double(i));
@@ -80,8 +81,11 @@ Scene generate_forest(std::size_t triangles, std::uint64_t seed) {
   scene.materials.push_back(Material{.name = "leaves", .diffuse = {0.25f, 0.4f, 0.1f}});
   scene.materials.push_back(Material{.name = "soil", .diffuse = {0.35f, 0.3f, 0.2f}});
   const auto f = [](double a) { return float(a); };
-  scene.camera = Camera{.position = {f(0.4 * half), f(5.0 + 0.25 * half), f(1.15 * half + 4.0)}, .look_at = {0, 2, 0}, .vertical_fov = 45};
-  scene.lights.push_back(Light{.position = {f(half), f(30.0 + half), f(half)}, .intensity = Vec3f{1, 1, 1} * f(half * half + 900.0)});
+  scene.camera = Camera{.position = {f(0.4 * half), f(5.0 + 0.25 * half), f(1.15 * half + 4.0)},
+                        .look_at = {0, 2, 0},
+                        .vertical_fov = 45};
+  scene.lights.push_back(
+      Light{.position = {f(half), f(30.0 + half), f(half)}, .intensity = Vec3f{1, 1, 1} * f(half * half + 900.0)});
   return scene;
 }
 

@@ -21,24 +21,22 @@ constexpr GeneratorInfo kInfos[] = {
     {"needles", "long thin triangles of any direction, the worst for boxes", kExact, true},
     {"city", "towers of boxes on a ground plane, streets between", kExact, true},
     {"teapot_in_stadium", "a teapot of one unit in a stadium a million units wide", kExact, false},
-    {"cornell_box", "a box with a lamp, a glass sphere, a mirror sphere, a metal and a matt block", kExact,
-     false},
+    {"cornell_box", "a box with a lamp, a glass sphere, a mirror sphere, a metal and a matt block", kExact, false},
     {"sphere", "a closed sphere of latitude and longitude lines, poles as fans", kEven, false},
     {"fan", "two fans base to base: closed, half of the triangles at each of two vertices", kEven, false},
     {"forest", "about a thousand instances of four trees on a ground; for two_level", kExact, true},
-    {"waving_cloth", "a curtain that waves and a ball that flies past, in five key frames; for bvh4_motion", kExact, false, true},
+    {"waving_cloth", "a curtain that waves and a ball that flies past, in five key frames; for bvh4_motion", kExact,
+     false, true},
 };
 constexpr Generate kFunctions[] = {
-    generate_sphere_flake, generate_fractal_terrain,   generate_random_triangles, generate_needles,
-    generate_city,         generate_teapot_in_stadium, generate_cornell_box,      generate_sphere,
-    generate_fan,          generate_forest,            generate_waving_cloth};
+    generate_sphere_flake,      generate_fractal_terrain, generate_random_triangles, generate_needles, generate_city,
+    generate_teapot_in_stadium, generate_cornell_box,     generate_sphere,           generate_fan,     generate_forest,
+    generate_waving_cloth};
 static_assert(std::size(kInfos) == std::size(kFunctions));
 
 }  // namespace
 
-std::span<const GeneratorInfo> generators() {
-  return kInfos;
-}
+std::span<const GeneratorInfo> generators() { return kInfos; }
 
 namespace {
 
@@ -49,12 +47,11 @@ std::size_t checked(std::string_view name, std::size_t triangles, std::uint64_t 
     names.emplace_back(kInfos[i].name);
     if (kInfos[i].name != name) continue;
     if (triangles == 0 || triangles > kMaxGeneratedTriangles)
-      throw UserError(fmt::format("generator {}: triangles: {} is not within 1 to {}", name, triangles,
-                                  kMaxGeneratedTriangles));
+      throw UserError(
+          fmt::format("generator {}: triangles: {} is not within 1 to {}", name, triangles, kMaxGeneratedTriangles));
     if (seed != 1 && !kInfos[i].takes_seed)
       throw UserError(fmt::format(
-          "generator {}: seed: {} would change nothing, since its shape has nothing random; leave it out",
-          name, seed));
+          "generator {}: seed: {} would change nothing, since its shape has nothing random; leave it out", name, seed));
     return i;
   }
   throw UserError(unknown_name_message("generator", name, names));

@@ -13,9 +13,7 @@ namespace {
 class Draw {
  public:
   Draw(std::uint64_t seed, std::uint64_t index) : seed_(seed), index_(index) {}
-  double operator()(double low, double high) {
-    return low + (high - low) * random_double(seed_, index_, dimension_++);
-  }
+  double operator()(double low, double high) { return low + (high - low) * random_double(seed_, index_, dimension_++); }
   Vec3d in_cube(double half) {
     const double x = (*this)(-half, half), y = (*this)(-half, half), z = (*this)(-half, half);
     return {x, y, z};
@@ -88,8 +86,7 @@ Scene generate_needles(std::size_t triangles, std::uint64_t seed) {
     const Vec3d middle = draw.in_cube(0.8);
     const Vec3d along = draw.direction();
     const double half = draw(0.2, 0.4);
-    const Vec3d across =
-        normalize(cross(along, Frame(along).to_world(draw.direction()) + Frame(along).tangent * 1e-3));
+    const Vec3d across = normalize(cross(along, Frame(along).to_world(draw.direction()) + Frame(along).tangent * 1e-3));
     return std::array{middle - along * half, middle + along * half, middle + along * half + across * width};
   }));
 }

@@ -18,8 +18,8 @@ struct Ball {
 void add_ball(MeshBuilder& builder, const Ball& ball, std::size_t count, std::uint16_t material) {
   builder.add_closed(count, 0.5, material, [&ball](double v, double turns) {
     const UnitCircle latitude(0.5 * v), longitude(turns);  // v = 0: the pole at -normal
-    return ball.center + ball.frame.to_world(Vec3d{latitude.sine * longitude.cosine,
-                                                   latitude.sine * longitude.sine, -latitude.cosine}) *
+    return ball.center + ball.frame.to_world(Vec3d{latitude.sine * longitude.cosine, latitude.sine * longitude.sine,
+                                                   -latitude.cosine}) *
                              ball.radius;
   });
 }
@@ -87,13 +87,11 @@ Scene generate_sphere_flake(std::size_t triangles, std::uint64_t) {
     if (ball.level == levels) continue;
     for (int child = 0; child < 9; ++child) {
       const bool upper = child >= 6;
-      const UnitCircle latitude(upper ? 0.15 : 0.0),
-          longitude(upper ? (child - 6) / 3.0 + 1.0 / 12.0 : child / 6.0);
-      const Vec3d direction = normalize(ball.frame.to_world(
-          {latitude.cosine * longitude.cosine, latitude.cosine * longitude.sine, latitude.sine}));
+      const UnitCircle latitude(upper ? 0.15 : 0.0), longitude(upper ? (child - 6) / 3.0 + 1.0 / 12.0 : child / 6.0);
+      const Vec3d direction = normalize(
+          ball.frame.to_world({latitude.cosine * longitude.cosine, latitude.cosine * longitude.sine, latitude.sine}));
       const double radius = ball.radius / 3.0;
-      waiting.push_back(
-          {ball.center + direction * (ball.radius + radius), radius, Frame(direction), ball.level + 1});
+      waiting.push_back({ball.center + direction * (ball.radius + radius), radius, Frame(direction), ball.level + 1});
     }
   }
   Scene scene;

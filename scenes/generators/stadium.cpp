@@ -23,8 +23,7 @@ Vec3d curve(const std::array<Vec3d, N>& points, double t) {
 
 /// A tube around a curve in the plane z = 0; its radius closes at both ends like a hemisphere's.
 template <std::size_t N>
-void add_tube(MeshBuilder& builder, std::size_t count, const std::array<Vec3d, N>& points, double thick,
-              double thin) {
+void add_tube(MeshBuilder& builder, std::size_t count, const std::array<Vec3d, N>& points, double thick, double thin) {
   builder.add_closed(count, 4.0, 1, [&](double v, double turns) {
     const Vec3d center = curve(points, v);
     constexpr double kStep = 1.0 / 256.0;
@@ -63,12 +62,8 @@ void add_pot(MeshBuilder& builder, std::size_t count) {
   if (tube == 0) return;
   const std::array<Vec3d, 5> spout{
       {{0.36, 0.16, 0}, {0.52, 0.20, 0}, {0.60, 0.34, 0}, {0.66, 0.48, 0}, {0.76, 0.56, 0}}};
-  const std::array<Vec3d, 6> handle{{{-0.34, 0.50, 0},
-                                     {-0.52, 0.53, 0},
-                                     {-0.68, 0.48, 0},
-                                     {-0.70, 0.34, 0},
-                                     {-0.58, 0.20, 0},
-                                     {-0.40, 0.14, 0}}};
+  const std::array<Vec3d, 6> handle{
+      {{-0.34, 0.50, 0}, {-0.52, 0.53, 0}, {-0.68, 0.48, 0}, {-0.70, 0.34, 0}, {-0.58, 0.20, 0}, {-0.40, 0.14, 0}}};
   add_tube(builder, tube, spout, 0.10, 0.045);
   add_tube(builder, tube, handle, 0.042, 0.042);
 }
@@ -90,12 +85,10 @@ Scene generate_teapot_in_stadium(std::size_t triangles, std::uint64_t) {
     builder.add_patch(stands, 8.0, 2, [&](double u, double v) {
       const UnitCircle circle(1.0 - u);
       const double step = std::floor(v * steps), inside = v * steps - step;
-      const double rise =
-          (step + std::min(1.0, inside * 4.0)) / steps;  // a quarter riser, three quarters tread
+      const double rise = (step + std::min(1.0, inside * 4.0)) / steps;  // a quarter riser, three quarters tread
       const double out = (step + std::max(0.0, (inside - 0.2) / 0.8)) / steps;
       const double scale = kInner + (1.0 - kInner) * out;
-      return Vec3d{kHalfWidth * scale * circle.cosine, 1000.0 + kRise * rise,
-                   -kHalfDepth * scale * circle.sine};
+      return Vec3d{kHalfWidth * scale * circle.cosine, 1000.0 + kRise * rise, -kHalfDepth * scale * circle.sine};
     });
   }
   if (pot > 0) add_pot(builder, pot);
@@ -103,10 +96,8 @@ Scene generate_teapot_in_stadium(std::size_t triangles, std::uint64_t) {
   Scene scene;
   scene.mesh = builder.take();
   scene.materials.push_back(Material{.name = "grass", .diffuse = {0.2f, 0.4f, 0.15f}});
-  scene.materials.push_back(Material{.name = "china",
-                                     .diffuse = {0.7f, 0.7f, 0.75f},
-                                     .specular = {0.04f, 0.04f, 0.04f},
-                                     .roughness = 0.05f});
+  scene.materials.push_back(
+      Material{.name = "china", .diffuse = {0.7f, 0.7f, 0.75f}, .specular = {0.04f, 0.04f, 0.04f}, .roughness = 0.05f});
   scene.materials.push_back(Material{.name = "stands", .diffuse = {0.5f, 0.5f, 0.5f}});
   scene.camera = Camera{.position = {0.5f, 0.75f, 2.1f}, .look_at = {0.03f, 0.4f, 0.0f}, .vertical_fov = 45};
   scene.lights.push_back(Light{.position = {2, 4, 3}, .intensity = {30, 30, 30}});

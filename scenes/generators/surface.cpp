@@ -25,11 +25,9 @@ std::vector<std::size_t> MeshBuilder::ring_sizes(std::size_t count, double aspec
   // k rings of r_1 .. r_k vertices have 2 (r_1 + ... + r_k) triangles, the two fans included.
   const std::size_t vertices = count / 2;
   const std::size_t most = vertices / 3;
-  const std::size_t wanted =
-      std::clamp<std::size_t>(std::size_t(std::sqrt(double(vertices) * aspect) + 0.5), 1, most);
+  const std::size_t wanted = std::clamp<std::size_t>(std::size_t(std::sqrt(double(vertices) * aspect) + 0.5), 1, most);
   std::size_t rings = wanted;
-  for (std::size_t off = 0; off <= wanted / 8;
-       ++off) {  // equal rings where a number of rings nearby allows it
+  for (std::size_t off = 0; off <= wanted / 8; ++off) {  // equal rings where a number of rings nearby allows it
     if (vertices % (wanted - off) == 0) {
       rings = wanted - off;
       break;

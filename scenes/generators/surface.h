@@ -56,8 +56,7 @@ class MeshBuilder {
 };
 
 template <class Position>
-void MeshBuilder::add_patch(std::size_t count, double aspect, std::uint16_t material,
-                            const Position& position) {
+void MeshBuilder::add_patch(std::size_t count, double aspect, std::uint16_t material, const Position& position) {
   if (count == 1) {
     const std::uint32_t a = add_vertex(position(0.0, 0.0)), b = add_vertex(position(1.0, 0.0)),
                         c = add_vertex(position(0.0, 1.0));
@@ -86,8 +85,7 @@ void MeshBuilder::add_patch(std::size_t count, double aspect, std::uint16_t mate
 }
 
 template <class Position>
-void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t material,
-                             const Position& position) {
+void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t material, const Position& position) {
   const std::vector<std::size_t> sizes = ring_sizes(count, aspect);
   const std::uint32_t pole = add_vertex(position(0.0, 0.0));
   Row below{};
@@ -97,8 +95,7 @@ void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t mat
     for (std::size_t j = 0; j < sizes[i]; ++j) add_vertex(position(v, double(j) / double(sizes[i])));
     if (i == 0) {
       for (std::size_t j = 0; j < row.segments; ++j)
-        add_triangle(pole, row.first + std::uint32_t((j + 1) % row.segments), row.first + std::uint32_t(j),
-                     material);
+        add_triangle(pole, row.first + std::uint32_t((j + 1) % row.segments), row.first + std::uint32_t(j), material);
     } else {
       stitch(below, row, true, material);
     }
@@ -106,8 +103,8 @@ void MeshBuilder::add_closed(std::size_t count, double aspect, std::uint16_t mat
   }
   const std::uint32_t other_pole = add_vertex(position(1.0, 0.0));
   for (std::size_t j = 0; j < below.segments; ++j)
-    add_triangle(other_pole, below.first + std::uint32_t(j),
-                 below.first + std::uint32_t((j + 1) % below.segments), material);
+    add_triangle(other_pole, below.first + std::uint32_t(j), below.first + std::uint32_t((j + 1) % below.segments),
+                 material);
 }
 
 }  // namespace arboretum

@@ -16,16 +16,14 @@ double value_noise(std::uint64_t seed, std::uint64_t octave, double x, double y)
   };
   const auto fade = [](double t) { return t * t * t * (t * (t * 6.0 - 15.0) + 10.0); };
   const double u = fade(x - fx), v = fade(y - fy);
-  const double lower = corner(0, 0) * (1.0 - u) + corner(1, 0) * u,
-               upper = corner(0, 1) * (1.0 - u) + corner(1, 1) * u;
+  const double lower = corner(0, 0) * (1.0 - u) + corner(1, 0) * u, upper = corner(0, 1) * (1.0 - u) + corner(1, 1) * u;
   return lower * (1.0 - v) + upper * v;
 }
 
 double height(std::uint64_t seed, int octaves, double u, double v) {
   double sum = 0.0, amplitude = 0.5, frequency = 3.0, weight = 1.0;
   for (int octave = 0; octave < octaves; ++octave) {
-    const double ridge =
-        1.0 - std::abs(value_noise(seed, std::uint64_t(octave), u * frequency, v * frequency));
+    const double ridge = 1.0 - std::abs(value_noise(seed, std::uint64_t(octave), u * frequency, v * frequency));
     const double signal = ridge * ridge * weight;
     sum += signal * amplitude;
     weight = std::clamp(signal * 1.6, 0.0, 1.0);

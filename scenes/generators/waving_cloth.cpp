@@ -1,5 +1,5 @@
-// waving_cloth: a curtain with a travelling wave, a closed ball that flies past it and turns, a ground that stands still;
-// five key frames.
+// waving_cloth: a curtain with a travelling wave, a closed ball that flies past it and turns, a ground that stands
+// still; five key frames.
 #include "scenes/generators/generators.h"
 #include "scenes/generators/surface.h"
 
@@ -38,7 +38,8 @@ TriangleMesh at(std::size_t triangles, double time) {
 Scene generate_waving_cloth(std::size_t triangles, std::uint64_t) {
   Scene scene;
   scene.mesh = at(triangles, 0.0);
-  for (std::size_t k = 1; k < kFrames; ++k) scene.mesh.later_frames.push_back(at(triangles, double(k) / double(kFrames - 1)).vertices);
+  for (std::size_t k = 1; k < kFrames; ++k)
+    scene.mesh.later_frames.push_back(at(triangles, double(k) / double(kFrames - 1)).vertices);
   scene.key_frames = kFrames;
   scene.shutter = {0.0f, 1.0f};
   scene.materials.push_back(Material{.name = "cloth", .diffuse = {0.6f, 0.2f, 0.2f}});

@@ -19,12 +19,7 @@ class Converter {
  public:
   Converter(const BinaryTree& tree, const Collapse& collapse, const BuilderParameters& costs,
             MeteredVector<Node>& nodes, LeafLists& lists)
-      : tree_(tree),
-        collapse_(collapse),
-        costs_(costs),
-        nodes_(nodes),
-        lists_(lists),
-        cost_(tree.node_count) {
+      : tree_(tree), collapse_(collapse), costs_(costs), nodes_(nodes), lists_(lists), cost_(tree.node_count) {
     price(0);
     nodes_.resize(1);
     place(0, 0, box_of(0), 0);
@@ -33,14 +28,11 @@ class Converter {
   [[nodiscard]] std::size_t pairs_deep() const noexcept { return deepest_; }
 
  private:
-  [[nodiscard]] Bounds3f box_of(std::uint32_t node) const {
-    return {tree_.nodes[node].lower, tree_.nodes[node].upper};
-  }
+  [[nodiscard]] Bounds3f box_of(std::uint32_t node) const { return {tree_.nodes[node].lower, tree_.nodes[node].upper}; }
 
   /// Expected cost below a node for a ray that meets its box.
   float price(std::uint32_t node) {
-    if (collapse_.is_leaf(node))
-      return cost_[node] = costs_.intersection_cost * float(collapse_.blocks(node));
+    if (collapse_.is_leaf(node)) return cost_[node] = costs_.intersection_cost * float(collapse_.blocks(node));
     const std::uint32_t left = tree_.nodes[node].left;
     const float whole = tree_.nodes[node].half_area();
     float below = 0;
@@ -73,8 +65,8 @@ class Converter {
       slot = child;
     }
     if (collapse_.is_leaf(node)) {
-      nodes_[slot] = {{std::bit_cast<float>(std::uint32_t(lists_.begin.size())), 0.0f},
-                      Node::kLeaf};  // the code comes later
+      // the code comes later
+      nodes_[slot] = {{std::bit_cast<float>(std::uint32_t(lists_.begin.size())), 0.0f}, Node::kLeaf};
       lists_.begin.push_back(std::uint32_t(lists_.ids.size()));
       const auto begin = tree_.primitives.begin() + tree_.begin_of(node);
       lists_.ids.insert(lists_.ids.end(), begin, begin + tree_.nodes[node].count);
@@ -137,9 +129,10 @@ const StructureInfo& Bih::static_info() {
     i.name = kName;
     i.summary = "bounding interval hierarchy: two planes a node, between kd-tree and BVH";
     i.builders = binary_builder_names();
-    for_each_type(AllBlocks{},
-                  [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
-    i.no_streams = "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them";
+    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.no_streams =
+        "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its "
+        "own in every node, which the stack would have to hold for each of them";
     return i;
   }();
   return info;
@@ -151,8 +144,7 @@ void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildRe
     throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. " +
                     std::to_string(bvh::kMaxLeafBlocks));
   }
-  if (p.bins < 4 || p.bins > 64)
-    throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
+  if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
   if (mesh.size() >= (1u << 30)) throw UserError("bih takes at most 2^30 - 1 triangles");
   LeafLists lists;
   nodes_.clear(), bounds_ = mesh.bounds(), stack_entries_ = 1, max_coordinate_ = largest_coordinate(bounds_);

@@ -44,9 +44,7 @@ class Bih final : public Accel {
   /// Boxes are what the planes above leave: where a ray comes along. The scene's box is the root's.
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
   void archive(Archive& archive) override;
-  [[nodiscard]] std::size_t bytes() const noexcept override {
-    return nodes_.size() * sizeof(Node) + leaves_.bytes();
-  }
+  [[nodiscard]] std::size_t bytes() const noexcept override { return nodes_.size() * sizeof(Node) + leaves_.bytes(); }
 
   [[nodiscard]] const Node* nodes() const noexcept { return nodes_.data(); }  ///< the root first
   [[nodiscard]] const Bounds3f& bounds() const noexcept { return bounds_; }

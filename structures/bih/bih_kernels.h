@@ -16,11 +16,13 @@ struct BihSingle {
   using Scratch = IntervalStack;
 
   template <bool AnyHit, class Visits>
-  static ARBORETUM_INLINE bool trace(const bih::Bih& tree, const Ray& ray, NearestHit& best, const Counting& counting, Scratch& stack, Visits& visits) {
+  static ARBORETUM_INLINE bool trace(const bih::Bih& tree, const Ray& ray, NearestHit& best, const Counting& counting,
+                                     Scratch& stack, Visits& visits) {
     const IntervalRay interval(BoxRay<2, Padded>(ray, tree.max_coordinate()));
     float low = ray.tnear, high = best.t;
     clip_to_scene(tree, interval, low, high);
-    return low <= high && search_bih<AnyHit>(tree, interval, tree.nodes(), low, high, best, counting, stack.data(), visits);
+    return low <= high &&
+           search_bih<AnyHit>(tree, interval, tree.nodes(), low, high, best, counting, stack.data(), visits);
   }
 };
 

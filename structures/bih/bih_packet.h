@@ -1,10 +1,12 @@
-// Packets: up to 64 rays go through a bounding interval hierarchy together, each with an interval of t of its own in a lane and a bit in the mask of those that are in a node.
+// Packets: up to 64 rays go through a bounding interval hierarchy together, each with an interval of t of its own in a
+// lane and a bit in the mask of those that are in a node.
 //
-// Rays that share an octant share near and far, and so one traversal; a packet of mixed signs is one masked traversal an octant. A far child waits on the stack with its rays and their
-// intervals; where no more than `threshold` rays are left they go on alone.
+// Rays that share an octant share near and far, and so one traversal; a packet of mixed signs is one masked traversal
+// an octant. A far child waits on the stack with its rays and their intervals; where no more than `threshold` rays are
+// left they go on alone.
 //
-// A ray's tests are those of bih_single.h, operation by operation, and its nodes come in the same order: it visits just the nodes that it would visit alone, and its answer is the
-// same bit for bit, with `fast` planes, too.
+// A ray's tests are those of bih_single.h, operation by operation, and its nodes come in the same order: it visits just
+// the nodes that it would visit alone, and its answer is the same bit for bit, with `fast` planes, too.
 #pragma once
 
 #include "structures/bih/bih_single.h"
@@ -23,12 +25,16 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
   using Base::best, Base::times_alone;
 
   BihPackets(const bih::Bih& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded"), stack_(tree.stack_entries() + 1), single_stack_(tree) {}
+      : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded"), stack_(tree.stack_entries() + 1),
+        single_stack_(tree) {}
 
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
     Base::trace(
-        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 2>(count, ray_at, padded_, BoxPad{tree_.max_coordinate()}, each); },
+        rays, count, threshold,
+        [&](const auto& ray_at, const auto& each) {
+          lanes_.template prepare<W, 2>(count, ray_at, padded_, BoxPad{tree_.max_coordinate()}, each);
+        },
         [&](Mask mask, unsigned octant) { traverse(mask, octant); });
   }
 
@@ -44,8 +50,12 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
     Mask mask;
   };
 
-  ARBORETUM_INLINE F at_begin(float plane, unsigned axis, int k) const { return plane_distance(F(plane), F::load(lanes_.r[axis] + k), F::load(lanes_.near[axis] + k)); }
-  ARBORETUM_INLINE F at_end(float plane, unsigned axis, int k) const { return plane_distance(F(plane), F::load(lanes_.r[axis] + k), F::load(lanes_.far[axis] + k)); }
+  ARBORETUM_INLINE F at_begin(float plane, unsigned axis, int k) const {
+    return plane_distance(F(plane), F::load(lanes_.r[axis] + k), F::load(lanes_.near[axis] + k));
+  }
+  ARBORETUM_INLINE F at_end(float plane, unsigned axis, int k) const {
+    return plane_distance(F(plane), F::load(lanes_.r[axis] + k), F::load(lanes_.far[axis] + k));
+  }
 
   /// Calls each(k, lanes) for the registers that hold rays of `mask`; returns the rays for which it is true.
   template <class Each>
@@ -60,15 +70,16 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
     Entry* const stack = stack_.data();
     Entry* top = stack;  // the node at hand; those below wait
     top->node = tree_.nodes(), top->mask = in_lanes(group, [&](int k) {
-      F low = F::load(lanes_.rays.tnear + k), high = F::load(lanes_.t + k);
-      for (unsigned a = 0; a < 3; ++a) {
-        const float faces[2] = {(&tree_.bounds().lower.x)[a], (&tree_.bounds().upper.x)[a]};
-        const unsigned back = octant >> a & 1u;
-        low = max_x86(at_begin(faces[back], a, k), low), high = min_x86(at_end(faces[1 - back], a, k), high);
-      }
-      low.store(top->low + k), high.store(top->high + k);
-      return low <= high;
-    });
+                                 F low = F::load(lanes_.rays.tnear + k), high = F::load(lanes_.t + k);
+                                 for (unsigned a = 0; a < 3; ++a) {
+                                   const float faces[2] = {(&tree_.bounds().lower.x)[a], (&tree_.bounds().upper.x)[a]};
+                                   const unsigned back = octant >> a & 1u;
+                                   low = max_x86(at_begin(faces[back], a, k), low),
+                                   high = min_x86(at_end(faces[1 - back], a, k), high);
+                                 }
+                                 low.store(top->low + k), high.store(top->high + k);
+                                 return low <= high;
+                               });
     while (true) {
       const bih::Node* const node = top->node;
       const std::uint32_t kind = node->kind();
@@ -77,10 +88,12 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
       } else if (top->mask != 0 && Base::few(top->mask)) {
         Base::go_on_alone(top->mask, [&](int i, auto& visits) {
           const auto of = [i](const auto& axes) { return Vec3f{axes[0][i], axes[1][i], axes[2][i]}; };
-          return search_bih<AnyHit>(tree_, IntervalRay(of(lanes_.r), of(lanes_.near), of(lanes_.far)), node, top->low[i], top->high[i], best_[i], counting_, single_stack_.data(), visits);
+          return search_bih<AnyHit>(tree_, IntervalRay(of(lanes_.r), of(lanes_.near), of(lanes_.far)), node,
+                                    top->low[i], top->high[i], best_[i], counting_, single_stack_.data(), visits);
         });
       } else if (top->mask != 0) {
-        top = kind < bih::Node::kLeaf ? divide(top, kind, octant >> kind & 1u) : clip(top, kind - bih::Node::kClip, octant >> (kind - bih::Node::kClip) & 1u);
+        top = kind < bih::Node::kLeaf ? divide(top, kind, octant >> kind & 1u)
+                                      : clip(top, kind - bih::Node::kClip, octant >> (kind - bih::Node::kClip) & 1u);
         continue;
       }
       if (top == stack) return;
@@ -97,7 +110,8 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
     }
   }
 
-  /// A node of two children, with the planes that end the lower and begin the upper one. Returns the child to go on with; another waits below it.
+  /// A node of two children, with the planes that end the lower and begin the upper one. Returns the child to go on
+  /// with; another waits below it.
   ARBORETUM_INLINE Entry* divide(Entry* top, unsigned axis, unsigned back) const {
     const bih::Node* const node = top->node;
     Entry* const near = top + 1;
@@ -105,7 +119,8 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
     Mask in_far = 0;
     near->mask = in_lanes(mask, [&](int k) {
       const F low = F::load(top->low + k), high = F::load(top->high + k);
-      const F near_high = min_x86(at_end(node->clip[back], axis, k), high), far_low = max_x86(at_begin(node->clip[1 - back], axis, k), low);
+      const F near_high = min_x86(at_end(node->clip[back], axis, k), high),
+              far_low = max_x86(at_begin(node->clip[1 - back], axis, k), low);
       low.store(near->low + k), near_high.store(near->high + k), far_low.store(top->low + k);
       in_far |= Mask((far_low <= high).bits()) << k;
       return low <= near_high;
@@ -121,7 +136,8 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
   ARBORETUM_INLINE Entry* clip(Entry* top, unsigned axis, unsigned back) const {
     const bih::Node* const node = top->node;
     const Mask in = in_lanes(top->mask, [&](int k) {
-      const F low = max_x86(at_begin(node->clip[back], axis, k), F::load(top->low + k)), high = min_x86(at_end(node->clip[1 - back], axis, k), F::load(top->high + k));
+      const F low = max_x86(at_begin(node->clip[back], axis, k), F::load(top->low + k)),
+              high = min_x86(at_end(node->clip[1 - back], axis, k), F::load(top->high + k));
       low.store(top->low + k), high.store(top->high + k);
       return low <= high;
     });
@@ -131,7 +147,8 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
   }
 
   /// A node visit of a packet counts as one of each of its rays.
-  void count([[maybe_unused]] Mask mask, [[maybe_unused]] unsigned boxes, [[maybe_unused]] Mask first, [[maybe_unused]] Mask second) const {
+  void count([[maybe_unused]] Mask mask, [[maybe_unused]] unsigned boxes, [[maybe_unused]] Mask first,
+             [[maybe_unused]] Mask second) const {
     if constexpr (Counting::kCounting) {
       for (; mask; mask &= mask - 1) {
         const int i = __builtin_ctzll(mask);

@@ -10,7 +10,8 @@
 
 namespace arboretum::bih {
 
-[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<Bih>, std::string_view builder) {
+[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<Bih>,
+                                                                      std::string_view builder) {
   std::vector<std::string_view> names = binary_builder_parameters(builder);
   names.insert(names.end(), {"traversal_cost", "intersection_cost", "max_leaf_blocks"});
   return names;

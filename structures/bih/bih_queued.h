@@ -1,7 +1,8 @@
 // Many rays in flight through a bounding interval hierarchy (traversal/queued_rays.h), by the steps of bih_single.h.
 //
-// A step is two planes, less work than to put it on a queue: one node at a time, rays in flight took 1.4 to 2.7 times as long as one after the other (docs/performance.md). So a turn of
-// a node goes on to the next leaf that the ray comes to; what is asked for ahead are that leaf's blocks, and the node that waits after it.
+// A step is two planes, less work than to put it on a queue: one node at a time, rays in flight took 1.4 to 2.7 times
+// as long as one after the other (docs/performance.md). So a turn of a node goes on to the next leaf that the ray comes
+// to; what is asked for ahead are that leaf's blocks, and the node that waits after it.
 #pragma once
 
 #include "structures/bih/bih_single.h"
@@ -31,10 +32,19 @@ class BihQueuedWalk : public ListedQueuedWalk<bih::Bih, Leaves, AnyHit> {
   std::size_t stack_entries() const { return tree_.stack_entries(); }
 
   ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
-    State& s = *new (state) State{Base::template constants<IntervalRay, 2>(ray), stack, stack, ray.tnear, ray.tfar, ray.tnear, NearestHit{ray.tfar}, Base::leaves_.prepare(ray)};
+    State& s = *new (state) State{Base::template constants<IntervalRay, 2>(ray),
+                                  stack,
+                                  stack,
+                                  ray.tnear,
+                                  ray.tfar,
+                                  ray.tnear,
+                                  NearestHit{ray.tfar},
+                                  Base::leaves_.prepare(ray)};
     clip_to_scene(tree_, s.interval, s.low, s.high);
   }
-  ARBORETUM_INLINE Target first(const State& s) const { return s.low <= s.high ? Target{0, Target::kNode} : Base::kEnd; }
+  ARBORETUM_INLINE Target first(const State& s) const {
+    return s.low <= s.high ? Target{0, Target::kNode} : Base::kEnd;
+  }
 
   ARBORETUM_INLINE void prefetch(Target target) const {
     if (target.kind == Target::kLeaf) {

@@ -18,7 +18,8 @@ struct IntervalRay {
 
   template <bool Padded>
   ARBORETUM_INLINE explicit IntervalRay(const BoxRay<2, Padded>& b) : IntervalRay(b.r, b.f, b.g) {}
-  ARBORETUM_INLINE IntervalRay(Vec3f known_r, Vec3f f, Vec3f g) : r{known_r.x, known_r.y, known_r.z}, begin{f.x, f.y, f.z}, end{g.x, g.y, g.z} {
+  ARBORETUM_INLINE IntervalRay(Vec3f known_r, Vec3f f, Vec3f g)
+      : r{known_r.x, known_r.y, known_r.z}, begin{f.x, f.y, f.z}, end{g.x, g.y, g.z} {
     for (int a = 0; a < 3; ++a) negative[a] = unsigned(__builtin_signbit(r[a]) != 0);
   }
   /// Where an interval begins that a plane begins.
@@ -32,12 +33,8 @@ struct IntervalRay {
 
 /// The later of a beginning and a plane's; the earlier of an end and a plane's. NaN for the plane's leaves
 /// it.
-ARBORETUM_INLINE float later(float plane, float low) {
-  return plane > low ? plane : low;
-}
-ARBORETUM_INLINE float earlier(float plane, float high) {
-  return plane < high ? plane : high;
-}
+ARBORETUM_INLINE float later(float plane, float low) { return plane > low ? plane : low; }
+ARBORETUM_INLINE float earlier(float plane, float high) { return plane < high ? plane : high; }
 
 struct IntervalEntry {
   std::uint32_t node;
@@ -59,10 +56,11 @@ ARBORETUM_INLINE void clip_to_scene(const bih::Bih& tree, const IntervalRay& int
 
 inline constexpr std::uint32_t kNoNode = ~0u;
 
-/// At an inner node of that kind, with the ray's interval [low, high] there: the child to go on with and its interval, or kNoNode where the ray meets none; where it meets two,
-/// the far one goes to the stack.
+/// At an inner node of that kind, with the ray's interval [low, high] there: the child to go on with and its interval,
+/// or kNoNode where the ray meets none; where it meets two, the far one goes to the stack.
 template <class Counting>
-ARBORETUM_INLINE std::uint32_t step_bih(const bih::Node* node, std::uint32_t kind, const IntervalRay& interval, float& low, float& high, IntervalEntry*& top, const Counting& counting) {
+ARBORETUM_INLINE std::uint32_t step_bih(const bih::Node* node, std::uint32_t kind, const IntervalRay& interval,
+                                        float& low, float& high, IntervalEntry*& top, const Counting& counting) {
   const std::uint32_t first = node->first();
   if (kind < bih::Node::kLeaf) {
     const unsigned axis = kind, back = interval.negative[axis];
@@ -90,7 +88,8 @@ ARBORETUM_INLINE std::uint32_t step_bih(const bih::Node* node, std::uint32_t kin
 
 /// The next that waits and its interval, or kNoNode; `nearest`: beyond it nothing is visited.
 template <bool AnyHit>
-ARBORETUM_INLINE std::uint32_t pop_bih(IntervalEntry*& top, const IntervalEntry* stack, float& low, float& high, float nearest) {
+ARBORETUM_INLINE std::uint32_t pop_bih(IntervalEntry*& top, const IntervalEntry* stack, float& low, float& high,
+                                       float nearest) {
   do {
     if (top == stack) return kNoNode;
     --top;
@@ -99,10 +98,12 @@ ARBORETUM_INLINE std::uint32_t pop_bih(IntervalEntry*& top, const IntervalEntry*
   return top->node;
 }
 
-/// What lies below `node`, where the ray's interval is [low, high]. visits(code) is called for leaves and ends the search where it is true.
+/// What lies below `node`, where the ray's interval is [low, high]. visits(code) is called for leaves and ends the
+/// search where it is true.
 template <bool AnyHit, class Counting, class Visits>
-ARBORETUM_INLINE bool search_bih(const bih::Bih& tree, const IntervalRay& interval, const bih::Node* node, float low, float high, NearestHit& best, const Counting& counting,
-                                 IntervalEntry* const stack, Visits& visits) {
+ARBORETUM_INLINE bool search_bih(const bih::Bih& tree, const IntervalRay& interval, const bih::Node* node, float low,
+                                 float high, NearestHit& best, const Counting& counting, IntervalEntry* const stack,
+                                 Visits& visits) {
   IntervalEntry* top = stack;
   const bih::Node* const nodes = tree.nodes();
   for (;;) {

@@ -26,13 +26,11 @@ const StructureInfo& BruteForce::static_info() {
 
 void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport&) {
   if (settings.builder != info().builders.front()) {
-    throw UserError(unknown_name_message("builder of brute_force", settings.builder,
-                                         std::vector<std::string>{"in_order"}));
+    throw UserError(
+        unknown_name_message("builder of brute_force", settings.builder, std::vector<std::string>{"in_order"}));
   }
-  constexpr std::size_t kMostTriangles =
-      0x7ffffffe;  // ids are compared as int32, and INT_MAX stands for none
-  if (mesh.size() > kMostTriangles)
-    throw UserError("brute_force: the mesh has more than 2^31 - 2 triangles; split it");
+  constexpr std::size_t kMostTriangles = 0x7ffffffe;  // ids are compared as int32, and INT_MAX stands for none
+  if (mesh.size() > kMostTriangles) throw UserError("brute_force: the mesh has more than 2^31 - 2 triangles; split it");
   const LeafForm* form = find_leaf_form(settings.leaf);
   if (!form) {
     throw UserError(unknown_name_message("leaf of brute_force", settings.leaf,

@@ -1,5 +1,5 @@
-// The kernels of brute_force: every block of the one leaf. There is no box to test, so `fast` and `padded` are the same function; both
-// rows exist, so that a sweep over box tests keeps its reference column.
+// The kernels of brute_force: every block of the one leaf. There is no box to test, so `fast` and `padded` are the same
+// function; both rows exist, so that a sweep over box tests keeps its reference column.
 #pragma once
 
 #include "traversal/kernel_rows.h"
@@ -12,7 +12,8 @@ template <class Leaves, bool, class Counting>
 class BruteForceKernel {
  public:
   BruteForceKernel(const Accel& accel, const KernelRow& row, Counting counting)
-      : accel_(static_cast<const brute_force::BruteForce&>(accel)), leaves_(row, accel_.vertices()), form_(*row.tests->form), counting_(counting) {}
+      : accel_(static_cast<const brute_force::BruteForce&>(accel)), leaves_(row, accel_.vertices()),
+        form_(*row.tests->form), counting_(counting) {}
 
   template <bool AnyHit>
   bool trace(const Ray& ray, float /*time*/, NearestHit& best) {

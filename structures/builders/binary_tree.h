@@ -34,7 +34,7 @@ struct BinaryTree {
   std::size_t node_count = 0;  ///< indices below this are in use, but for gaps
   MeteredVector<std::uint32_t> primitives;
   ReservedArray<std::uint32_t> first;  ///< one a node; set for leaves
-  bool duplicates = false;  ///< a primitive may be referenced by several leaves
+  bool duplicates = false;             ///< a primitive may be referenced by several leaves
 
   /// Where the references below `node` begin.
   [[nodiscard]] std::uint32_t begin_of(std::uint32_t node) const noexcept {

@@ -1,5 +1,5 @@
-// Box4: a box in two registers of four lanes, and triangles fetched ahead of their use. For builders that are written once for
-// all instruction sets: SSE2 is in every x86-64.
+// Box4: a box in two registers of four lanes, and triangles fetched ahead of their use. For builders that are written
+// once for all instruction sets: SSE2 is in every x86-64.
 #pragma once
 
 #include <algorithm>
@@ -44,7 +44,8 @@ class TriangleVertices {
       : vertices_(mesh.vertices.data()), last_(std::uint32_t(mesh.vertices.size() - 1)) {}
   /// The array's last vertex is not read beyond.
   [[nodiscard]] __m128 operator[](std::uint32_t v) const noexcept {
-    if (v != last_) [[likely]] return _mm_loadu_ps(&vertices_[v].x);
+    if (v != last_) [[likely]]
+      return _mm_loadu_ps(&vertices_[v].x);
     return _mm_setr_ps(vertices_[v].x, vertices_[v].y, vertices_[v].z, 0.0f);
   }
 
@@ -64,12 +65,13 @@ class TriangleBoxes {
     const __m128 a = corner_[t.a], b = corner_[t.b], c = corner_[t.c];
     return {_mm_min_ps(_mm_min_ps(a, b), c), _mm_max_ps(_mm_max_ps(a, b), c)};
   }
-  /// Asks for what boxes of the triangles ids[begin, end) take, of `last` + 1 ids in the order of their use: vertices some triangles ahead,
-  /// triangles twice as many. Not for a small mesh, which the caches hold.
+  /// Asks for what boxes of the triangles ids[begin, end) take, of `last` + 1 ids in the order of their use: vertices
+  /// some triangles ahead, triangles twice as many. Not for a small mesh, which the caches hold.
   ///
   /// Inlined by force: a function that only prefetches counts as one without effect, and GCC 12 leaves calls of it out.
   template <class Ids>
-  __attribute__((always_inline)) void prefetch(const Ids& id, std::size_t begin, std::size_t end, std::size_t last) const noexcept {
+  __attribute__((always_inline)) void prefetch(const Ids& id, std::size_t begin, std::size_t end,
+                                               std::size_t last) const noexcept {
     if (!far_) return;
     for (std::size_t i = begin; i < end; ++i) {
       ask(triangles_ + id(std::min(i + 2 * kAhead, last)));
@@ -81,7 +83,9 @@ class TriangleBoxes {
  private:
   static constexpr std::size_t kNear = std::size_t{1} << 17;  ///< triangles; some 2 MB
   static constexpr std::size_t kAhead = 24;
-  __attribute__((always_inline)) static void ask(const void* p) noexcept { _mm_prefetch(static_cast<const char*>(p), _MM_HINT_T0); }
+  __attribute__((always_inline)) static void ask(const void* p) noexcept {
+    _mm_prefetch(static_cast<const char*>(p), _MM_HINT_T0);
+  }
   const Triangle* triangles_;
   const Vec3f* vertices_;
   TriangleVertices corner_;

@@ -12,10 +12,18 @@
 
 namespace arboretum {
 
-namespace isa_scalar { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
-namespace isa_sse { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
-namespace isa_avx2 { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
-namespace isa_avx512 { extern const BinaryBuilder kBinnedSah, kSpatialSah; }
+namespace isa_scalar {
+extern const BinaryBuilder kBinnedSah, kSpatialSah;
+}
+namespace isa_sse {
+extern const BinaryBuilder kBinnedSah, kSpatialSah;
+}
+namespace isa_avx2 {
+extern const BinaryBuilder kBinnedSah, kSpatialSah;
+}
+namespace isa_avx512 {
+extern const BinaryBuilder kBinnedSah, kSpatialSah;
+}
 
 namespace {
 
@@ -41,16 +49,22 @@ struct Entry {
   std::string_view name;
   BinaryBuilder (*on)(Isa);
   std::array<std::string_view, 4> reads = {};  ///< of BuilderParameters; reinsertion's apart
-  unsigned reinserted_top = 0;  ///< where reinsertion_top leaves it to the builder
+  unsigned reinserted_top = 0;                 ///< where reinsertion_top leaves it to the builder
 };
 
 /// Nodes that top-down builders reinsert: hardly more is gained by all (docs/performance.md).
 constexpr unsigned kTop = 512, kMostTop = 65536;
 
 constexpr Entry kBuilders[] = {
-    {"binned_sah", on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>, {"bins"}, kTop},
+    {"binned_sah",
+     on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>,
+     {"bins"},
+     kTop},
     {"sweep_sah", on_any<build_sweep_sah>, {}, kTop},
-    {"spatial_sah", on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>, {"bins", "duplication_budget", "spatial_overlap", "spatial_gain"}, kTop},
+    {"spatial_sah",
+     on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>,
+     {"bins", "duplication_budget", "spatial_overlap", "spatial_gain"},
+     kTop},
     {"morton", on_any<build_morton>, {"morton_bits"}},
     {"ploc", on_any<build_ploc>, {"morton_bits", "ploc_radius"}},
 #ifdef ARBORETUM_HAVE_EMBREE
@@ -66,9 +80,11 @@ constexpr std::string_view kReinsertion = "_reinsertion";
 }  // namespace
 
 void require_budget(std::string_view builder, std::size_t triangles, float budget) {
-  if (!(budget >= 0.0f && budget <= 4.0f)) throw UserError("duplication_budget: " + std::to_string(budget) + " is not within 0 .. 4");
+  if (!(budget >= 0.0f && budget <= 4.0f))
+    throw UserError("duplication_budget: " + std::to_string(budget) + " is not within 0 .. 4");
   if (double(triangles) * (1.0 + double(budget)) > double(kMaxReferences)) {
-    throw UserError(std::string(builder) + ": " + std::to_string(triangles) + " triangles and a duplication_budget of " + std::to_string(budget) +
+    throw UserError(std::string(builder) + ": " + std::to_string(triangles) +
+                    " triangles and a duplication_budget of " + std::to_string(budget) +
                     " make more than 2^30 - 1 references; take a smaller duplication_budget or a smaller mesh");
   }
 }
@@ -107,9 +123,11 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
   const bool reinserts = builder.ends_with(kReinsertion);
   if (reinserts) builder.remove_suffix(kReinsertion.size());
   const unsigned rounds = settings.parameters.reinsertion_rounds;
-  if (reinserts && (rounds < 1 || rounds > 64)) throw UserError("reinsertion_rounds: " + std::to_string(rounds) + " is not within 1 .. 64");
+  if (reinserts && (rounds < 1 || rounds > 64))
+    throw UserError("reinsertion_rounds: " + std::to_string(rounds) + " is not within 1 .. 64");
   const unsigned top = settings.parameters.reinsertion_top;
-  if (top != BuilderParameters::kOwn && top > kMostTop) throw UserError("reinsertion_top: " + std::to_string(top) + " is not within 0 .. " + std::to_string(kMostTop));
+  if (top != BuilderParameters::kOwn && top > kMostTop)
+    throw UserError("reinsertion_top: " + std::to_string(top) + " is not within 0 .. " + std::to_string(kMostTop));
   for (const Entry& e : kBuilders) {
     if (e.name != builder) continue;
     const bool splits = builder == "spatial_sah" || builder == "embree_high";

@@ -10,23 +10,25 @@
 
 namespace arboretum {
 
-/// Builds a binary tree with leaves of at most `leaf_width` references. Deterministic: the tree depends on the mesh, the
-/// parameters and `leaf_width`, not on threads or ISA. Runs in the caller's TBB arena. The mesh may be empty: then the tree is, too.
+/// Builds a binary tree with leaves of at most `leaf_width` references. Deterministic: the tree depends on the mesh,
+/// the parameters and `leaf_width`, not on threads or ISA. Runs in the caller's TBB arena. The mesh may be empty: then
+/// the tree is, too.
 using BinaryBuilder = void (*)(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
                                BinaryTree& tree, BuildReport& report);
 
 /// Every builder that makes a binary tree; the first is the default.
 [[nodiscard]] const std::vector<std::string_view>& binary_builder_names();
 
-/// Builds with settings.builder, using kernels of settings.isa. Throws UserError where there is no such builder, and for
-/// parameters out of range.
+/// Builds with settings.builder, using kernels of settings.isa. Throws UserError where there is no such builder, and
+/// for parameters out of range.
 void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, unsigned leaf_width, BinaryTree& tree,
                        BuildReport& report);
 
 /// References that a tree of two nodes each can have, numbered in 31 bits.
 inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 30) - 1;
 
-/// Throws UserError where so many triangles and, of those, a share `budget` of references more are above kMaxReferences, or the budget is not within 0 .. 4.
+/// Throws UserError where so many triangles and, of those, a share `budget` of references more are above
+/// kMaxReferences, or the budget is not within 0 .. 4.
 void require_budget(std::string_view builder, std::size_t triangles, float budget);
 
 }  // namespace arboretum

@@ -34,7 +34,8 @@ Bounds3f clip_to_slab(const std::array<Vec3f, 3>& corners, int axis, float lower
     least = std::min(least, a[axis]), most = std::max(most, a[axis]);
     if (a[axis] >= lower && a[axis] <= upper) box.extend(a);
     for (float plane : {lower, upper}) {
-      if (std::min(a[axis], b[axis]) < plane && plane < std::max(a[axis], b[axis])) extend_by_crossing(box, a, b, axis, plane);
+      if (std::min(a[axis], b[axis]) < plane && plane < std::max(a[axis], b[axis]))
+        extend_by_crossing(box, a, b, axis, plane);
     }
   }
   box.lower[axis] = std::max(least, lower), box.upper[axis] = std::min(most, upper);
@@ -48,7 +49,8 @@ void clip_by_plane(const std::array<Vec3f, 3>& corners, int axis, float plane, B
     const Vec3f a = corners[std::size_t(i)], b = corners[std::size_t((i + 1) % 3)];
     if (a[axis] <= plane) low.extend(a);
     if (a[axis] >= plane) high.extend(a);
-    if (std::min(a[axis], b[axis]) < plane && plane < std::max(a[axis], b[axis])) extend_by_crossing(cut, a, b, axis, plane);
+    if (std::min(a[axis], b[axis]) < plane && plane < std::max(a[axis], b[axis]))
+      extend_by_crossing(cut, a, b, axis, plane);
   }
   if (low.empty() || high.empty()) return;
   // A cut has no extent along the axis but where it lies.

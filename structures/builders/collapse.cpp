@@ -16,7 +16,8 @@ namespace arboretum {
 namespace {
 constexpr std::uint32_t kParallel = 1u << 12;
 constexpr std::uint32_t kTooMany = 1000;  // references, more than a leaf holds
-/// What a leaf costs beside its blocks, in blocks. SAH knows none of it; where boxes overlap (`generate: needles`) rays lose by trees that open every leaf.
+/// What a leaf costs beside its blocks, in blocks. SAH knows none of it; where boxes overlap (`generate: needles`) rays
+/// lose by trees that open every leaf.
 constexpr float kLeafVisit = 0.25f;
 
 /// The references without repetitions, sorted, in `room`.
@@ -28,7 +29,8 @@ std::span<const std::uint32_t> distinct(std::span<const std::uint32_t> reference
 
 }  // namespace
 
-/// cost[k - 1]: least cost of the subtree in at most k slots of its parent; infinite above `slots`, and so is what stands before it.
+/// cost[k - 1]: least cost of the subtree in at most k slots of its parent; infinite above `slots`, and so is what
+/// stands before it.
 struct Collapse::Costs {
   alignas(16) float before[kMaxBranching];
   float cost[kMaxBranching];
@@ -44,8 +46,8 @@ struct Collapse::Costs {
   }
 };
 
-/// least[k - 1]: the least sum of two subtrees' costs in exactly k slots, k up to `slots`; left[k - 1]: of these the left one's, the fewest of
-/// equals. All k in lanes.
+/// least[k - 1]: the least sum of two subtrees' costs in exactly k slots, k up to `slots`; left[k - 1]: of these the
+/// left one's, the fewest of equals. All k in lanes.
 struct Collapse::Shares {
   alignas(16) float least[kMaxBranching];
   alignas(16) std::int32_t left[kMaxBranching];
@@ -54,7 +56,8 @@ struct Collapse::Shares {
     do {
       __m128 best = _mm_set1_ps(std::numeric_limits<float>::infinity());
       __m128i share = _mm_set1_epi32(1);
-      const unsigned most_left = std::min(a.slots, at + 3);  // these lanes' slots are at + 1 .. at + 4, and the right side needs one too
+      // These lanes' slots are at + 1 .. at + 4, and the right side needs one too
+      const unsigned most_left = std::min(a.slots, at + 3);
       for (unsigned l = at + 1 > b.slots ? at + 1 - b.slots : 1; l <= most_left; ++l) {
         const __m128 sum = _mm_add_ps(_mm_set1_ps(a.cost[l - 1]), _mm_loadu_ps(b.before + kMaxBranching + at - l));
         const __m128i less = _mm_castps_si128(_mm_cmplt_ps(sum, best));
@@ -79,10 +82,12 @@ Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : t
   }
 }
 
-/// How many references the leaf made from this node would hold. Where a subtree's leaves may repeat primitives, so does not the leaf.
+/// How many references the leaf made from this node would hold. Where a subtree's leaves may repeat primitives, so does
+/// not the leaf.
 unsigned Collapse::leaf_references(std::uint32_t index) const noexcept {
   const BinaryNode& node = tree_.nodes[index];
-  const bool repeats = tree_.duplicates && !node.is_leaf() && node.count <= kMaxMergedReferences && blocks_for(node.count) <= 2 * settings_.max_leaf_blocks;
+  const bool repeats = tree_.duplicates && !node.is_leaf() && node.count <= kMaxMergedReferences &&
+                       blocks_for(node.count) <= 2 * settings_.max_leaf_blocks;
   if (!repeats) return std::min(node.count, kTooMany);
   LeafPrimitives room;
   return unsigned(distinct({tree_.primitives.data() + tree_.begin_of(index), node.count}, room).size());
@@ -91,7 +96,8 @@ unsigned Collapse::leaf_references(std::uint32_t index) const noexcept {
 void Collapse::optimise(std::uint32_t index, Costs& out) {
   const BinaryNode& node = tree_.nodes[index];
   const float area = node.half_area();
-  const unsigned n = settings_.branching, references = tree_.duplicates ? leaf_references(index) : std::min(node.count, kTooMany);
+  const unsigned n = settings_.branching,
+                 references = tree_.duplicates ? leaf_references(index) : std::min(node.count, kTooMany);
   const unsigned leaf_blocks = blocks_for(references);
   const float leaf_cost = area * (kLeafVisit + float(leaf_blocks)) * settings_.intersection_cost;
   out.clear(n);
@@ -116,7 +122,8 @@ void Collapse::optimise(std::uint32_t index, Costs& out) {
     if (split_cost[k - 1] < split_cost[cheapest - 1]) cheapest = k;
   }
   const float inner_cost = area * settings_.traversal_cost + split_cost[cheapest - 1];
-  const bool leaf = node.count <= kMaxMergedReferences && leaf_blocks <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;
+  const bool leaf =
+      node.count <= kMaxMergedReferences && leaf_blocks <= settings_.max_leaf_blocks && leaf_cost <= inner_cost;
   plan_[index] = {std::uint16_t(references), std::uint16_t(cheapest), leaf};
   float cost = out.cost[0] = leaf ? leaf_cost : inner_cost;
   // A leaf in one slot may still be opened into several, where the parent has them to spare.
@@ -170,7 +177,8 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
     float largest_area = -1.0f;
     for (unsigned i = 0; i < out.size; ++i) {
       if (is_leaf(out.node[i])) continue;
-      if (const float area = tree_.nodes[out.node[i]].half_area(); area > largest_area) largest_area = area, largest = int(i);
+      if (const float area = tree_.nodes[out.node[i]].half_area(); area > largest_area)
+        largest_area = area, largest = int(i);
     }
     if (largest < 0) break;
     const std::uint32_t opened = tree_.nodes[out.node[largest]].left;
@@ -183,14 +191,17 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
 /// Places in the array depend on scheduling, the tree does not.
 class Collapse::Writer {
  public:
-  /// The nodes [next, end) of a run, which the tasks of one place in the arena take next: by runs tasks seldom meet at the counter or in a line of memory.
+  /// The nodes [next, end) of a run, which the tasks of one place in the arena take next: by runs tasks seldom meet at
+  /// the counter or in a line of memory.
   struct alignas(64) Share {
     std::uint32_t next = 0, end = 0;
   };
 
   Writer(const Collapse& collapse, ReservedArray<WideNode>& out)
-      : collapse_(collapse), tree_(collapse.tree_), out_(out), shares_(std::size_t(tbb::this_task_arena::max_concurrency())) {
-    // A run ends where fewer are left than siblings are asked for; and each place leaves one unfinished, the root's task another.
+      : collapse_(collapse), tree_(collapse.tree_), out_(out),
+        shares_(std::size_t(tbb::this_task_arena::max_concurrency())) {
+    // A run ends where fewer are left than siblings are asked for; and each place leaves one unfinished, the root's
+    // task another.
     const std::size_t runs = tree_.node_count / (kRun - kMaxBranching) + 1 + shares_.size() + 1;
     out.reserve(1 + runs * kRun), out.hand_out(1);
   }
@@ -199,7 +210,8 @@ class Collapse::Writer {
     Share share;
     (void)write(0, 0, share);
     shares_.push_back(share);
-    for (const Share& unfinished : shares_) out_.hand_out(unfinished.end > 0 ? kRun - (unfinished.end - unfinished.next) : 0);
+    for (const Share& unfinished : shares_)
+      out_.hand_out(unfinished.end > 0 ? kRun - (unfinished.end - unfinished.next) : 0);
   }
 
  private:
@@ -234,7 +246,9 @@ class Collapse::Writer {
     const auto child = [&](unsigned i, Share& its) { costs[i] = write(slots.node[i], first + i, its); };
     if (node.count > kParallel) {
       // A thread that waits here takes up other tasks, but none at the same time: its place's share is its own.
-      tbb::parallel_for(0u, slots.size, [&](unsigned i) { child(i, shares_[std::size_t(tbb::this_task_arena::current_thread_index())]); });
+      tbb::parallel_for(0u, slots.size, [&](unsigned i) {
+        child(i, shares_[std::size_t(tbb::this_task_arena::current_thread_index())]);
+      });
     } else {
       for (unsigned i = 0; i < slots.size; ++i) child(i, share);
     }
@@ -250,11 +264,12 @@ class Collapse::Writer {
     return cost;
   }
 
-  /// Puts children that cost little, such as leaves, last, where any hit looks first; others of much the same cost, within a factor of eight, stay as the builder has them,
-  /// next to each other in space.
+  /// Puts children that cost little, such as leaves, last, where any hit looks first; others of much the same cost,
+  /// within a factor of eight, stay as the builder has them, next to each other in space.
   static void order(WideNode* children, const float* costs, unsigned size) noexcept {
     int cost[kMaxBranching];
-    for (unsigned i = 0; i < size; ++i) cost[i] = std::ilogb(costs[i] * 0x1.6a09e6p1f) / 3;  // round(log8(cost)): of at least 1, but for settings of one's own
+    // round(log8(cost)): of at least 1, but for settings of one's own
+    for (unsigned i = 0; i < size; ++i) cost[i] = std::ilogb(costs[i] * 0x1.6a09e6p1f) / 3;
     for (unsigned i = 1; i < size; ++i) {
       const WideNode moved = children[i];
       const int its = cost[i];

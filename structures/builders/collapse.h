@@ -1,5 +1,6 @@
 // Collapse: a binary tree into a tree of branching factor N (Wald, Benthin, Boulos 2008), greedily by area or with the
-// least SAH cost by dynamic programming (as Aila and Karras 2010 choose treelets; Ylitie, Karras, Laine 2017 for wide BVHs).
+// least SAH cost by dynamic programming (as Aila and Karras 2010 choose treelets; Ylitie, Karras, Laine 2017 for wide
+// BVHs).
 #pragma once
 
 #include <array>
@@ -17,13 +18,13 @@ inline constexpr unsigned kMaxMergedReferences = 256;
 
 struct CollapseSettings {
   unsigned branching = 8;
-  unsigned block_width = 4;      ///< triangles a leaf block
+  unsigned block_width = 4;  ///< triangles a leaf block
   unsigned max_leaf_blocks = 4;
   float traversal_cost = 1.0f;
   float intersection_cost = 1.0f;
   bool optimal = true;
   std::size_t node_bytes = 0, block_bytes = 0;  ///< what a wide node and a leaf block take
-  std::size_t granule = 32;  ///< nodes and leaves take multiples of so many bytes
+  std::size_t granule = 32;                     ///< nodes and leaves take multiples of so many bytes
 };
 
 /// Room for the primitives of a leaf that is merged from a subtree.
@@ -38,9 +39,9 @@ struct Slots {
 /// A node or leaf of a wide tree.
 struct WideNode {
   Bounds3f box;
-  std::uint32_t first;     ///< of a node's children in WideTree::nodes; of a leaf's references in WideTree::primitives
-  std::uint32_t count;     ///< references below
-  std::uint64_t bytes : 48;  ///< of the subtree: its own, in granules, and all below
+  std::uint32_t first;  ///< of a node's children in WideTree::nodes; of a leaf's references in WideTree::primitives
+  std::uint32_t count;  ///< references below
+  std::uint64_t bytes : 48;    ///< of the subtree: its own, in granules, and all below
   std::uint64_t children : 6;  ///< 0 for a leaf
   std::uint64_t blocks : 9;    ///< of a leaf
   std::uint64_t repeats : 1;   ///< the leaf's references may name a primitive more than once
@@ -49,15 +50,18 @@ struct WideNode {
 };
 static_assert(sizeof(WideNode) == 40);
 
-/// What of a binary tree becomes of a wide one: all that has to be known to write it. Node 0 is the root, children stand next to each other, the ones of which the SAH expects
-/// the least work last: there any hit looks first.
+/// What of a binary tree becomes of a wide one: all that has to be known to write it. Node 0 is the root, children
+/// stand next to each other, the ones of which the SAH expects the least work last: there any hit looks first.
 struct WideTree {
   ReservedArray<WideNode> nodes;
   MeteredVector<std::uint32_t> primitives;
 
-  [[nodiscard]] std::span<const WideNode> children(const WideNode& node) const noexcept { return {nodes.data() + node.first, node.children}; }
+  [[nodiscard]] std::span<const WideNode> children(const WideNode& node) const noexcept {
+    return {nodes.data() + node.first, node.children};
+  }
   /// The primitives of a leaf, none of them twice; in `room`, or in the tree where it holds them so.
-  [[nodiscard]] std::span<const std::uint32_t> leaf_primitives(const WideNode& leaf, LeafPrimitives& room) const noexcept;
+  [[nodiscard]] std::span<const std::uint32_t> leaf_primitives(const WideNode& leaf,
+                                                               LeafPrimitives& room) const noexcept;
 };
 
 /// The wide tree, and none of the binary one any more.
@@ -89,18 +93,22 @@ class Collapse {
   void optimise(std::uint32_t node, Costs& out);
   void choose_leaves(std::uint32_t node);
   [[nodiscard]] unsigned leaf_references(std::uint32_t node) const noexcept;
-  [[nodiscard]] unsigned blocks_for(unsigned references) const noexcept { return (references + settings_.block_width - 1) / settings_.block_width; }
+  [[nodiscard]] unsigned blocks_for(unsigned references) const noexcept {
+    return (references + settings_.block_width - 1) / settings_.block_width;
+  }
   void expand(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
   void expand_children(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
 
   /// Of an inner node: one row for each pair of children.
-  [[nodiscard]] std::size_t choices_of(std::uint32_t node) const noexcept { return std::size_t(tree_.nodes[node].left / 2) * settings_.branching; }
+  [[nodiscard]] std::size_t choices_of(std::uint32_t node) const noexcept {
+    return std::size_t(tree_.nodes[node].left / 2) * settings_.branching;
+  }
 
   const BinaryTree& tree_;
   const CollapseSettings settings_;
   MeteredVector<Plan> plan_;
-  /// [choices_of(node) + k - 1], k >= 2: below, the left child's share of k slots less one; above (4 bits), how many of at most
-  /// k slots to use, less one.
+  /// [choices_of(node) + k - 1], k >= 2: below, the left child's share of k slots less one; above (4 bits), how many of
+  /// at most k slots to use, less one.
   MeteredVector<std::uint8_t> choice_;
 };
 

@@ -29,8 +29,8 @@
 namespace arboretum {
 namespace {
 
-constexpr unsigned kMaxDepth = 128;         ///< deeper down Embree halves ranges without a look
-constexpr float kLargest = 1.844e18f;       ///< Embree's own bound on coordinates
+constexpr unsigned kMaxDepth = 128;    ///< deeper down Embree halves ranges without a look
+constexpr float kLargest = 1.844e18f;  ///< Embree's own bound on coordinates
 constexpr std::size_t kGrain = 1u << 12;
 
 /// What the callbacks make, in Embree's memory. A leaf has no children.
@@ -42,7 +42,9 @@ struct Node {
   [[nodiscard]] const std::uint32_t* ids() const noexcept { return reinterpret_cast<const std::uint32_t*>(this + 1); }
 };
 
-Bounds3f to_bounds(const RTCBounds& b) noexcept { return {{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}}; }
+Bounds3f to_bounds(const RTCBounds& b) noexcept {
+  return {{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}};
+}
 
 void* create_node(RTCThreadLocalAllocator allocator, unsigned, void*) {
   return new (rtcThreadLocalAlloc(allocator, sizeof(Node), 16)) Node{};
@@ -56,8 +58,8 @@ void set_bounds(void* node, const RTCBounds** bounds, unsigned count, void*) {
   for (unsigned i = 0; i < count; ++i) static_cast<Node*>(node)->box[i] = to_bounds(*bounds[i]);
 }
 
-/// A triangle that several parts of which end in one leaf is referenced once; ids ascend, so that threads leave no trace in
-/// their order.
+/// A triangle that several parts of which end in one leaf is referenced once; ids ascend, so that threads leave no
+/// trace in their order.
 void* create_leaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* primitives, std::size_t count, void*) {
   auto* leaf = new (rtcThreadLocalAlloc(allocator, sizeof(Node) + count * sizeof(std::uint32_t), 16)) Node{};
   for (std::size_t i = 0; i < count; ++i) {
@@ -70,8 +72,10 @@ void* create_leaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* pr
   return leaf;
 }
 
-/// What of a part of a triangle lies on either side of a plane: the triangle clipped to the side, within the part's box, as Embree clips its own triangles.
-void split_primitive(const RTCBuildPrimitive* primitive, unsigned dimension, float position, RTCBounds* left, RTCBounds* right, void* mesh) {
+/// What of a part of a triangle lies on either side of a plane: the triangle clipped to the side, within the part's
+/// box, as Embree clips its own triangles.
+void split_primitive(const RTCBuildPrimitive* primitive, unsigned dimension, float position, RTCBounds* left,
+                     RTCBounds* right, void* mesh) {
   const RTCBuildPrimitive& p = *primitive;
   const Bounds3f box{{p.lower_x, p.lower_y, p.lower_z}, {p.upper_x, p.upper_y, p.upper_z}};
   const auto corners = static_cast<const TriangleMesh*>(mesh)->corners(p.primID);
@@ -128,8 +132,8 @@ bool on_memory(void*, std::ptrdiff_t bytes, bool) {
   return true;
 }
 
-void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
-           BuildReport& report) {
+void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+           BinaryTree& tree, BuildReport& report) {
   const std::size_t n = mesh.size();
   if (n == 0) return;
   PhaseClock phase(report);
@@ -144,10 +148,12 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
       primitives[i] = {b.lower.x, b.lower.y, b.lower.z, 0, b.upper.x, b.upper.y, b.upper.z, std::uint32_t(i)};
     }
   });
-  if (too_large) throw UserError("embree's builders take coordinates up to 1.8e18; scale the scene or take one of our builders");
+  if (too_large)
+    throw UserError("embree's builders take coordinates up to 1.8e18; scale the scene or take one of our builders");
   phase.ends("references");
 
-  const std::unique_ptr<std::remove_pointer_t<RTCDevice>, void (*)(RTCDevice)> device(rtcNewDevice("set_affinity=0"), &rtcReleaseDevice);
+  const std::unique_ptr<std::remove_pointer_t<RTCDevice>, void (*)(RTCDevice)> device(rtcNewDevice("set_affinity=0"),
+                                                                                      &rtcReleaseDevice);
   if (!device) throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
   rtcSetDeviceMemoryMonitorFunction(device.get(), &on_memory, nullptr);
   LinkedTree linked;
@@ -166,7 +172,9 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
     if (spatial) arguments.splitPrimitive = &split_primitive;
     arguments.userPtr = const_cast<TriangleMesh*>(&mesh);
     auto* root = static_cast<Node*>(rtcBuildBVH(&arguments));  // works in the caller's arena
-    if (!root) throw std::runtime_error("embree: rtcBuildBVH failed, error " + std::to_string(int(rtcGetDeviceError(device.get()))));
+    if (!root)
+      throw std::runtime_error("embree: rtcBuildBVH failed, error " +
+                               std::to_string(int(rtcGetDeviceError(device.get()))));
     phase.ends("embree");
     Reader(*root, linked);
   }
@@ -177,15 +185,18 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
 
 }  // namespace
 
-void build_embree_low(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report) {
+void build_embree_low(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+                      BinaryTree& tree, BuildReport& report) {
   build(RTC_BUILD_QUALITY_LOW, mesh, parameters, leaf_width, tree, report);
 }
 
-void build_embree_medium(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report) {
+void build_embree_medium(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+                         BinaryTree& tree, BuildReport& report) {
   build(RTC_BUILD_QUALITY_MEDIUM, mesh, parameters, leaf_width, tree, report);
 }
 
-void build_embree_high(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report) {
+void build_embree_high(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+                       BinaryTree& tree, BuildReport& report) {
   build(RTC_BUILD_QUALITY_HIGH, mesh, parameters, leaf_width, tree, report);
 }
 

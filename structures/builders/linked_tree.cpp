@@ -17,7 +17,8 @@ constexpr unsigned kForkLevels = 8;  ///< where sizes are not known yet, the fir
 
 class Layout {
  public:
-  Layout(const LinkedTree& tree, unsigned leaf_width) : tree_(tree), leaf_width_(leaf_width), sizes_(tree.nodes.size()) {}
+  Layout(const LinkedTree& tree, unsigned leaf_width)
+      : tree_(tree), leaf_width_(leaf_width), sizes_(tree.nodes.size()) {}
 
   BinaryTree run() {
     const Size all = count(tree_.root, 0);
@@ -42,7 +43,8 @@ class Layout {
       left = count(node.left, level + 1), right = count(node.right, level + 1);
     }
     const std::uint32_t references = left.references + right.references;
-    return sizes_[index] = {references, references <= leaf_width_ && !tree_.duplicates ? 1 : 1 + left.nodes + right.nodes};
+    return sizes_[index] = {references,
+                            references <= leaf_width_ && !tree_.duplicates ? 1 : 1 + left.nodes + right.nodes};
   }
 
   /// Node `index` goes to `slot`, what is below to next, next + 1, ..., its references from `first` on.
@@ -84,7 +86,8 @@ class Layout {
 BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width) { return Layout(tree, leaf_width).run(); }
 
 LinkedTree to_linked(BinaryTree&& tree) {
-  if (tree.node_count > LinkedNode::kLeaf) throw UserError("reinsertion: a tree of more than 2^31 nodes; take wider leaf blocks or a smaller mesh");
+  if (tree.node_count > LinkedNode::kLeaf)
+    throw UserError("reinsertion: a tree of more than 2^31 nodes; take wider leaf blocks or a smaller mesh");
   LinkedTree out;
   out.nodes.resize(tree.node_count);
   // Unused slots of the binary tree hold anything; nothing names them.
@@ -92,7 +95,8 @@ LinkedTree to_linked(BinaryTree&& tree) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const BinaryNode& node = tree.nodes[i];
       const Bounds3f box{node.lower, node.upper};
-      out.nodes[i] = node.is_leaf() ? LinkedNode::leaf(box, tree.first[i], node.count) : LinkedNode::inner(box, node.left, node.left + 1);
+      out.nodes[i] = node.is_leaf() ? LinkedNode::leaf(box, tree.first[i], node.count)
+                                    : LinkedNode::inner(box, node.left, node.left + 1);
     }
   });
   out.primitives = std::move(tree.primitives), out.duplicates = tree.duplicates;

@@ -1,4 +1,5 @@
-// LinkedTree: a binary tree whose nodes stand anywhere, as bottom-up builders and optimisers keep it; lay_out() makes a BinaryTree.
+// LinkedTree: a binary tree whose nodes stand anywhere, as bottom-up builders and optimisers keep it; lay_out() makes a
+// BinaryTree.
 #pragma once
 
 #include <cstdint>
@@ -37,8 +38,9 @@ struct LinkedTree {
   bool duplicates = false;                  ///< a primitive may be referenced by several leaves
 };
 
-/// The same tree with children next to each other and references in order of the leaves; a subtree of at most `leaf_width`
-/// references becomes one leaf, unless it might name a primitive twice. The result depends on the tree alone. Runs in the caller's TBB arena. The tree is not empty.
+/// The same tree with children next to each other and references in order of the leaves; a subtree of at most
+/// `leaf_width` references becomes one leaf, unless it might name a primitive twice. The result depends on the tree
+/// alone. Runs in the caller's TBB arena. The tree is not empty.
 [[nodiscard]] BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width);
 
 /// The other way: nodes keep their numbers. Throws UserError where those take more than 31 bits.

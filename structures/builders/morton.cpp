@@ -1,7 +1,9 @@
-// Linear BVH (Lauterbach et al., Eurographics 2009): triangles in Morton order, cut from the top where the highest differing bit
-// of the codes changes; boxes on the way back. Equal codes are cut in the middle, so a million of them are 20 levels.
+// Linear BVH (Lauterbach et al., Eurographics 2009): triangles in Morton order, cut from the top where the highest
+// differing bit of the codes changes; boxes on the way back. Equal codes are cut in the middle, so a million of them
+// are 20 levels.
 //
-// Unlike in the paper a range that a few leaf blocks hold is cut only where those are not made more, so that leaves are full.
+// Unlike in the paper a range that a few leaf blocks hold is cut only where those are not made more, so that leaves are
+// full.
 #include <algorithm>
 
 #include <tbb/parallel_invoke.h>
@@ -16,8 +18,9 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kParallel = 1u << 12;
-constexpr std::size_t kFewBlocks = 3;  ///< ranges of so many leaf blocks are cut where they fill no more
-constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 21 bits of their codes at first, in two passes; more by 30 bits, in three
+constexpr std::size_t kFewBlocks = 3;     ///< ranges of so many leaf blocks are cut where they fill no more
+constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 21 bits of their codes at first, in two
+                                          ///< passes; more by 30 bits, in three
 
 class Lbvh {
  public:
@@ -41,11 +44,13 @@ class Lbvh {
   }
 
   std::size_t split(std::size_t begin, std::size_t end) const noexcept {
-    return end - begin <= kFewBlocks * leaf_width_ ? order_.split_into_blocks(begin, end, leaf_width_) : order_.split(begin, end);
+    return end - begin <= kFewBlocks * leaf_width_ ? order_.split_into_blocks(begin, end, leaf_width_)
+                                                   : order_.split(begin, end);
   }
 
   /// [begin, end) is sorted by the first `sorted` bits of the codes; the task that calls goes on up to `last`.
-  Box4 recurse(std::size_t begin, std::size_t end, std::size_t last, std::uint32_t index, unsigned sorted, NodePool::Share& share) {
+  Box4 recurse(std::size_t begin, std::size_t end, std::size_t last, std::uint32_t index, unsigned sorted,
+               NodePool::Share& share) {
     Box4 box;
     std::uint32_t left = 0;
     if (end - begin <= leaf_width_) {

@@ -22,7 +22,8 @@ constexpr unsigned kMostDigitBits = 8;             ///< of a small digit
 
 template <class F>
 void for_chunks(std::size_t n, const F& f) {
-  tbb::parallel_for(std::size_t{0}, (n + kChunk - 1) / kChunk, [&](std::size_t c) { f(c, c * kChunk, std::min(n, (c + 1) * kChunk)); });
+  tbb::parallel_for(std::size_t{0}, (n + kChunk - 1) / kChunk,
+                    [&](std::size_t c) { f(c, c * kChunk, std::min(n, (c + 1) * kChunk)); });
 }
 
 __m128 doubled_centroid(const Box4& box) noexcept { return _mm_add_ps(box.lower, box.upper); }
@@ -41,8 +42,10 @@ Box4 doubled_vertex_bounds(const TriangleMesh& mesh) {
     Box4 all;
     const __m128 zero = _mm_setzero_ps();
     for (std::size_t i = begin; i < end; ++i) {
-      const __m128 v = vertices[std::uint32_t(i)], nought = _mm_mul_ps(v, zero);  // 0, or NaN where not finite: then the other operand counts
-      all.lower = _mm_min_ps(_mm_add_ps(v, nought), all.lower), all.upper = _mm_max_ps(_mm_add_ps(v, nought), all.upper);
+      // 0, or NaN where not finite: then the other operand counts
+      const __m128 v = vertices[std::uint32_t(i)], nought = _mm_mul_ps(v, zero);
+      all.lower = _mm_min_ps(_mm_add_ps(v, nought), all.lower),
+      all.upper = _mm_max_ps(_mm_add_ps(v, nought), all.upper);
     }
     partial[c] = all;
   });
@@ -57,7 +60,8 @@ void put_keys(std::uint64_t* to, __m128i code, __m128i id) noexcept {
   _mm_storeu_si128(reinterpret_cast<__m128i*>(to + 2), _mm_unpackhi_epi32(id, code));
 }
 
-/// Sorts n keys, whose ids ascend, by the `bits` of their codes, by digits that suit a few hundred. They are then in `keys` or `room`: where is returned.
+/// Sorts n keys, whose ids ascend, by the `bits` of their codes, by digits that suit a few hundred. They are then in
+/// `keys` or `room`: where is returned.
 std::uint64_t* sort_few(std::uint64_t* keys, std::uint64_t* room, std::size_t n, unsigned bits) noexcept {
   if (n <= kVeryFew) {
     std::sort(keys, keys + n);
@@ -94,14 +98,18 @@ std::uint64_t MortonCells::code(__m128 point) const noexcept {
 
 __m128i MortonCells::bits(const __m128 (&point)[4], unsigned skipped, unsigned count) const noexcept {
   const Points4 p(point[0], point[1], point[2], point[3]);
-  const __m128i shift = _mm_cvtsi32_si128(int(axis_bits_ - (skipped + count) / 3)), mask = _mm_set1_epi32((1 << count / 3) - 1);
+  const __m128i shift = _mm_cvtsi32_si128(int(axis_bits_ - (skipped + count) / 3)),
+                mask = _mm_set1_epi32((1 << count / 3) - 1);
   const auto axis = [&](__m128 at, __m128 lower) {
     __m128i v = _mm_and_si128(_mm_srl_epi32(number(at, lower, scale_, last_), shift), mask);
-    const auto spread = [&v](int by, int kept) { v = _mm_and_si128(_mm_or_si128(v, _mm_slli_epi32(v, by)), _mm_set1_epi32(kept)); };
+    const auto spread = [&v](int by, int kept) {
+      v = _mm_and_si128(_mm_or_si128(v, _mm_slli_epi32(v, by)), _mm_set1_epi32(kept));
+    };
     spread(16, 0x030000ff), spread(8, 0x0300f00f), spread(4, 0x030c30c3), spread(2, 0x09249249);  // as spread_bits()
     return v;
   };
-  const __m128i x = axis(p.x, _mm_shuffle_ps(lower_, lower_, 0x00)), y = axis(p.y, _mm_shuffle_ps(lower_, lower_, 0x55)),
+  const __m128i x = axis(p.x, _mm_shuffle_ps(lower_, lower_, 0x00)),
+                y = axis(p.y, _mm_shuffle_ps(lower_, lower_, 0x55)),
                 z = axis(p.z, _mm_shuffle_ps(lower_, lower_, 0xaa));
   return _mm_or_si128(_mm_or_si128(_mm_slli_epi32(x, 2), _mm_slli_epi32(y, 1)), z);
 }
@@ -110,11 +118,13 @@ void check_morton_bits(unsigned bits) {
   if (bits != 30 && bits != 63) throw UserError("morton_bits: " + std::to_string(bits) + " is neither 30 nor 63");
 }
 
-MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorted) : boxes_(mesh), bits_(bits), sorted_(sorted), keys_(mesh.size()) {
+MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorted)
+    : boxes_(mesh), bits_(bits), sorted_(sorted), keys_(mesh.size()) {
   check_morton_bits(bits);
   const std::size_t n = mesh.size();
   if (n == 0) return;
-  // The vertices' bounds are had sooner than the centroids', and as good, unless vertices that no triangle has lie far out.
+  // The vertices' bounds are had sooner than the centroids', and as good, unless vertices that no triangle has lie far
+  // out.
   const Box4 guess = doubled_vertex_bounds(mesh);
   cells_ = MortonCells(guess, bits);
   const Box4 centroids = make_keys();
@@ -150,12 +160,14 @@ Box4 MortonOrder::make_keys() {
 }
 
 /// Writes the keys of [begin, end) with `more` bits of their codes behind the first `sorted`.
-void MortonOrder::next_codes(std::size_t begin, std::size_t end, unsigned sorted, unsigned more, std::uint64_t* keys) const noexcept {
+void MortonOrder::next_codes(std::size_t begin, std::size_t end, unsigned sorted, unsigned more,
+                             std::uint64_t* keys) const noexcept {
   for (std::size_t i = begin; i < end; i += 4, keys += 4) {
     boxes_.prefetch([this](std::size_t k) { return id(k); }, i, i + 4, end - 1);
     std::uint32_t ids[4];
     __m128 centroids[4];
-    for (std::size_t k = 0; k < 4; ++k) ids[k] = id(std::min(i + k, end - 1)), centroids[k] = doubled_centroid(boxes_.box(ids[k]));
+    for (std::size_t k = 0; k < 4; ++k)
+      ids[k] = id(std::min(i + k, end - 1)), centroids[k] = doubled_centroid(boxes_.box(ids[k]));
     put_keys(keys, cells_.bits(centroids, sorted, more), _mm_loadu_si128(reinterpret_cast<const __m128i*>(ids)));
   }
 }
@@ -163,7 +175,8 @@ void MortonOrder::next_codes(std::size_t begin, std::size_t end, unsigned sorted
 unsigned MortonOrder::refine(std::size_t begin, std::size_t end, unsigned sorted) {
   const std::size_t n = end - begin;
   const auto first = keys_.begin() + std::ptrdiff_t(begin);
-  // A surface of n triangles is in some 2^(2/3 b) of the cells that b bits tell apart; the rest is left for where it is asked for.
+  // A surface of n triangles is in some 2^(2/3 b) of the cells that b bits tell apart; the rest is left for where it is
+  // asked for.
   const unsigned enough = 3 * ((unsigned(std::bit_width(n)) + 1) / 2);
   const unsigned more = std::min({bits_ - sorted, kAtOnce, enough});
   if (n <= kFew) {
@@ -172,7 +185,8 @@ unsigned MortonOrder::refine(std::size_t begin, std::size_t end, unsigned sorted
     std::copy_n(sort_few(run.data(), room.data(), n, more), n, first);
   } else {
     MeteredVector<std::uint64_t> run((n + 3) / 4 * 4);
-    for_chunks(n, [&](std::size_t, std::size_t b, std::size_t e) { next_codes(begin + b, begin + e, sorted, more, &run[b]); });
+    for_chunks(
+        n, [&](std::size_t, std::size_t b, std::size_t e) { next_codes(begin + b, begin + e, sorted, more, &run[b]); });
     run.resize(n);
     radix_sort(run, 32, 32 + more);
     std::copy(run.begin(), run.end(), first);

@@ -1,8 +1,9 @@
-// The order of a mesh's triangles along a Morton curve through their centroids (Lauterbach et al., "Fast BVH Construction on
-// GPUs", Eurographics 2009), with codes of 30 or 63 bits.
+// The order of a mesh's triangles along a Morton curve through their centroids (Lauterbach et al., "Fast BVH
+// Construction on GPUs", Eurographics 2009), with codes of 30 or 63 bits.
 //
-// Only a code's first bits are sorted by; the next ones are looked at where triangles that share those have to be told apart, which in most
-// scenes are few. So a sort takes two or three passes, and whoever cuts the order asks for more bits where he is to cut between equals.
+// Only a code's first bits are sorted by; the next ones are looked at where triangles that share those have to be told
+// apart, which in most scenes are few. So a sort takes two or three passes, and whoever cuts the order asks for more
+// bits where he is to cut between equals.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@ namespace arboretum {
 /// Throws UserError unless `bits` is 30 or 63.
 void check_morton_bits(unsigned bits);
 
-/// Cells of a cube around (doubled) points: cells as wide on each axis make better boxes than the scene's own proportions.
+/// Cells of a cube around (doubled) points: cells as wide on each axis make better boxes than the scene's own
+/// proportions.
 class MortonCells {
  public:
   MortonCells() = default;
@@ -41,33 +43,37 @@ class MortonOrder {
  public:
   static constexpr unsigned kAtOnce = 30;  ///< bits of a code that are sorted by at a time, at most
 
-  /// `bits` of a code, 30 or 63, of which the first `sorted`, kAtOnce at most, are sorted by. Runs in the caller's TBB arena. Coordinates are finite.
+  /// `bits` of a code, 30 or 63, of which the first `sorted`, kAtOnce at most, are sorted by. Runs in the caller's TBB
+  /// arena. Coordinates are finite.
   MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorted);
 
   [[nodiscard]] std::size_t size() const noexcept { return keys_.size(); }
   [[nodiscard]] std::uint32_t id(std::size_t i) const noexcept { return std::uint32_t(keys_[i]); }
   /// Bits that refine() may be told of: those sorted by so far, of all ranges to begin with.
   [[nodiscard]] unsigned sorted_bits() const noexcept { return sorted_; }
-  /// Whether [begin, end), whose codes are the same as far as they are sorted by, could be told apart by more bits than the first `sorted`.
+  /// Whether [begin, end), whose codes are the same as far as they are sorted by, could be told apart by more bits than
+  /// the first `sorted`.
   [[nodiscard]] bool refinable(std::size_t begin, std::size_t end, unsigned sorted) const noexcept {
     return sorted < bits_ && code(begin) == code(end - 1);
   }
-  /// Sorts such a range by the next bits and returns how many it is sorted by then. From now on it has codes of its own, for cuts inside it.
+  /// Sorts such a range by the next bits and returns how many it is sorted by then. From now on it has codes of its
+  /// own, for cuts inside it.
   unsigned refine(std::size_t begin, std::size_t end, unsigned sorted);
   /// Refines every run of more than `longest` equal codes as far as there are bits. No split() any more.
   void refine_runs(std::size_t longest);
 
-  /// Where [begin, end) of two or more parts: behind the last code that lacks the highest bit in which the first and the last
-  /// code differ; in the middle where all are equal.
+  /// Where [begin, end) of two or more parts: behind the last code that lacks the highest bit in which the first and
+  /// the last code differ; in the middle where all are equal.
   [[nodiscard]] std::size_t split(std::size_t begin, std::size_t end) const noexcept;
-  /// Where it parts if it is to fill no more blocks of `width` on both sides together than it needs as a whole, two at least: of these places the one
-  /// where the highest bit changes, the first of equals.
+  /// Where it parts if it is to fill no more blocks of `width` on both sides together than it needs as a whole, two at
+  /// least: of these places the one where the highest bit changes, the first of equals.
   [[nodiscard]] std::size_t split_into_blocks(std::size_t begin, std::size_t end, std::size_t width) const noexcept;
 
  private:
   [[nodiscard]] std::uint32_t code(std::size_t i) const noexcept { return std::uint32_t(keys_[i] >> 32); }
   Box4 make_keys();
-  void next_codes(std::size_t begin, std::size_t end, unsigned sorted, unsigned more, std::uint64_t* keys) const noexcept;
+  void next_codes(std::size_t begin, std::size_t end, unsigned sorted, unsigned more,
+                  std::uint64_t* keys) const noexcept;
   void refine_runs(std::size_t begin, std::size_t end, std::size_t longest, unsigned sorted);
 
   TriangleBoxes boxes_;

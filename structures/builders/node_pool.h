@@ -11,17 +11,20 @@
 
 namespace arboretum {
 
-/// Gives out pairs of neighbouring nodes from 1 on (0 is the root), with room for the worst case and counted as they go. Each
-/// task owns a Share and takes nodes in blocks, so that its own lie together; numbers depend on scheduling, the tree need not.
+/// Gives out pairs of neighbouring nodes from 1 on (0 is the root), with room for the worst case and counted as they
+/// go. Each task owns a Share and takes nodes in blocks, so that its own lie together; numbers depend on scheduling,
+/// the tree need not.
 class NodePool {
  public:
   struct Share {
     std::uint32_t next = 0, end = 0;
   };
 
-  /// For a tree of n references, when shares are those of tasks for subtrees of more than `grain` of them, and one for each place in the arena.
+  /// For a tree of n references, when shares are those of tasks for subtrees of more than `grain` of them, and one for
+  /// each place in the arena.
   NodePool(BinaryTree& tree, std::size_t n, std::size_t grain) : tree_(tree) {
-    // Fewer than n / grain + 1 shares (both sides of a split into tasks are larger than that) leave a block unfinished each, and one for each place in the arena.
+    // Fewer than n / grain + 1 shares (both sides of a split into tasks are larger than that) leave a block unfinished
+    // each, and one for each place in the arena.
     const std::size_t shares = n / grain + 2 + std::size_t(tbb::this_task_arena::max_concurrency());
     tree.nodes.reserve(2 * n + shares * kBlock), tree.first.reserve(tree.nodes.size());
     count(1);

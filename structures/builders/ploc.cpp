@@ -1,10 +1,10 @@
-// PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG 2018):
-// clusters stand in Morton order; each round every one finds, among `ploc_radius` neighbours on either side, the one whose common
-// box is smallest, and pairs that chose each other merge.
+// PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG
+// 2018): clusters stand in Morton order; each round every one finds, among `ploc_radius` neighbours on either side, the
+// one whose common box is smallest, and pairs that chose each other merge.
 //
-// Where we differ: of equal areas the least (i xor j) wins, so that a run of equal triangles pairs up as a whole and some pair
-// always merges; and a round in which next to nothing merges (each cluster nearest to the one before it, as where gaps grow)
-// is replaced by merging neighbours, which bounds rounds and depth.
+// Where we differ: of equal areas the least (i xor j) wins, so that a run of equal triangles pairs up as a whole and
+// some pair always merges; and a round in which next to nothing merges (each cluster nearest to the one before it, as
+// where gaps grow) is replaced by merging neighbours, which bounds rounds and depth.
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -22,14 +22,16 @@ namespace arboretum {
 namespace {
 
 constexpr std::size_t kChunk = 1u << 12;
-constexpr std::size_t kFew = 1024;        ///< with this many clusters any round is cheap
-constexpr std::size_t kLeastShare = 64;   ///< one cluster in so many has to merge
+constexpr std::size_t kFew = 1024;       ///< with this many clusters any round is cheap
+constexpr std::size_t kLeastShare = 64;  ///< one cluster in so many has to merge
 constexpr unsigned kMaxRadius = 128;
-constexpr std::size_t kShortRun = 8;  ///< triangles that may share the first bits of their codes and stand in order of their ids
+/// Triangles that may share the first bits of their codes and stand in order of their ids
+constexpr std::size_t kShortRun = 8;
 
 class Ploc {
  public:
-  Ploc(const TriangleMesh& mesh, const MortonOrder& order, unsigned radius, LinkedTree& tree) : radius_(radius), tree_(tree) {
+  Ploc(const TriangleMesh& mesh, const MortonOrder& order, unsigned radius, LinkedTree& tree)
+      : radius_(radius), tree_(tree) {
     const std::size_t n = order.size();
     tree.nodes.resize(2 * n - 1), tree.primitives.resize(n);
     current_.resize(n), next_.resize(n), best_.resize(n), results_.resize((n + kChunk - 1) / kChunk);
@@ -81,7 +83,8 @@ class Ploc {
   template <class F>
   void for_chunks(const F& f) {
     const std::size_t n = current_.size;
-    tbb::parallel_for(std::size_t{0}, (n + kChunk - 1) / kChunk, [&](std::size_t c) { f(c, c * kChunk, std::min(n, (c + 1) * kChunk)); });
+    tbb::parallel_for(std::size_t{0}, (n + kChunk - 1) / kChunk,
+                      [&](std::size_t c) { f(c, c * kChunk, std::min(n, (c + 1) * kChunk)); });
   }
 
   /// Areas of the boxes around i and each of the `count` clusters behind it.
@@ -100,7 +103,8 @@ class Ploc {
     }
   }
 
-  /// best_[i] = i xor the chosen partner, for [begin, end). A pair's area is computed once, but for those across a border.
+  /// best_[i] = i xor the chosen partner, for [begin, end). A pair's area is computed once, but for those across a
+  /// border.
   void find_best(std::size_t begin, std::size_t end) noexcept {
     std::uint64_t key[kChunk];  // area's bits, which order as the area does, then i xor j
     std::fill(key, key + (end - begin), std::numeric_limits<std::uint64_t>::max());
@@ -111,7 +115,8 @@ class Ploc {
       std::uint64_t own = std::numeric_limits<std::uint64_t>::max();
       for (std::size_t k = 0; k < count; ++k) {
         const std::size_t j = i + 1 + k;
-        const std::uint64_t candidate = std::uint64_t{std::bit_cast<std::uint32_t>(area[k])} << 32 | std::uint32_t(i ^ j);
+        const std::uint64_t candidate =
+            std::uint64_t{std::bit_cast<std::uint32_t>(area[k])} << 32 | std::uint32_t(i ^ j);
         own = std::min(own, candidate);
         if (j >= begin && j < end) key[j - begin] = std::min(key[j - begin], candidate);
       }
@@ -181,7 +186,8 @@ void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, u
                 BuildReport& report) {
   check_morton_bits(parameters.morton_bits);
   if (parameters.ploc_radius < 1 || parameters.ploc_radius > kMaxRadius) {
-    throw UserError("ploc_radius: " + std::to_string(parameters.ploc_radius) + " is not within 1 .. " + std::to_string(kMaxRadius));
+    throw UserError("ploc_radius: " + std::to_string(parameters.ploc_radius) + " is not within 1 .. " +
+                    std::to_string(kMaxRadius));
   }
   if (mesh.size() == 0) return;
   PhaseClock phase(report);

@@ -40,7 +40,9 @@ void radix_sort(MeteredVector<std::uint64_t>& keys, unsigned low, unsigned high)
     tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
       Histogram& count = counts[c];
       count.fill(0);
-      for (const std::uint64_t *k = keys.data() + chunk_begin(c), *last = keys.data() + chunk_begin(c + 1); k < last; ++k) ++count[digit(*k)];
+      for (const std::uint64_t *k = keys.data() + chunk_begin(c), *last = keys.data() + chunk_begin(c + 1); k < last;
+           ++k)
+        ++count[digit(*k)];
     });
     std::uint32_t next = 0;
     bool one_digit = false;
@@ -52,7 +54,8 @@ void radix_sort(MeteredVector<std::uint64_t>& keys, unsigned low, unsigned high)
     if (one_digit) continue;
     tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
       Histogram& target = counts[c];
-      for (const std::uint64_t *k = keys.data() + chunk_begin(c), *last = keys.data() + chunk_begin(c + 1); k < last; ++k) {
+      for (const std::uint64_t *k = keys.data() + chunk_begin(c), *last = keys.data() + chunk_begin(c + 1); k < last;
+           ++k) {
         other[target[digit(*k)]++] = *k;
       }
     });

@@ -7,8 +7,8 @@
 
 namespace arboretum {
 
-/// Sorts `keys` by their bits [low, high); keys equal there keep their order. Runs in the caller's TBB arena and needs as much
-/// memory again while it works.
+/// Sorts `keys` by their bits [low, high); keys equal there keep their order. Runs in the caller's TBB arena and needs
+/// as much memory again while it works.
 void radix_sort(MeteredVector<std::uint64_t>& keys, unsigned low, unsigned high);
 
 }  // namespace arboretum

@@ -11,9 +11,11 @@ Bounds3f refit_subtree(BinaryTree& tree, const TriangleMesh& mesh, std::uint32_t
   BinaryNode& node = tree.nodes[index];
   Bounds3f box, other;
   if (node.is_leaf()) {
-    for (std::uint32_t i = tree.first[index]; i < tree.first[index] + node.count; ++i) box.extend(mesh.bounds(tree.primitives[i]));
+    for (std::uint32_t i = tree.first[index]; i < tree.first[index] + node.count; ++i)
+      box.extend(mesh.bounds(tree.primitives[i]));
   } else if (node.count > kParallel) {
-    tbb::parallel_invoke([&] { box = refit_subtree(tree, mesh, node.left); }, [&] { other = refit_subtree(tree, mesh, node.left + 1); });
+    tbb::parallel_invoke([&] { box = refit_subtree(tree, mesh, node.left); },
+                         [&] { other = refit_subtree(tree, mesh, node.left + 1); });
   } else {
     box = refit_subtree(tree, mesh, node.left), other = refit_subtree(tree, mesh, node.left + 1);
   }

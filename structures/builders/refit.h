@@ -6,8 +6,8 @@
 
 namespace arboretum {
 
-/// Fits every box of `tree` to `mesh`, which has the triangles that the tree was built from, their vertices moved. Leaves of
-/// splitting builders get the boxes of whole triangles. Runs in the caller's TBB arena.
+/// Fits every box of `tree` to `mesh`, which has the triangles that the tree was built from, their vertices moved.
+/// Leaves of splitting builders get the boxes of whole triangles. Runs in the caller's TBB arena.
 void refit(BinaryTree& tree, const TriangleMesh& mesh);
 
 }  // namespace arboretum

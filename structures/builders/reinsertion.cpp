@@ -1,7 +1,8 @@
-// Each pass looks, in parallel and without changing anything, for the best new place of every node; then moves are made one
-// after another, the most gainful first. A move's gain is what it changes in the tree as it then is: one that no longer gains is
-// taken back. So no locks are needed, no conflict can spoil the tree, and the result is the same for any number of threads.
-// Things that lie within each other would become a chain; a move that brings anything below kMaxReinsertedDepth is not made.
+// Each pass looks, in parallel and without changing anything, for the best new place of every node; then moves are made
+// one after another, the most gainful first. A move's gain is what it changes in the tree as it then is: one that no
+// longer gains is taken back. So no locks are needed, no conflict can spoil the tree, and the result is the same for
+// any number of threads. Things that lie within each other would become a chain; a move that brings anything below
+// kMaxReinsertedDepth is not made.
 #include "structures/builders/reinsertion.h"
 
 #include <algorithm>
@@ -28,7 +29,8 @@ struct Move {
 
 class Reinsertion {
  public:
-  explicit Reinsertion(LinkedTree& tree) : tree_(tree), nodes_(tree.nodes), parent_(tree.nodes.size()), height_(tree.nodes.size()) {
+  explicit Reinsertion(LinkedTree& tree)
+      : tree_(tree), nodes_(tree.nodes), parent_(tree.nodes.size()), height_(tree.nodes.size()) {
     parent_[tree.root] = kNone;
     MeteredVector<std::uint32_t> order(nodes_.size());  // parents before their children, wherever they stand
     std::size_t listed = 0;
@@ -49,8 +51,11 @@ class Reinsertion {
       std::vector<Step> stack;
       for (std::size_t i = range.begin(); i < range.end(); ++i) moves_[i] = best_move(std::uint32_t(i), stack);
     });
-    moves_.erase(std::remove_if(moves_.begin(), moves_.end(), [](const Move& m) { return !(m.gain > 0.0f); }), moves_.end());
-    tbb::parallel_sort(moves_.begin(), moves_.end(), [](const Move& a, const Move& b) { return a.gain != b.gain ? a.gain > b.gain : a.node < b.node; });
+    moves_.erase(std::remove_if(moves_.begin(), moves_.end(), [](const Move& m) { return !(m.gain > 0.0f); }),
+                 moves_.end());
+    tbb::parallel_sort(moves_.begin(), moves_.end(), [](const Move& a, const Move& b) {
+      return a.gain != b.gain ? a.gain > b.gain : a.node < b.node;
+    });
     bool gained = false;
     for (const Move& move : moves_) gained |= try_move(move.node, move.target);
     return gained;
@@ -69,8 +74,8 @@ class Reinsertion {
     return p.left == i ? p.right : p.left;
   }
 
-  /// Looks below each ancestor's other child, nearest ancestors first, and leaves out what cannot beat the best so far: the
-  /// new parent is at least as large as the node.
+  /// Looks below each ancestor's other child, nearest ancestors first, and leaves out what cannot beat the best so far:
+  /// the new parent is at least as large as the node.
   [[nodiscard]] Move best_move(std::uint32_t index, std::vector<Step>& stack) const {
     Move best{0.0f, index, kNone};
     const std::uint32_t parent = parent_[index];

@@ -1,8 +1,8 @@
 // What the binned SAH builders share: references, the bins of three axes, the sweep over them, the partition.
 //
-// A reference is 32 bytes, [-lower, id, upper, 0], so that merging boxes is one maximum of eight lanes. Minima, maxima and
-// counts do not depend on order and no arithmetic is fused, so bins are the same however the references are cut into
-// chunks, and on any ISA.
+// A reference is 32 bytes, [-lower, id, upper, 0], so that merging boxes is one maximum of eight lanes. Minima, maxima
+// and counts do not depend on order and no arithmetic is fused, so bins are the same however the references are cut
+// into chunks, and on any ISA.
 #pragma once
 
 #include "simd/simd.h"
@@ -39,7 +39,8 @@ struct BinSet {
   Bin bin[N];
 };
 using Bins = BinSet<kMaxBins>;
-/// For more than kLarge references. A few planes decide there what all levels below have to do with, and a sweep costs little beside the binning.
+/// For more than kLarge references. A few planes decide there what all levels below have to do with, and a sweep costs
+/// little beside the binning.
 using ManyBins = BinSet<kManyBins>;
 
 struct Split {
@@ -81,7 +82,8 @@ ARBORETUM_INLINE Box both_halves(vf<4> low, vf<4> high) {
 }
 /// The centroid, doubled: upper + lower.
 ARBORETUM_INLINE vf<4> centroid(const Reference& r) { return vf<4>::load(r.upper) - vf<4>::load(r.neg_lower); }
-/// The first three lanes, and 0. Behind a reference's coordinates stands its id, which is subnormal as a float: slow to multiply.
+/// The first three lanes, and 0. Behind a reference's coordinates stands its id, which is subnormal as a float: slow to
+/// multiply.
 ARBORETUM_INLINE vf<4> three_lanes(vf<4> v) { return select(vm<4>::from_bits(7u), v, vf<4>(0.0f)); }
 
 inline float lane_of(vf<4> v, int lane) {
@@ -96,7 +98,8 @@ struct BinMap {
   unsigned bins;
   bool finite;  ///< else there are centroids, or distances between them, beyond float, and no bins for them
   BinMap(Box centroids, std::size_t n, unsigned max_bins) {
-    bins = std::min(max_bins, n < 32 ? 8u : n < 512 ? 16u : n < 4096 ? 32u : max_bins);  // a sweep costs as much as binning this many
+    // a sweep costs as much as binning this many
+    bins = std::min(max_bins, n < 32 ? 8u : n < 512 ? 16u : n < 4096 ? 32u : max_bins);
     if (n > kLarge) bins = std::min(8 * bins, kManyBins);
     const vf<4> low = -low_half(centroids), extent = high_half(centroids) - low;
     lower = low;
@@ -117,7 +120,8 @@ void clear(B& bins, unsigned n) {
   }
 }
 
-/// The bins of references [r, end), taken from four places in turn: neighbours mostly go to the same bin, where each would wait for the one before.
+/// The bins of references [r, end), taken from four places in turn: neighbours mostly go to the same bin, where each
+/// would wait for the one before.
 template <class B>
 void bin(const Reference* r, const Reference* end, const BinMap& map, B& bins) {
   clear(bins, map.bins);
@@ -130,7 +134,8 @@ void bin(const Reference* r, const Reference* end, const BinMap& map, B& bins) {
     }
   };
   constexpr std::size_t kPlaces = 4, kAhead = 16;
-  alignas(16) std::int32_t numbers[kAhead][kPlaces][4];  // found for some references before any is put: stores and later loads keep out of each other's way
+  // Found for some references before any is put: stores and later loads keep out of each other's way
+  alignas(16) std::int32_t numbers[kAhead][kPlaces][4];
   const std::size_t part = std::size_t(end - r) / kPlaces;
   for (std::size_t begin = 0; begin < part; begin += kAhead) {
     const std::size_t n = std::min(kAhead, part - begin);
@@ -171,7 +176,8 @@ ARBORETUM_INLINE void transpose(vf<4> a, vf<4> b, vf<4> c, vf<4>& x, vf<4>& y, v
 
 /// Half the areas of three boxes, in lanes 0 to 2.
 ARBORETUM_INLINE vf<4> half_areas(const Box (&box)[3]) {
-  const vf<4> a = high_half(box[0]) + low_half(box[0]), b = high_half(box[1]) + low_half(box[1]), c = high_half(box[2]) + low_half(box[2]);
+  const vf<4> a = high_half(box[0]) + low_half(box[0]), b = high_half(box[1]) + low_half(box[1]),
+              c = high_half(box[2]) + low_half(box[2]);
   vf<4> x, y, z;
   transpose(a, b, c, x, y, z);
   return x * (y + z) + y * z;
@@ -186,11 +192,13 @@ ARBORETUM_INLINE vf<4> counts_of(const B& bins, unsigned b) {
 struct BlocksFor {
   vf<4> one_less, per_block;
   explicit BlocksFor(unsigned leaf_width) : one_less(float(leaf_width - 1)), per_block(1.0f / float(leaf_width)) {}
-  ARBORETUM_INLINE vf<4> operator()(vf<4> count) const { return to_float(truncate_to_int((count + one_less) * per_block)); }
+  ARBORETUM_INLINE vf<4> operator()(vf<4> count) const {
+    return to_float(truncate_to_int((count + one_less) * per_block));
+  }
 };
 
-/// The cheapest plane: area times blocks on both sides, a block holding leaf_width references; the three axes in lanes. Whole blocks:
-/// what a block's last lanes could hold costs the same, and splits that fill blocks save nodes and bytes.
+/// The cheapest plane: area times blocks on both sides, a block holding leaf_width references; the three axes in lanes.
+/// Whole blocks: what a block's last lanes could hold costs the same, and splits that fill blocks save nodes and bytes.
 template <class B>
 Split best_split(const B& bins, unsigned n, std::size_t total, unsigned leaf_width) {
   const BlocksFor blocks(leaf_width);
@@ -241,8 +249,12 @@ struct LeftOf {
   float lower, scale;
   int axis;
   std::int32_t bin;
-  LeftOf(const BinMap& map, const Split& split) : lower(lane_of(map.lower, split.axis)), scale(lane_of(map.scale, split.axis)), axis(split.axis), bin(std::int32_t(split.bin)) {}
-  ARBORETUM_INLINE bool operator()(const Reference& r) const { return std::int32_t((r.upper[axis] - r.neg_lower[axis] - lower) * scale) < bin; }
+  LeftOf(const BinMap& map, const Split& split)
+      : lower(lane_of(map.lower, split.axis)), scale(lane_of(map.scale, split.axis)), axis(split.axis),
+        bin(std::int32_t(split.bin)) {}
+  ARBORETUM_INLINE bool operator()(const Reference& r) const {
+    return std::int32_t((r.upper[axis] - r.neg_lower[axis] - lower) * scale) < bin;
+  }
 };
 
 /// Bounds of the centroids on the two sides of a split, gathered without branches.
@@ -263,8 +275,8 @@ class SideBounds {
 };
 
 /// Moves references [r, end) to left_out and right_out, in order; returns the sides' centroid bounds.
-inline void partition(const Reference* r, const Reference* end, const BinMap& map, const Split& split, Reference* left_out,
-                      Reference* right_out, Box& left_centroids, Box& right_centroids) {
+inline void partition(const Reference* r, const Reference* end, const BinMap& map, const Split& split,
+                      Reference* left_out, Reference* right_out, Box& left_centroids, Box& right_centroids) {
   SideBounds bounds;
   const LeftOf is_left(map, split);
   for (; r < end; ++r) {
@@ -276,9 +288,10 @@ inline void partition(const Reference* r, const Reference* end, const BinMap& ma
   left_centroids = bounds.left(), right_centroids = bounds.right();
 }
 
-/// Writes the places in [r, r + count), at most kChunk, of references that are not on the side `wanted_left` says; returns their number, and the centroid bounds of either side.
-inline std::size_t find_misplaced(const Reference* r, std::size_t count, const BinMap& map, const Split& split, bool wanted_left, std::uint16_t* places,
-                                  Box& left_centroids, Box& right_centroids) {
+/// Writes the places in [r, r + count), at most kChunk, of references that are not on the side `wanted_left` says;
+/// returns their number, and the centroid bounds of either side.
+inline std::size_t find_misplaced(const Reference* r, std::size_t count, const BinMap& map, const Split& split,
+                                  bool wanted_left, std::uint16_t* places, Box& left_centroids, Box& right_centroids) {
   SideBounds bounds;
   const LeftOf is_left(map, split);
   std::size_t found = 0;

@@ -66,7 +66,8 @@ class TreeWriter {
     tree_.nodes[index] = {{0.0f - b[0], 0.0f - b[1], 0.0f - b[2]}, left, {b[4], b[5], b[6]}, std::uint32_t(count)};
   }
 
-  /// A leaf of references [r, end). Their ids go to `ids`, bytes in which the references themselves may lie, there or behind; `first` is what the leaf notes of that place.
+  /// A leaf of references [r, end). Their ids go to `ids`, bytes in which the references themselves may lie, there or
+  /// behind; `first` is what the leaf notes of that place.
   void leaf(std::uint32_t index, Box box, const Reference* r, const Reference* end, std::size_t first, void* ids) {
     node(index, box, std::size_t(end - r), 0);
     tree_.first[index] = std::uint32_t(first);

@@ -1,9 +1,9 @@
-// Bins of space for spatial splits (Stich, Friedrich, Dietrich, "Spatial Splits in Bounding Volume Hierarchies", HPG 2009,
-// section 3.3): a reference goes into every bin that it reaches, with the part of its triangle that lies there.
+// Bins of space for spatial splits (Stich, Friedrich, Dietrich, "Spatial Splits in Bounding Volume Hierarchies", HPG
+// 2009, section 3.3): a reference goes into every bin that it reaches, with the part of its triangle that lies there.
 //
 // The parts are estimates in float, for choosing a plane; the references that the split makes are clipped by clip.h.
-// Unlike the paper, the part of a triangle in a slab is taken from the points where its edges pass the slab's planes, all
-// bins at once, not by chopping the rest plane by plane.
+// Unlike the paper, the part of a triangle in a slab is taken from the points where its edges pass the slab's planes,
+// all bins at once, not by chopping the rest plane by plane.
 #pragma once
 
 #include "structures/builders/sah_references.h"
@@ -16,7 +16,8 @@ inline constexpr unsigned kMaxSpatialBins = 16;
 
 struct SpatialBins {
   Box box[3][kMaxSpatialBins];
-  std::int32_t enter4[kMaxSpatialBins][4], leave4[kMaxSpatialBins][4];  ///< references by their first and last bin, then axis
+  /// references by their first and last bin, then axis
+  std::int32_t enter4[kMaxSpatialBins][4], leave4[kMaxSpatialBins][4];
   float saved4[kMaxSpatialBins][4];  ///< half area that references lose when they are split by the plane before a bin
 };
 
@@ -46,7 +47,8 @@ struct SpatialAxis {
   std::int32_t bins;
   int axis;
   SpatialAxis(const SpatialMap& map, int a)
-      : lower(lane_of(map.lower, a)), scale(lane_of(map.scale, a)), width(lane_of(map.width, a)), bins(std::int32_t(map.bins)), axis(a) {}
+      : lower(lane_of(map.lower, a)), scale(lane_of(map.scale, a)), width(lane_of(map.width, a)),
+        bins(std::int32_t(map.bins)), axis(a) {}
   ARBORETUM_INLINE std::int32_t operator()(float position) const {
     return std::min(std::max(std::int32_t((position - lower) * scale), 0), bins - 1);
   }
@@ -81,7 +83,8 @@ ARBORETUM_INLINE float half_area_or_0(Box box) {
 }
 
 /// Spreads a reference over bins [first, last], first < last, of an axis.
-inline void spread(const Reference& r, const vf<4> (&corner)[3], const SpatialAxis& map, std::int32_t first, std::int32_t last, SpatialBins& bins) {
+inline void spread(const Reference& r, const vf<4> (&corner)[3], const SpatialAxis& map, std::int32_t first,
+                   std::int32_t last, SpatialBins& bins) {
   Box part[kMaxSpatialBins];
   for (std::int32_t b = first; b <= last; ++b) part[b] = empty_box();
   const float begin = -r.neg_lower[map.axis], end = r.upper[map.axis];
@@ -122,7 +125,8 @@ inline void spread(const Reference& r, const vf<4> (&corner)[3], const SpatialAx
   }
 }
 
-inline void bin(const TriangleMesh& mesh, const Reference* r, const Reference* end, const SpatialMap& map, SpatialBins& bins) {
+inline void bin(const TriangleMesh& mesh, const Reference* r, const Reference* end, const SpatialMap& map,
+                SpatialBins& bins) {
   clear(bins, map.bins);
   const SpatialAxis axes[3] = {{map, 0}, {map, 1}, {map, 2}};
   for (; r < end; ++r) {
@@ -148,11 +152,14 @@ inline void bin(const TriangleMesh& mesh, const Reference* r, const Reference* e
 }
 
 /// Bins of references [r, end); many are binned in parallel.
-inline void bin_range(const TriangleMesh& mesh, const Reference* r, const Reference* end, const SpatialMap& map, SpatialBins& total) {
+inline void bin_range(const TriangleMesh& mesh, const Reference* r, const Reference* end, const SpatialMap& map,
+                      SpatialBins& total) {
   const std::size_t n = std::size_t(end - r);
   if (n <= kLarge) return bin(mesh, r, end, map, total);
   MeteredVector<SpatialBins> chunks((n + kChunk - 1) / kChunk);
-  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) { bin(mesh, r + c * kChunk, std::min(end, r + (c + 1) * kChunk), map, chunks[c]); });
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    bin(mesh, r + c * kChunk, std::min(end, r + (c + 1) * kChunk), map, chunks[c]);
+  });
   clear(total, map.bins);
   for (const SpatialBins& b : chunks) merge(total, b, map.bins);
 }
@@ -167,7 +174,8 @@ struct SpatialSplit {
 };
 
 /// The cheapest plane among those that leave fewer than `total` references on either side and at most `room` on both.
-inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t total, std::size_t room, unsigned leaf_width) {
+inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t total, std::size_t room,
+                               unsigned leaf_width) {
   const BlocksFor blocks(leaf_width);
   const vf<4> zero(0.0f), none(std::numeric_limits<float>::infinity());
   vf<4> right_cost[kMaxSpatialBins], right_count[kMaxSpatialBins];
@@ -188,7 +196,8 @@ inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t 
   for (unsigned b = 1; b < n; ++b) {
     for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[axis][b - 1], box[axis]);
     count = count + to_float(vi<4>::load(bins.enter4[b - 1]));
-    const vf<4> cost = select(fits(count) & (count + right_count[b] <= most), half_areas(box) * blocks(count) + right_cost[b], none);
+    const vf<4> cost =
+        select(fits(count) & (count + right_count[b] <= most), half_areas(box) * blocks(count) + right_cost[b], none);
     const vm<4> better = cost < best_cost;
     best_cost = select(better, cost, best_cost);
     best_bin = select(better, vi<4>(std::int32_t(b)), best_bin);
@@ -205,12 +214,16 @@ inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t 
   best.saved = bins.saved4[best.bin][best.axis];
   for (std::int32_t b = 0; b < std::int32_t(n); ++b) {
     if (b < best.bin) {
-      best.left_count += std::uint32_t(bins.enter4[b][best.axis]), best.left = max_x86(bins.box[best.axis][b], best.left);
+      best.left_count += std::uint32_t(bins.enter4[b][best.axis]),
+          best.left = max_x86(bins.box[best.axis][b], best.left);
     } else {
-      best.right_count += std::uint32_t(bins.leave4[b][best.axis]), best.right = max_x86(bins.box[best.axis][b], best.right);
+      best.right_count += std::uint32_t(bins.leave4[b][best.axis]),
+          best.right = max_x86(bins.box[best.axis][b], best.right);
     }
   }
-  if (best.left_count + best.right_count > room || best.left_count >= total || best.right_count >= total) best.axis = -1;  // float counts err above 2^24
+  // Float counts err above 2^24
+  if (best.left_count + best.right_count > room || best.left_count >= total || best.right_count >= total)
+    best.axis = -1;
   return best;
 }
 

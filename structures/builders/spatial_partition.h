@@ -67,19 +67,23 @@ class SpatialSorter {
 };
 
 /// Writes the left side's references from `left_out` on and the right side's from `right_end` back.
-inline Sides spatial_partition(const Reference* r, const Reference* end, const SpatialSorter& sorter, Reference* left_out, Reference* right_end) {
+inline Sides spatial_partition(const Reference* r, const Reference* end, const SpatialSorter& sorter,
+                               Reference* left_out, Reference* right_end) {
   Sides sides = Sides::none();
   Reference *l = left_out, *h = right_end;
   for (; r < end; ++r) {
-    sorter(*r, [&](const Reference& ref) { *l++ = ref, sides.left.extend(ref); }, [&](const Reference& ref) { *--h = ref, sides.right.extend(ref); });
+    sorter(
+        *r, [&](const Reference& ref) { *l++ = ref, sides.left.extend(ref); },
+        [&](const Reference& ref) { *--h = ref, sides.right.extend(ref); });
   }
   sides.left_count = std::size_t(l - left_out), sides.right_count = std::size_t(right_end - h);
   return sides;
 }
 
 /// The same, in parallel for many references: a first pass counts.
-inline Sides spatial_partition_range(const TriangleMesh& mesh, const Reference* r, const Reference* end, const SpatialMap& map,
-                                     const SpatialSplit& split, Reference* left_out, Reference* right_end) {
+inline Sides spatial_partition_range(const TriangleMesh& mesh, const Reference* r, const Reference* end,
+                                     const SpatialMap& map, const SpatialSplit& split, Reference* left_out,
+                                     Reference* right_end) {
   const SpatialSorter sorter(mesh, map, split);
   const std::size_t n = std::size_t(end - r);
   if (n <= kLarge) return spatial_partition(r, end, sorter, left_out, right_end);
@@ -91,17 +95,20 @@ inline Sides spatial_partition_range(const TriangleMesh& mesh, const Reference* 
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
     std::size_t left = 0, right = 0;
     for (const Reference *at = r + c * kChunk, *stop = std::min(end, at + kChunk); at < stop; ++at) {
-      sorter(*at, [&](const Reference&) { ++left; }, [&](const Reference&) { ++right; });
+      sorter(
+          *at, [&](const Reference&) { ++left; }, [&](const Reference&) { ++right; });
     }
     chunks[c].left_begin = left, chunks[c].right_begin = right;
   });
   Sides all = Sides::none();
   for (Chunk& c : chunks) {
-    all.left_count += std::exchange(c.left_begin, all.left_count), all.right_count += std::exchange(c.right_begin, all.right_count);
+    all.left_count += std::exchange(c.left_begin, all.left_count),
+        all.right_count += std::exchange(c.right_begin, all.right_count);
   }
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
     const Reference* at = r + c * kChunk;
-    chunks[c].sides = spatial_partition(at, std::min(end, at + kChunk), sorter, left_out + chunks[c].left_begin, right_end - chunks[c].right_begin);
+    chunks[c].sides = spatial_partition(at, std::min(end, at + kChunk), sorter, left_out + chunks[c].left_begin,
+                                        right_end - chunks[c].right_begin);
   });
   for (const Chunk& c : chunks) all.left.extend(c.sides.left), all.right.extend(c.sides.right);
   return all;

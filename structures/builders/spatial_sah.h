@@ -1,11 +1,11 @@
-// Spatial split SAH builder, SBVH (Stich, Friedrich, Dietrich, "Spatial Splits in Bounding Volume Hierarchies", HPG 2009): the
-// binned SAH builder, but where the children of the best object split overlap, references may be split by a plane instead. When
-// that pays is decided otherwise than in the paper: split_space() says how.
+// Spatial split SAH builder, SBVH (Stich, Friedrich, Dietrich, "Spatial Splits in Bounding Volume Hierarchies", HPG
+// 2009): the binned SAH builder, but where the children of the best object split overlap, references may be split by a
+// plane instead. When that pays is decided otherwise than in the paper: split_space() says how.
 //
-// Every range of references has room behind it, the budget of references that its splits may add; a split shares what it leaves
-// of it between the children by their numbers. So the budget is kept without a counter that tasks would race for, and the tree is
-// the same for any number of threads. Unlike the paper, a reference that lies on both sides is given to one side alone
-// (unsplitting) by costs that do not depend on the references before it.
+// Every range of references has room behind it, the budget of references that its splits may add; a split shares what
+// it leaves of it between the children by their numbers. So the budget is kept without a counter that tasks would race
+// for, and the tree is the same for any number of threads. Unlike the paper, a reference that lies on both sides is
+// given to one side alone (unsplitting) by costs that do not depend on the references before it.
 #pragma once
 
 #include "structures/builders/object_split.h"
@@ -52,8 +52,9 @@ class SpatialSah {
   static constexpr std::size_t kFewest = 32;
   static constexpr float kReferenceCost = 2.0f;  ///< a reference's box: its leaf and the nodes around it
   static constexpr float kLevelCost = 0.8f;      ///< the areas of a level of a tree over surfaces, of the root's
-  static constexpr float kLeastShare = 0.2f;     ///< of the references' boxes in the estimate, for a spatial split to be tried
-  static constexpr float kMostCost = 1.25f;      ///< of a spatial split by SAH, of the object split's
+  /// of the references' boxes in the estimate, for a spatial split to be tried
+  static constexpr float kLeastShare = 0.2f;
+  static constexpr float kMostCost = 1.25f;  ///< of a spatial split by SAH, of the object split's
 
   /// Where the left child's room ends when the children have so many references.
   static std::size_t divide(const Range& range, std::size_t left, std::size_t right) {
@@ -78,14 +79,18 @@ class SpatialSah {
     const sah::Reference* begin = references_[range.side].data() + range.begin;
     const sah::Reference* end = begin + range.size();
     const sah::ObjectSplit object(begin, end, range.bounds.centroids, parameters_.bins, leaf_width_);
-    const sah::Box left_box = object.exists() ? object.left() : range.bounds.boxes, right_box = object.exists() ? object.right() : range.bounds.boxes;
-    if (range.room() >= range.size() + kFewest && range.size() > kFewest && sah::half_area_or_0(min_x86(left_box, right_box)) > parameters_.spatial_overlap * root_area_ &&
+    const sah::Box left_box = object.exists() ? object.left() : range.bounds.boxes,
+                   right_box = object.exists() ? object.right() : range.bounds.boxes;
+    if (range.room() >= range.size() + kFewest && range.size() > kFewest &&
+        sah::half_area_or_0(min_x86(left_box, right_box)) > parameters_.spatial_overlap * root_area_ &&
         split_space(range, object.cost(), left, right)) {
       return;
     }
     if (!object.exists()) return split_in_the_middle(range, left, right);
-    const std::size_t right_count = range.size() - object.left_count(), middle = divide(range, object.left_count(), right_count);
-    left = {range.room_begin, range.room_begin + object.left_count(), range.room_begin, middle, 1 - range.side, {left_box, left_box}};
+    const std::size_t right_count = range.size() - object.left_count(),
+                      middle = divide(range, object.left_count(), right_count);
+    left = {range.room_begin,    range.room_begin + object.left_count(), range.room_begin, middle, 1 - range.side,
+            {left_box, left_box}};
     right = {middle, middle + right_count, middle, range.room_end, 1 - range.side, {right_box, right_box}};
     sah::Reference* out = references_[1 - range.side].data();
     object.partition_to(out + left.begin, out + right.begin, left.bounds.centroids, right.bounds.centroids);
@@ -93,10 +98,11 @@ class SpatialSah {
 
   /// Splits by a plane in space where that pays; false where it does not.
   ///
-  /// SAH takes a child for a leaf, area times references. That is far from what the subtree will cost, and chooses splits that make
-  /// some trees worse. The estimate here has two parts: the boxes of the references themselves, which no object split makes smaller,
-  /// and a share of the node's box for each level below. A spatial split pays by the area that it cuts off references: a share x
-  /// of references more must lower the estimate by (1 - spatial_gain) x. Where the first part is small nothing is tried.
+  /// SAH takes a child for a leaf, area times references. That is far from what the subtree will cost, and chooses
+  /// splits that make some trees worse. The estimate here has two parts: the boxes of the references themselves, which
+  /// no object split makes smaller, and a share of the node's box for each level below. A spatial split pays by the
+  /// area that it cuts off references: a share x of references more must lower the estimate by (1 - spatial_gain) x.
+  /// Where the first part is small nothing is tried.
   bool split_space(const Range& range, float object_cost, Range& left, Range& right) {
     const sah::Reference* begin = references_[range.side].data() + range.begin;
     const sah::Reference* end = begin + range.size();
@@ -107,7 +113,8 @@ class SpatialSah {
     }
     const float n = float(range.size()), per_block = 1.0f / float(leaf_width_);
     const float of_references = kReferenceCost * sum * per_block;
-    const float cost = of_references + kLevelCost * sah::half_area_or_0(range.bounds.boxes) * std::log2(n * per_block + 1.0f);
+    const float cost =
+        of_references + kLevelCost * sah::half_area_or_0(range.bounds.boxes) * std::log2(n * per_block + 1.0f);
     const float least = parameters_.spatial_overlap * root_area_;  // that a reference more must save
     if (largest * 0.5f * kReferenceCost * per_block < least || of_references < kLeastShare * cost) return false;
     sah::SpatialSplit best;
@@ -119,13 +126,16 @@ class SpatialSah {
     }
     if (best.axis < 0 || !(best.cost < kMostCost * object_cost)) return false;
     if (best.left_count + best.right_count < range.size() + kFewest) return false;
-    const float added = float(best.left_count + best.right_count - range.size()), gain = best.saved * kReferenceCost * per_block;
+    const float added = float(best.left_count + best.right_count - range.size()),
+                gain = best.saved * kReferenceCost * per_block;
     if (!(gain >= added * std::max(least, (1.0f - parameters_.spatial_gain) * cost / n))) return false;
     sah::Reference* out = references_[1 - range.side].data();
-    const sah::Sides sides = sah::spatial_partition_range(mesh_, begin, end, map, best, out + range.room_begin, out + range.room_end);
+    const sah::Sides sides =
+        sah::spatial_partition_range(mesh_, begin, end, map, best, out + range.room_begin, out + range.room_end);
     if (sides.left_count == 0 || sides.right_count == 0) return false;
     const std::size_t middle = divide(range, sides.left_count, sides.right_count);
-    left = {range.room_begin, range.room_begin + sides.left_count, range.room_begin, middle, 1 - range.side, sides.left};
+    left = {range.room_begin, range.room_begin + sides.left_count, range.room_begin, middle, 1 - range.side,
+            sides.left};
     right = {range.room_end - sides.right_count, range.room_end, middle, range.room_end, 1 - range.side, sides.right};
     return true;
   }
@@ -134,7 +144,8 @@ class SpatialSah {
   std::size_t recurse(const Range& range, std::uint32_t index, sah::TreeWriter::Share& share) {
     if (range.size() <= leaf_width_) {
       const sah::Reference* r = references_[range.side].data();
-      writer_->leaf(index, range.bounds.boxes, r + range.begin, r + range.end, range.room_begin, references_[0].data() + range.room_begin);
+      writer_->leaf(index, range.bounds.boxes, r + range.begin, r + range.end, range.room_begin,
+                    references_[0].data() + range.room_begin);
       return range.size();
     }
     Range left, right;
@@ -156,11 +167,14 @@ class SpatialSah {
     return left_count + right_count;
   }
 
-  /// Brings the leaves' ids from where their references began in the first buffer into the tree's primitives, from `begin` on.
+  /// Brings the leaves' ids from where their references began in the first buffer into the tree's primitives, from
+  /// `begin` on.
   void line_up(std::uint32_t index, std::uint32_t begin) {
     const BinaryNode& node = tree_.nodes[index];
     if (node.is_leaf()) {
-      if (node.count > 0) std::memcpy(tree_.primitives.data() + begin, references_[0].data() + tree_.first[index], node.count * sizeof(std::uint32_t));
+      if (node.count > 0)
+        std::memcpy(tree_.primitives.data() + begin, references_[0].data() + tree_.first[index],
+                    node.count * sizeof(std::uint32_t));
       tree_.first[index] = begin;
       return;
     }
@@ -181,7 +195,8 @@ class SpatialSah {
   ReservedArray<sah::Reference> references_[2];
 };
 
-inline void build_spatial_sah(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree, BuildReport& report) {
+inline void build_spatial_sah(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+                              BinaryTree& tree, BuildReport& report) {
   SpatialSah(mesh, parameters, leaf_width, tree).build(report);
 }
 

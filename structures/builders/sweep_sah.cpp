@@ -1,9 +1,10 @@
-// Full-sweep SAH builder: every split between neighbours in the order of centroids is tried, on all three axes (MacDonald and
-// Booth 1990; Wald, Boulos, Shirley, "Ray Tracing Deformable Scenes using Dynamic Bounding Volume Hierarchies", TOG 2007, section
-// 3.2). The triangles are sorted once on each axis and a partition keeps the three orders, so that building takes O(n log n).
+// Full-sweep SAH builder: every split between neighbours in the order of centroids is tried, on all three axes
+// (MacDonald and Booth 1990; Wald, Boulos, Shirley, "Ray Tracing Deformable Scenes using Dynamic Bounding Volume
+// Hierarchies", TOG 2007, section 3.2). The triangles are sorted once on each axis and a partition keeps the three
+// orders, so that building takes O(n log n).
 //
-// Equal centroids are ordered by triangle, so the tree does not depend on threads. Cost is that of binned_sah: area times
-// references on both sides, in blocks of the leaf's width and one block at least.
+// Equal centroids are ordered by triangle, so the tree does not depend on threads. Cost is that of binned_sah: area
+// times references on both sides, in blocks of the leaf's width and one block at least.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -23,14 +24,16 @@ constexpr std::size_t kParallel = 1u << 12;
 
 class SweepSah {
  public:
-  SweepSah(const TriangleMesh& mesh, unsigned leaf_width, BinaryTree& tree) : mesh_(mesh), leaf_width_(leaf_width), tree_(tree) {}
+  SweepSah(const TriangleMesh& mesh, unsigned leaf_width, BinaryTree& tree)
+      : mesh_(mesh), leaf_width_(leaf_width), tree_(tree) {}
 
   void build(BuildReport& report) {
     const std::size_t n = mesh_.size();
     PhaseClock phase(report);
     boxes_.resize(n), is_left_.resize(n), scratch_.resize(2 * n), right_cost_.resize(3 * n);
     tbb::parallel_for(std::size_t{0}, (n + kParallel - 1) / kParallel, [&](std::size_t chunk) {
-      for (std::size_t i = chunk * kParallel; i < std::min(n, (chunk + 1) * kParallel); ++i) boxes_[i] = mesh_.bounds(i);
+      for (std::size_t i = chunk * kParallel; i < std::min(n, (chunk + 1) * kParallel); ++i)
+        boxes_[i] = mesh_.bounds(i);
     });
     phase.ends("references");
     sort();
@@ -63,7 +66,8 @@ class SweepSah {
     };
     MeteredVector<Key> keys(n);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < n; ++i) keys[i] = {boxes_[i].lower[int(axis)] + boxes_[i].upper[int(axis)], std::uint32_t(i)};
+      for (std::size_t i = 0; i < n; ++i)
+        keys[i] = {boxes_[i].lower[int(axis)] + boxes_[i].upper[int(axis)], std::uint32_t(i)};
       tbb::parallel_sort(keys.begin(), keys.end());
       order_[axis].resize(n);
       for (std::size_t i = 0; i < n; ++i) order_[axis][i] = keys[i].id;
@@ -88,14 +92,16 @@ class SweepSah {
       box.extend(boxes_[order[i]]);
       const float total = cost(box, i + 1 - begin) + right_cost[i + 1];
       // Among equal ones the split nearest the middle, or a line of points would make a list.
-      if (total < best.cost || (total == best.cost && 2 * (i + 1 - begin) <= end - begin)) best.cost = total, best.left = i + 1 - begin;
+      if (total < best.cost || (total == best.cost && 2 * (i + 1 - begin) <= end - begin))
+        best.cost = total, best.left = i + 1 - begin;
     }
     return best;
   }
 
   [[nodiscard]] bool centroids_coincide(std::size_t begin, std::size_t end) const {
     for (int axis = 0; axis < 3; ++axis) {
-      const Bounds3f &low = boxes_[order_[std::size_t(axis)][begin]], &high = boxes_[order_[std::size_t(axis)][end - 1]];
+      const Bounds3f &low = boxes_[order_[std::size_t(axis)][begin]],
+                     &high = boxes_[order_[std::size_t(axis)][end - 1]];
       if (low.lower[axis] + low.upper[axis] != high.lower[axis] + high.upper[axis]) return false;
     }
     return true;
@@ -142,7 +148,8 @@ class SweepSah {
     const int other[2] = {(best.axis + 1) % 3, (best.axis + 2) % 3};
     if (parallel) {
       std::uint32_t* second = scratch_.data() + mesh_.size();
-      tbb::parallel_invoke([&] { partition(other[0], begin, end, scratch_.data() + begin); }, [&] { partition(other[1], begin, end, second + begin); });
+      tbb::parallel_invoke([&] { partition(other[0], begin, end, scratch_.data() + begin); },
+                           [&] { partition(other[1], begin, end, second + begin); });
     } else {
       for (int axis : other) partition(axis, begin, end, scratch_.data() + begin);
     }
@@ -170,7 +177,8 @@ class SweepSah {
 
 }  // namespace
 
-void build_sweep_sah(const TriangleMesh& mesh, const BuilderParameters&, unsigned leaf_width, BinaryTree& tree, BuildReport& report) {
+void build_sweep_sah(const TriangleMesh& mesh, const BuilderParameters&, unsigned leaf_width, BinaryTree& tree,
+                     BuildReport& report) {
   SweepSah(mesh, leaf_width, tree).build(report);
 }
 

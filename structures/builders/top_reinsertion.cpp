@@ -1,5 +1,6 @@
-// The top of the tree, its largest nodes with what hangs below them as leaves, becomes a small tree of its own; reinsertion improves that, and
-// the result takes the places of the old top. Subtrees below stay where they are; only their references move, so that those below a node stand together.
+// The top of the tree, its largest nodes with what hangs below them as leaves, becomes a small tree of its own;
+// reinsertion improves that, and the result takes the places of the old top. Subtrees below stay where they are; only
+// their references move, so that those below a node stand together.
 #include "structures/builders/top_reinsertion.h"
 
 #include <algorithm>
@@ -15,19 +16,24 @@
 namespace arboretum {
 namespace {
 
-constexpr unsigned kRounds = 2;               ///< a third gains a hundredth of what two do
-constexpr std::size_t kReferencesEach = 256;  ///< of a tree for each node that is opened, or small trees would take long
+constexpr unsigned kRounds = 2;  ///< a third gains a hundredth of what two do
+/// of a tree for each node that is opened, or small trees would take long
+constexpr std::size_t kReferencesEach = 256;
 
 class Top {
  public:
-  /// The `opened` largest inner nodes of the tree, and their children. Numbers depend on the tree's shape and not on where its nodes stand.
+  /// The `opened` largest inner nodes of the tree, and their children. Numbers depend on the tree's shape and not on
+  /// where its nodes stand.
   Top(BinaryTree& tree, std::size_t opened) : tree_(tree) {
     using Entry = std::pair<float, std::uint32_t>;  // area, number in the top
-    const auto after = [](const Entry& a, const Entry& b) { return a.first != b.first ? a.first < b.first : a.second > b.second; };
+    const auto after = [](const Entry& a, const Entry& b) {
+      return a.first != b.first ? a.first < b.first : a.second > b.second;
+    };
     std::priority_queue<Entry, std::vector<Entry>, decltype(after)> largest(after);
     const auto add = [&](std::uint32_t node) {
       const std::uint32_t number = std::uint32_t(top_.nodes.size());
-      top_.nodes.push_back(LinkedNode::leaf({tree_.nodes[node].lower, tree_.nodes[node].upper}, number, tree_.nodes[node].count));
+      top_.nodes.push_back(
+          LinkedNode::leaf({tree_.nodes[node].lower, tree_.nodes[node].upper}, number, tree_.nodes[node].count));
       hanging_.push_back({tree_.nodes[node], node, 0, 0});
       if (!tree_.nodes[node].is_leaf()) largest.emplace(tree_.nodes[node].half_area(), number);
     };
@@ -55,7 +61,8 @@ class Top {
   }
 
  private:
-  /// A node of the old top. Of those that hang below the new one the place and where references begin, before and after.
+  /// A node of the old top. Of those that hang below the new one the place and where references begin, before and
+  /// after.
   struct Hanging {
     BinaryNode node;
     std::uint32_t place;

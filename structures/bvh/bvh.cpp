@@ -6,7 +6,8 @@
 namespace arboretum::bvh {
 
 void BvhBase::set_scene(const TriangleMesh& mesh, const Bounds3f& bounds) noexcept {
-  vertices_ = mesh.vertices.data(), triangles_ = mesh.size(), bounds_ = bounds, max_coordinate_ = largest_coordinate(bounds);
+  vertices_ = mesh.vertices.data(), triangles_ = mesh.size(), bounds_ = bounds,
+  max_coordinate_ = largest_coordinate(bounds);
 }
 
 template class WideBvh<SoaNodes<2>>;

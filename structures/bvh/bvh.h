@@ -51,10 +51,10 @@ class BvhBase : public Accel {
 };
 
 /// A wide BVH whose nodes are written in `Format`, which has
-///   kName, kSummary; kBranching, the most children; Node, a trivially copyable type; kGranule, a multiple of 32: nodes and leaves
-///   lie on addresses that are multiples of it;
-///   write(Node&, boxes, references, count): the node of these children, 0 of them for an empty scene;
-///   read(const Node&, boxes, references): the count, and the children as a ray's box test sees them.
+///   kName, kSummary; kBranching, the most children; Node, a trivially copyable type; kGranule, a multiple of 32: nodes
+///   and leaves lie on addresses that are multiples of it; write(Node&, boxes, references, count): the node of these
+///   children, 0 of them for an empty scene; read(const Node&, boxes, references): the count, and the children as a
+///   ray's box test sees them.
 /// Its members are defined in wide_bvh.h and wide_refit.h, which a structure's .cpp file includes to instantiate them.
 template <class Format>
 class WideBvh final : public BvhBase {
@@ -69,39 +69,43 @@ class WideBvh final : public BvhBase {
   void refit(const TriangleMesh& mesh) override;
 };
 
-/// planes[2 * axis + side][child], side 0 lower, 1 upper. 64, 112, 224, 448 bytes of planes and references for N = 2, 4,
-/// 8, 16. A slot without a child has lower = +inf, upper = -inf, so that no ray enters it; children come first.
-/// With a stride of 224 bytes on 32-byte addresses a node of N = 8 always lies on four cache lines.
+/// planes[2 * axis + side][child], side 0 lower, 1 upper. 64, 112, 224, 448 bytes of planes and references for N = 2,
+/// 4, 8, 16. A slot without a child has lower = +inf, upper = -inf, so that no ray enters it; children come first. With
+/// a stride of 224 bytes on 32-byte addresses a node of N = 8 always lies on four cache lines.
 template <int N>
 struct alignas(32) Node {
   float planes[6][N];
   NodeReference child[N];
 };
-static_assert(sizeof(Node<2>) == 64 && sizeof(Node<4>) == 128 && sizeof(Node<8>) == 256 - 32 && sizeof(Node<16>) == 448);
+static_assert(sizeof(Node<2>) == 64 && sizeof(Node<4>) == 128 && sizeof(Node<8>) == 256 - 32 &&
+              sizeof(Node<16>) == 448);
 
 /// Child boxes as structure of arrays.
 template <int N>
 struct SoaNodes {
   static constexpr int kBranching = N;
   static constexpr std::string_view kName = N == 2 ? "bvh2" : N == 4 ? "bvh4" : N == 8 ? "bvh8" : "bvh16";
-  static constexpr std::string_view kSummary = N == 2   ? "binary bounding volume hierarchy"
-                                               : N == 4 ? "4-wide bounding volume hierarchy, child boxes as structure of arrays"
-                                               : N == 8 ? "8-wide bounding volume hierarchy, child boxes as structure of arrays"
-                                                        : "16-wide bounding volume hierarchy, child boxes as structure of arrays";
+  static constexpr std::string_view kSummary =
+      N == 2   ? "binary bounding volume hierarchy"
+      : N == 4 ? "4-wide bounding volume hierarchy, child boxes as structure of arrays"
+      : N == 8 ? "8-wide bounding volume hierarchy, child boxes as structure of arrays"
+               : "16-wide bounding volume hierarchy, child boxes as structure of arrays";
   static constexpr std::size_t kGranule = 32;
   using Node = bvh::Node<N>;
 
   static void write(Node& node, const Bounds3f* boxes, const NodeReference* references, unsigned count) noexcept {
     for (unsigned i = 0; i < unsigned(N); ++i) {
       const Bounds3f box = i < count ? boxes[i] : Bounds3f{};
-      for (int axis = 0; axis < 3; ++axis) node.planes[2 * axis][i] = box.lower[axis], node.planes[2 * axis + 1][i] = box.upper[axis];
+      for (int axis = 0; axis < 3; ++axis)
+        node.planes[2 * axis][i] = box.lower[axis], node.planes[2 * axis + 1][i] = box.upper[axis];
       node.child[i] = i < count ? references[i] : 0;
     }
   }
   static unsigned read(const Node& node, Bounds3f* boxes, NodeReference* references) noexcept {
     unsigned i = 0;
     for (; i < unsigned(N) && node.planes[0][i] <= node.planes[1][i]; ++i) {
-      boxes[i] = {{node.planes[0][i], node.planes[2][i], node.planes[4][i]}, {node.planes[1][i], node.planes[3][i], node.planes[5][i]}};
+      boxes[i] = {{node.planes[0][i], node.planes[2][i], node.planes[4][i]},
+                  {node.planes[1][i], node.planes[3][i], node.planes[5][i]}};
       references[i] = node.child[i];
     }
     return i;

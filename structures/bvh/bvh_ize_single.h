@@ -1,5 +1,6 @@
-// Single rays through a wide BVH with Ize's box test (traversal/ize_box.h). It is there to be compared with the others in node visits and answers;
-// leaves are always called (traversal/leaves.h), so times compare with those of a leaf that the other box tests call too: `triangle4i`.
+// Single rays through a wide BVH with Ize's box test (traversal/ize_box.h). It is there to be compared with the others
+// in node visits and answers; leaves are always called (traversal/leaves.h), so times compare with those of a leaf that
+// the other box tests call too: `triangle4i`.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
@@ -17,10 +18,13 @@ struct IzeNodeTest {
   IzeLanes<N> box;
   F tnear, tfar;
 
-  ARBORETUM_INLINE IzeNodeTest(const Ray& ray, float /*max_coordinate*/) : box(ray), tnear(first_distance(ray)), tfar(ray.tfar) {}
+  ARBORETUM_INLINE IzeNodeTest(const Ray& ray, float /*max_coordinate*/)
+      : box(ray), tnear(first_distance(ray)), tfar(ray.tfar) {}
   ARBORETUM_INLINE unsigned test(const std::byte* node, F& entry) const { return box.test(node, tnear, tfar, entry); }
   ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
-  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) { return SoaNodeTest<N, false>::children(node); }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return SoaNodeTest<N, false>::children(node);
+  }
   static unsigned boxes(const std::byte* node) { return SoaNodeTest<N, false>::boxes(node); }
 };
 

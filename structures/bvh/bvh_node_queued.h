@@ -1,8 +1,9 @@
 // Many rays in flight through a wide BVH of any node format (traversal/queued_rays.h).
 //
-// The steps of bvh_single.h, one at a time: children in the same order, nearest on top of the ray's own stack; for any hit as they stand in the node. What starts beyond a
-// new hit leaves the stack when it is found, so that a step takes the top and compares nothing. The bvh::SoaNodes have a loop of their own (bvh_queued.h), whose
-// steps build the ray's node test anew from its constants; here a ray keeps the test itself, whatever it consists of.
+// The steps of bvh_single.h, one at a time: children in the same order, nearest on top of the ray's own stack; for any
+// hit as they stand in the node. What starts beyond a new hit leaves the stack when it is found, so that a step takes
+// the top and compares nothing. The bvh::SoaNodes have a loop of their own (bvh_queued.h), whose steps build the ray's
+// node test anew from its constants; here a ray keeps the test itself, whatever it consists of.
 #pragma once
 
 #include "structures/bvh/bvh_queued.h"
@@ -11,12 +12,15 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// push() (bvh_queued.h), also where references lie `Stride` places apart, and of four children without a branch on AVX2, too.
+/// push() (bvh_queued.h), also where references lie `Stride` places apart, and of four children without a branch on
+/// AVX2, too.
 template <int Stride, bool AnyHit, int W>
 ARBORETUM_INLINE void push_children_of(const bvh::NodeReference* child, vf<W> entry, unsigned hit, StackEntry*& top) {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
   if constexpr (W == 4) {
-    push_four<AnyHit>(vi<4>(_mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride]))), entry, hit, top);
+    push_four<AnyHit>(
+        vi<4>(_mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride]))), entry,
+        hit, top);
     top += __builtin_popcount(hit);
     return;
   }
@@ -27,7 +31,8 @@ ARBORETUM_INLINE void push_children_of(const bvh::NodeReference* child, vf<W> en
     alignas(16) bvh::NodeReference side_by_side[W];
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
     static_assert(W == 4);  // as one vector: a load that is wider than the stores before it waits for them
-    _mm_store_si128(reinterpret_cast<__m128i*>(side_by_side), _mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride])));
+    _mm_store_si128(reinterpret_cast<__m128i*>(side_by_side),
+                    _mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride])));
 #else
     for (int i = 0; i < W; ++i) side_by_side[i] = child[i * Stride];
 #endif
@@ -99,7 +104,8 @@ class BvhNodeWalk {
 
  private:
   BvhNodeWalk(const bvh::BvhBase& tree, const KernelRow& row)
-      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), stack_entries_(tree.stack_entries()) {}
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()),
+        stack_entries_(tree.stack_entries()) {}
 
   static ARBORETUM_INLINE Target pop(State& s) { return Target(*--s.top); }
 
@@ -117,7 +123,8 @@ struct BvhNodeQueue {
   using Of = QueuedRays<BvhNodeWalk<Nodes<Padded>, Leaves, AnyHit>>;
 };
 
-/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register (docs/performance.md), else alone.
+/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register
+/// (docs/performance.md), else alone.
 template <template <class, bool, bool> class Queue, class Single, int N>
 using IncoherentInFlight = std::conditional_t<(kRegisterWidth >= N), QueuedFunctions<Queue, Single, 32, 64>, Single>;
 

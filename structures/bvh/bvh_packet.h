@@ -1,17 +1,20 @@
 // Packets: up to 64 rays go through a wide BVH together, with masks of those that are still in it.
 //
-// Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant. A node's N children are first tested
-// at once against an interval that holds all rays of the packet, then each that is left against the rays, W at a time, with the very
-// arithmetic of single rays. Children go on the stack with the mask of their rays, nearest on top by the interval's entry. Where no more
-// than `threshold` rays are in a node they go on alone, with all N children in lanes, and the packet with what is left on its stack.
+// Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant. A node's N
+// children are first tested at once against an interval that holds all rays of the packet, then each that is left
+// against the rays, W at a time, with the very arithmetic of single rays. Children go on the stack with the mask of
+// their rays, nearest on top by the interval's entry. Where no more than `threshold` rays are in a node they go on
+// alone, with all N children in lanes, and the packet with what is left on its stack.
 //
-// The interval test. With r = 1/d and o within the packet's bounds a plane b is met at (b - o) r, whose ends over the packet are products of
-// ends. What a ray's own test computes is off it by less than 2^-20 (M + |o|)|r| (traversal/box_test.h: its pad and roundings are
-// three quarters of that, the interval's own roundings less than the rest), by which the interval is widened: no child is lost that a ray's test takes.
-// Without FMA r may be infinite; such a packet has no interval test. Rays with a common end instead of a common origin, as those towards a point light, are bounded from there.
+// The interval test. With r = 1/d and o within the packet's bounds a plane b is met at (b - o) r, whose ends over the
+// packet are products of ends. What a ray's own test computes is off it by less than 2^-20 (M + |o|)|r|
+// (traversal/box_test.h: its pad and roundings are three quarters of that, the interval's own roundings less than the
+// rest), by which the interval is widened: no child is lost that a ray's test takes. Without FMA r may be infinite;
+// such a packet has no interval test. Rays with a common end instead of a common origin, as those towards a point
+// light, are bounded from there.
 //
-// Every ray visits at least the leaves that it would visit alone, up to those that begin beyond its nearest hit. So with padded boxes
-// the answers are those of single rays, bit for bit.
+// Every ray visits at least the leaves that it would visit alone, up to those that begin beyond its nearest hit. So
+// with padded boxes the answers are those of single rays, bit for bit.
 #pragma once
 
 #include "structures/bvh/bvh_packet_nodes.h"
@@ -30,20 +33,25 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   using Base::best, Base::kMost, Base::times_alone;
 
   BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"),
-        stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
+      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(tree.root()),
+        max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"), stack_(tree.stack_entries()),
+        single_stack_(tree.stack_entries()) {}
 
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
     Base::trace(
-        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, N>(count, ray_at, padded_, BoxPad{max_coordinate_}, each); },
+        rays, count, threshold,
+        [&](const auto& ray_at, const auto& each) {
+          lanes_.template prepare<W, N>(count, ray_at, padded_, BoxPad{max_coordinate_}, each);
+        },
         [&](Mask mask, unsigned) { traverse(mask); });
   }
 
  private:
   using typename Base::Mask;
   using F = vf<W>;
-  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::lanes_, Base::leaves_, Base::range, Base::rays_, Base::spread_;
+  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::lanes_, Base::leaves_,
+      Base::range, Base::rays_, Base::spread_;
   static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
   using Children = vf<kLanes>;
 
@@ -52,7 +60,8 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     float t;
     Mask mask;
   };
-  /// Bounds of a group of rays by axis: of 1/d, of the origin at the near and at the far planes, and what they are widened by.
+  /// Bounds of a group of rays by axis: of 1/d, of the origin at the near and at the far planes, and what they are
+  /// widened by.
   struct Interval {
     float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
     float tnear;
@@ -97,8 +106,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together.
   static float rounding(const Bounds& o, const Bounds& end) { return 0x1p-21f * (o.largest() + end.largest()); }
 
-  /// Rays towards a light have no common origin, but their ends o + tfar d lie close together. Then the bounds of the ends take the place of the origins', and
-  /// distances count from a ray's end, s = t - tfar: it meets a plane b at s = (b - end) r.
+  /// Rays towards a light have no common origin, but their ends o + tfar d lie close together. Then the bounds of the
+  /// ends take the place of the origins', and distances count from a ray's end, s = t - tfar: it meets a plane b at s =
+  /// (b - end) r.
   void take_common_end(Mask mask, Interval& v, Bounds (&o)[3], float (&scale)[3]) {
     Bounds t, end[3];
     range(lanes_.t, mask, t.low, t.high);
@@ -106,7 +116,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     float origins = 0.0f, ends = 0.0f, largest = 0.0f;
     for (int a = 0; a < 3; ++a) {
       alignas(64) float at[kMost];
-      for (int k = 0; k < chunks_ * W; k += W) (F::load(lanes_.rays.origin[a] + k) + F::load(lanes_.t + k) * F::load(lanes_.rays.direction[a] + k)).store(at + k);
+      for (int k = 0; k < chunks_ * W; k += W)
+        (F::load(lanes_.rays.origin[a] + k) + F::load(lanes_.t + k) * F::load(lanes_.rays.direction[a] + k))
+            .store(at + k);
       range(at, mask, end[a].low, end[a].high);
       const float most = o[a].largest() > end[a].largest() ? o[a].largest() : end[a].largest();
       largest = most > largest ? most : largest;
@@ -114,8 +126,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     }
     if (!(ends < 0.25f * origins)) return;
     v.from_end = true;
-    // What is computed from `end` is off like what is computed from `o` above. Where the direction is as good as 0 along an axis, r is not its reciprocal but 2^60 / |d|max, and s is off by
-    // up to tfar <= 2 largest / |d|max: the width is of the largest coordinate of any axis, 2^-19 of which times that r is beyond it.
+    // What is computed from `end` is off like what is computed from `o` above. Where the direction is as good as 0
+    // along an axis, r is not its reciprocal but 2^60 / |d|max, and s is off by up to tfar <= 2 largest / |d|max: the
+    // width is of the largest coordinate of any axis, 2^-19 of which times that r is beyond it.
     for (int a = 0; a < 3; ++a) {
       const float wide = rounding(o[a], end[a]);
       const float up = end[a].high - o[a].low, down = o[a].high - end[a].low;
@@ -149,9 +162,13 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       if (in == 0) continue;
       const int k = c * W;
       const F rx = F::load(lanes_.r[0] + k), ry = F::load(lanes_.r[1] + k), rz = F::load(lanes_.r[2] + k);
-      const auto at = [&](unsigned plane, F r, const float* c) { return Format::template distance<F>(node, plane, i, r, F::load(c + k)); };
-      const F enter = max_x86(max_x86(at(near[0], rx, lanes_.near[0]), at(near[1], ry, lanes_.near[1])), max_x86(at(near[2], rz, lanes_.near[2]), F::load(lanes_.first + k)));
-      const F leave = min_x86(min_x86(at(1 - near[0], rx, lanes_.far[0]), at(5 - near[1], ry, lanes_.far[1])), min_x86(at(9 - near[2], rz, lanes_.far[2]), F::load(lanes_.t + k)));
+      const auto at = [&](unsigned plane, F r, const float* c) {
+        return Format::template distance<F>(node, plane, i, r, F::load(c + k));
+      };
+      const F enter = max_x86(max_x86(at(near[0], rx, lanes_.near[0]), at(near[1], ry, lanes_.near[1])),
+                              max_x86(at(near[2], rz, lanes_.near[2]), F::load(lanes_.first + k)));
+      const F leave = min_x86(min_x86(at(1 - near[0], rx, lanes_.far[0]), at(5 - near[1], ry, lanes_.far[1])),
+                              min_x86(at(9 - near[2], rz, lanes_.far[2]), F::load(lanes_.t + k)));
       met |= Mask((enter <= leave).bits() & in) << k;
     }
     return met;
@@ -219,13 +236,17 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   }
 
   template <class Axes>
-  static ARBORETUM_INLINE Vec3f of(const Axes& axes, int i) { return {axes[0][i], axes[1][i], axes[2][i]}; }
+  static ARBORETUM_INLINE Vec3f of(const Axes& axes, int i) {
+    return {axes[0][i], axes[1][i], axes[2][i]};
+  }
 
   template <class RayData>
   bool alone(int i, RayData& ray, bvh::NodeReference reference, typename Counting::Depth depth) {
     const auto below = [&](auto padded) {
       const BoxRay<N, decltype(padded)::value> box(of(lanes_.r, i), of(lanes_.near, i), of(lanes_.far, i));
-      return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(base_, reference, box, lanes_.first[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_, counting_, depth);
+      return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(
+          base_, reference, box, lanes_.first[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_,
+          counting_, depth);
     };
     return padded_ ? below(std::true_type{}) : below(std::false_type{});
   }

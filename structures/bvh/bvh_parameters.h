@@ -11,7 +11,8 @@
 namespace arboretum::bvh {
 
 template <class Format>
-[[nodiscard]] std::vector<std::string_view> builder_parameters(std::type_identity<WideBvh<Format>>, std::string_view builder) {
+[[nodiscard]] std::vector<std::string_view> builder_parameters(std::type_identity<WideBvh<Format>>,
+                                                               std::string_view builder) {
   std::vector<std::string_view> names = binary_builder_parameters(builder);
   names.insert(names.end(), {"traversal_cost", "intersection_cost", "max_leaf_blocks", "collapse"});
   return names;

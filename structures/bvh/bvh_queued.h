@@ -1,9 +1,10 @@
 // Queued traversal: K rays of a batch in flight, their next steps in two queues, one of nodes, one of leaves.
 //
-// A step of one ray waits some fifty cycles for memory and mispredicted branches. Here a step only says what the ray needs next:
-// the target's cache lines are asked for and {ray, target} is put on the queue of its kind, so that by the time it is its turn the
-// lines are there, and the steps of a queue are independent of each other and all of one kind. Every ray keeps its own stack and
-// visits nodes in the very order of single-ray traversal: the answers are the same to the bit, however many rays are in flight.
+// A step of one ray waits some fifty cycles for memory and mispredicted branches. Here a step only says what the ray
+// needs next: the target's cache lines are asked for and {ray, target} is put on the queue of its kind, so that by the
+// time it is its turn the lines are there, and the steps of a queue are independent of each other and all of one kind.
+// Every ray keeps its own stack and visits nodes in the very order of single-ray traversal: the answers are the same to
+// the bit, however many rays are in flight.
 #pragma once
 
 #include "simd/lane_order.h"
@@ -20,9 +21,11 @@ inline constexpr bvh::NodeReference kDone = 16;
 /// The kinds of step, as the reference's own bits tell them: node 0, leaf 1, done 2.
 [[nodiscard]] ARBORETUM_INLINE unsigned kind_of(bvh::NodeReference r) { return r >> 3 & 3u; }
 
-/// The children of `hit` onto the stack, the nearest on top: the order of push_children(). For any hit as they stand in the node: walk_bvh()'s.
+/// The children of `hit` onto the stack, the nearest on top: the order of push_children(). For any hit as they stand in
+/// the node: walk_bvh()'s.
 template <int N, bool AnyHit>
-ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std::uint32_t* key, unsigned hit, StackEntry*& top) {
+ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std::uint32_t* key, unsigned hit,
+                                      StackEntry*& top) {
   for (StackEntry* const bottom = top; hit; hit &= hit - 1) {
     const int i = __builtin_ctz(hit);
     const StackEntry e = stack_entry(key[i], child[i]);
@@ -35,7 +38,8 @@ ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std
 }
 
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
-/// Four entries, the largest first. Positive doubles order as their bits do, and no distance of a float is a double's NaN.
+/// Four entries, the largest first. Positive doubles order as their bits do, and no distance of a float is a double's
+/// NaN.
 ARBORETUM_INLINE __m256d sort_down(__m256d e) {
   __m256d p = _mm256_permute4x64_pd(e, 0x4e);  // 2 3 0 1
   e = _mm256_blend_pd(_mm256_max_pd(e, p), _mm256_min_pd(e, p), 0b1100);
@@ -55,7 +59,8 @@ ARBORETUM_INLINE void push_four(vi<W> references, vf<W> entry, unsigned hit, Sta
 #endif
 
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
-/// Which lane, in bytes, comes to each place when the first four lanes of a mask are moved together; 0xff where there are fewer.
+/// Which lane, in bytes, comes to each place when the first four lanes of a mask are moved together; 0xff where there
+/// are fewer.
 struct CompressBytesTable {
   alignas(16) std::uint8_t bytes[256][16] = {};
   constexpr CompressBytesTable() {
@@ -73,23 +78,26 @@ struct CompressBytesTable {
 };
 inline constexpr CompressBytesTable kCompressBytes;
 
-/// Of eight lanes those that `from` (a row of the table) names. A byte of an index with its highest bit gives 0, else its low four bits count.
+/// Of eight lanes those that `from` (a row of the table) names. A byte of an index with its highest bit gives 0, else
+/// its low four bits count.
 ARBORETUM_INLINE __m128i compress_bytes(__m128i low, __m128i high, __m128i from) {
-  return _mm_or_si128(_mm_shuffle_epi8(low, _mm_adds_epu8(from, _mm_set1_epi8(0x70))), _mm_shuffle_epi8(high, _mm_sub_epi8(from, _mm_set1_epi8(16))));
+  return _mm_or_si128(_mm_shuffle_epi8(low, _mm_adds_epu8(from, _mm_set1_epi8(0x70))),
+                      _mm_shuffle_epi8(high, _mm_sub_epi8(from, _mm_set1_epi8(16))));
 }
 
 /// Four entries, the largest first: a[0], a[1], b[0], b[1]. Positive doubles order as their bits do.
 ARBORETUM_INLINE void sort_down(__m128d& a, __m128d& b) {
   const __m128d high = _mm_max_pd(a, b), low = _mm_min_pd(a, b);
   const __m128d even = _mm_unpacklo_pd(high, low), odd = _mm_unpackhi_pd(high, low);
-  const __m128d more = _mm_max_pd(even, odd), less = _mm_min_pd(even, odd);  // the most and one in between, one in between and the least
+  // The most and one in between, one in between and the least
+  const __m128d more = _mm_max_pd(even, odd), less = _mm_min_pd(even, odd);
   const __m128d between = _mm_unpackhi_pd(more, more);
   a = _mm_unpacklo_pd(more, _mm_max_sd(between, less)), b = _mm_shuffle_pd(_mm_min_sd(between, less), less, 0b10);
 }
 #endif
 
-/// The same for all: up to four children, the usual case, without a branch where the registers can do it. Writes up to four
-/// entries whatever their number.
+/// The same for all: up to four children, the usual case, without a branch where the registers can do it. Writes up to
+/// four entries whatever their number.
 template <int N, bool AnyHit>
 ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> entry, unsigned hit, StackEntry*& top) {
   constexpr int W = N < 4 ? 4 : N;
@@ -115,7 +123,8 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> 
         references = compress_bytes(_mm_loadu_si128(reference), _mm_loadu_si128(reference + 1), from);
         keys = compress_bytes(_mm_castps_si128(entry.lo.v), _mm_castps_si128(entry.hi.v), from);
       }
-      __m128d a = _mm_castsi128_pd(_mm_unpacklo_epi32(references, keys)), b = _mm_castsi128_pd(_mm_unpackhi_epi32(references, keys));
+      __m128d a = _mm_castsi128_pd(_mm_unpacklo_epi32(references, keys)),
+              b = _mm_castsi128_pd(_mm_unpackhi_epi32(references, keys));
       if constexpr (!AnyHit) sort_down(a, b);
       _mm_storeu_pd(reinterpret_cast<double*>(top), a), _mm_storeu_pd(reinterpret_cast<double*>(top + 2), b);
       top += count;
@@ -132,12 +141,15 @@ template <int N, class Leaves, bool Padded, bool AnyHit>
 class Queued {
  public:
   /// `in_flight`: 1 to kMostInFlight.
-  Queued(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight) : Queued(static_cast<const bvh::BvhBase&>(accel), row, rays, in_flight) {}
+  Queued(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight)
+      : Queued(static_cast<const bvh::BvhBase&>(accel), row, rays, in_flight) {}
   Queued(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, unsigned in_flight)
-      : in_flight_(in_flight), base_(tree.base()), leaves_(row, tree.vertices()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), rays_(rays),
-        stride_(((tree.stack_entries() + 6 + 7) / 8 | 1) * 8), stacks_(stride_ * in_flight) {}
+      : in_flight_(in_flight), base_(tree.base()), leaves_(row, tree.vertices()), root_(tree.root()),
+        max_coordinate_(tree.max_coordinate()), rays_(rays), stride_(((tree.stack_entries() + 6 + 7) / 8 | 1) * 8),
+        stacks_(stride_ * in_flight) {}
 
-  /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit. Of `counting` the queues' lengths alone.
+  /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit. Of `counting` the
+  /// queues' lengths alone.
   template <class Report, class Counting>
   void run(Report&& report, const Counting& counting) {
     for (unsigned slot = 0; slot < in_flight_; ++slot) start(slot, report);
@@ -172,7 +184,8 @@ class Queued {
     typename Leaves::RayData data;
 
     ARBORETUM_INLINE State(const Ray& ray, const Leaves& leaves, float max_coordinate, StackEntry* stack, std::size_t i)
-        : box(ray, max_coordinate), first(first_distance(ray)), tnear(ray.tnear), top(stack), best{ray.tfar}, index(i), data(leaves.prepare(ray)) {}
+        : box(ray, max_coordinate), first(first_distance(ray)), tnear(ray.tnear), top(stack), best{ray.tfar}, index(i),
+          data(leaves.prepare(ray)) {}
   };
   struct Step {
     std::uint32_t slot;
@@ -185,7 +198,8 @@ class Queued {
   struct Tails {
     Queued& q;
     unsigned node, leaf, done;
-    ARBORETUM_INLINE explicit Tails(Queued& queued) : q(queued), node(queued.counts_[0]), leaf(queued.counts_[1]), done(queued.counts_[2]) {}
+    ARBORETUM_INLINE explicit Tails(Queued& queued)
+        : q(queued), node(queued.counts_[0]), leaf(queued.counts_[1]), done(queued.counts_[2]) {}
     ARBORETUM_INLINE ~Tails() { q.counts_[0] = node, q.counts_[1] = leaf, q.counts_[2] = done; }
 
     /// Asks for the lines of the target and puts the step on the queue of its kind.

@@ -1,9 +1,11 @@
-// One ray through a wide BVH, depth first, children near to far; closest hit and any hit, whatever the format of its nodes.
+// One ray through a wide BVH, depth first, children near to far; closest hit and any hit, whatever the format of its
+// nodes.
 //
 // `Nodes` is one ray and how it meets the nodes of a format:
 //   Nodes(ray, max_coordinate): the ray's constants, its interval [tnear, tfar] among them;
 //   Nodes(box, first, last): the same where the constants are known (BoxRay), between two distances;
-//   kSlots: children that a node has room for; W: lanes of a test; test(node, entry): the children whose box the ray meets within its interval, as bits, and in those lanes of
+//   kSlots: children that a node has room for; W: lanes of a test; test(node, entry): the children whose box the ray
+//   meets within its interval, as bits, and in those lanes of
 //     `entry` the distances at which it enters them, at least tnear;
 //   children(node): an array in which bit i's child has its reference at [i * kStride];
 //   shorten(tfar): the interval ends earlier; boxes(node): how many children there are.
@@ -27,7 +29,8 @@ struct SoaNodeTest {
   /// `max_coordinate`: the largest of the scene, what padded boxes scale their pad with.
   ARBORETUM_INLINE SoaNodeTest(const Ray& ray, float max_coordinate)
       : SoaNodeTest(BoxRay<N, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
-  ARBORETUM_INLINE SoaNodeTest(const BoxRay<N, Padded>& constants, float first, float last) : box(constants), tnear(first), tfar(last) {}
+  ARBORETUM_INLINE SoaNodeTest(const BoxRay<N, Padded>& constants, float first, float last)
+      : box(constants), tnear(first), tfar(last) {}
   ARBORETUM_INLINE unsigned test(const std::byte* node, F& entry) const { return box.test(node, tnear, tfar, entry); }
   ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
   static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
@@ -47,11 +50,13 @@ struct SoaTests {
   using Nodes = SoaNodeTest<N, Padded>;
 };
 
-/// Depth first, children near to far; for any hit in whatever order, since an occluder may be anywhere. `leaf(reference)` returns true to stop; where it finds a nearer hit it lowers `nearest`, beyond which
-/// nothing is visited, and shortens `nodes`. Returns whether it was stopped. `depth`: of the root, where it is counted.
+/// Depth first, children near to far; for any hit in whatever order, since an occluder may be anywhere.
+/// `leaf(reference)` returns true to stop; where it finds a nearer hit it lowers `nearest`, beyond which nothing is
+/// visited, and shortens `nodes`. Returns whether it was stopped. `depth`: of the root, where it is counted.
 template <bool AnyHit, class Nodes, class Counting, class Leaf>
-ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, Nodes& nodes, StackEntry* stack, const float& nearest,
-                               const Counting& counting, const Leaf& leaf, typename Counting::Depth depth = {}) {
+ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, Nodes& nodes, StackEntry* stack,
+                               const float& nearest, const Counting& counting, const Leaf& leaf,
+                               typename Counting::Depth depth = {}) {
   StackEntry* top = stack;
   typename Counting::Depths depths(depth);
   bvh::NodeReference reference = root;
@@ -93,12 +98,13 @@ ARBORETUM_INLINE bool walk_bvh(const std::byte* base, bvh::NodeReference root, N
   }
 }
 
-/// The same with the tests of `leaves` and what they keep for the ray, `data`: the search of one ray below `root`. GCC makes a function of the leaf's
-/// part unless it is forced not to, and no vector register survives a call (docs/performance.md).
+/// The same with the tests of `leaves` and what they keep for the ray, `data`: the search of one ray below `root`. GCC
+/// makes a function of the leaf's part unless it is forced not to, and no vector register survives a call
+/// (docs/performance.md).
 template <bool AnyHit, class Nodes, class Leaves, class Counting>
-ARBORETUM_INLINE bool search_bvh(const std::byte* base, bvh::NodeReference root, Nodes& nodes, StackEntry* stack, const Ray& ray, const Leaves& leaves,
-                                 typename Leaves::RayData& data, NearestHit& best, const LeafForm& form, const Counting& counting,
-                                 typename Counting::Depth depth = {}) {
+ARBORETUM_INLINE bool search_bvh(const std::byte* base, bvh::NodeReference root, Nodes& nodes, StackEntry* stack,
+                                 const Ray& ray, const Leaves& leaves, typename Leaves::RayData& data, NearestHit& best,
+                                 const LeafForm& form, const Counting& counting, typename Counting::Depth depth = {}) {
   const auto leaf = [&](bvh::NodeReference reference) __attribute__((always_inline)) {
     const std::byte* const blocks = base + bvh::offset_of(reference);
     const unsigned count = bvh::block_count(reference);
@@ -125,28 +131,23 @@ struct BvhSingle {
     ARBORETUM_INLINE bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
       Nodes<Padded> nodes(ray, max_coordinate_);
       typename Leaves::RayData data = leaves_.prepare(ray);
-      const bool hit = search_bvh<AnyHit>(base_, root_, nodes, stack_.data(), ray, leaves_, data, best, form_, counting_);
+      const bool hit =
+          search_bvh<AnyHit>(base_, root_, nodes, stack_.data(), ray, leaves_, data, best, form_, counting_);
       if constexpr (!AnyHit && !kLater) leaves_.finish(data, best);
       if constexpr (!AnyHit && kLater) {
         if (best.primitive != NearestHit::kNone) unfinished_.add(ray, data.best);
       }
       return hit;
     }
-    ARBORETUM_INLINE void settle(Hit& hit)
-      requires kLater
-    {
+    ARBORETUM_INLINE void settle(Hit& hit) requires kLater {
       if (hit.is_hit()) unfinished_.settle(hit);
     }
-    void finish_all()
-      requires kLater
-    {
-      unfinished_.finish_all();
-    }
+    void finish_all() requires kLater { unfinished_.finish_all(); }
 
    private:
     Kernel(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
-        : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form),
-          counting_(counting), stack_(tree.stack_entries()) {}
+        : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()),
+          form_(*row.tests->form), counting_(counting), stack_(tree.stack_entries()) {}
 
     const std::byte* base_;
     bvh::NodeReference root_;

@@ -1,12 +1,15 @@
-// Stream traversal: rays of one octant share nodes. A group of up to 64 of them has one stack of nodes, each with a mask of the rays that are to visit it, after the any-hit
-// streams of Embree 3 (groups of 32 rays; there a ray alone leaves the stream).
+// Stream traversal: rays of one octant share nodes. A group of up to 64 of them has one stack of nodes, each with a
+// mask of the rays that are to visit it, after the any-hit streams of Embree 3 (groups of 32 rays; there a ray alone
+// leaves the stream).
 //
-// A batch's rays are sorted into eight lists as they come; a full list is a group. A node tests each of its rays against all its children, the planes in registers,
-// so that its cache lines, its place on the stack and its mispredicted branches are paid once for all of them. A closest hit takes the
-// children nearest first by the least distance at which any ray enters; rays that have found something nearer leave the mask when the node's turn comes.
-// Several groups take turns, a node each, so that the lines that one asks for arrive while others work: that hides what rays of their own wait for as
-// rays in flight do (bvh_queued.h), at a third of the instructions a node. What a group visits next is known when its turn ends, and those lines alone are asked for. A ray may visit a node that it would not have alone; it finds the same hit, since a
-// box is dropped only where it begins beyond the nearest hit.
+// A batch's rays are sorted into eight lists as they come; a full list is a group. A node tests each of its rays
+// against all its children, the planes in registers, so that its cache lines, its place on the stack and its
+// mispredicted branches are paid once for all of them. A closest hit takes the children nearest first by the least
+// distance at which any ray enters; rays that have found something nearer leave the mask when the node's turn comes.
+// Several groups take turns, a node each, so that the lines that one asks for arrive while others work: that hides what
+// rays of their own wait for as rays in flight do (bvh_queued.h), at a third of the instructions a node. What a group
+// visits next is known when its turn ends, and those lines alone are asked for. A ray may visit a node that it would
+// not have alone; it finds the same hit, since a box is dropped only where it begins beyond the nearest hit.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
@@ -30,15 +33,23 @@ class Stream {
 
   /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
-      : base_(tree.base()), root_(tree.root()), pad_{tree.max_coordinate(), Padded && row.tests->depth_between_corners}, leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
-        order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()), count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()), stacks_(std::make_unique_for_overwrite<std::uint32_t[]>(count_ * StreamStack::words(stack_entries_))), groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
+      : base_(tree.base()), root_(tree.root()), pad_{tree.max_coordinate(), Padded && row.tests->depth_between_corners},
+        leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
+        order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()),
+        count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()),
+        stacks_(std::make_unique_for_overwrite<std::uint32_t[]>(count_ * StreamStack::words(stack_entries_))),
+        groups_(std::make_unique_for_overwrite<Group[]>(count_)) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report>
   void run(const Report& report) {
     Group* turn[kGroupsInTurn];
     unsigned groups = 0;
-    for (unsigned i = 0; i < count_ && fill(groups_[i], StreamStack(stacks_.get() + i * StreamStack::words(stack_entries_), stack_entries_)); ++i) turn[groups++] = &groups_[i];
+    for (unsigned i = 0;
+         i < count_ &&
+         fill(groups_[i], StreamStack(stacks_.get() + i * StreamStack::words(stack_entries_), stack_entries_));
+         ++i)
+      turn[groups++] = &groups_[i];
     while (groups != 0) {
       for (unsigned i = 0; i < groups;) {
         Group& group = *turn[i];
@@ -53,15 +64,14 @@ class Stream {
   }
 
   /// How many rays of a group visited a node or leaf together, on average.
-  [[nodiscard]] float rays_a_turn() const
-    requires kCountsTurns
-  {
+  [[nodiscard]] float rays_a_turn() const requires kCountsTurns {
     return float(rays_in_turns_) / float(std::max(turns_, std::uint64_t{1}));
   }
 
  private:
   static constexpr unsigned kRays = BoxRays::kMost;
-  static constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead) + 63 + 32) / 64);  ///< of a node, or of a leaf's first block, wherever they begin
+  /// of a node, or of a leaf's first block, wherever they begin
+  static constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead) + 63 + 32) / 64);
   using Test = SoaNodeTest<N, Padded>;
   using Box = BoxRay<N, Padded>;
   static constexpr int W = Test::W, kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
@@ -69,7 +79,8 @@ class Stream {
 
   /// BoxRay's g is not its f.
   static constexpr bool kTwoOffsets = Padded || !kHasFma;
-  /// What nodes need of a ray, in one cache line: BoxRay's r, the distance from which boxes count, f and g; where f serves as g there is room for the ray.
+  /// What nodes need of a ray, in one cache line: BoxRay's r, the distance from which boxes count, f and g; where f
+  /// serves as g there is room for the ray.
   struct alignas(64) Constants {
     float number[12];
   };
@@ -139,10 +150,13 @@ class Stream {
       g.index[i] = list[i], ray(g, unsigned(i)) = ray_at(i);
       g.best[i] = NearestHit{lanes_.t[i]};
       if constexpr (kKeepsData) {
-        if (lanes_.valid >> i & 1u) new (static_cast<void*>(g.data + std::size_t(i) * sizeof(RayData))) std::remove_const_t<RayData>(leaves_.prepare(ray_at(i)));
+        if (lanes_.valid >> i & 1u)
+          new (static_cast<void*>(g.data + std::size_t(i) * sizeof(RayData)))
+              std::remove_const_t<RayData>(leaves_.prepare(ray_at(i)));
       }
     }
-    for (int k = 0; k < count; k += kNative) (vf<kNative>::load(lanes_.t + k) * vf<kNative>(pad_.beyond())).store(g.t + k);
+    for (int k = 0; k < count; k += kNative)
+      (vf<kNative>::load(lanes_.t + k) * vf<kNative>(pad_.beyond())).store(g.t + k);
     g.count = unsigned(count), g.octant = octant, g.active = lanes_.valid;
     g.stack = stack, g.top = 0;
     g.target = root_, g.visitors = g.active;
@@ -184,7 +198,8 @@ class Stream {
     return next(g);
   }
 
-  /// Finds what the group visits when its turn comes again, and asks for its lines: no others, since what waits longer would be gone by then.
+  /// Finds what the group visits when its turn comes again, and asks for its lines: no others, since what waits longer
+  /// would be gone by then.
   ARBORETUM_INLINE bool next(Group& g) {
     for (unsigned top = g.top; top-- != 0;) {
       g.depths.pop(top);
@@ -210,8 +225,10 @@ class Stream {
     constexpr unsigned kSide = Box::kSide;
     [[maybe_unused]] constexpr unsigned kChildren = (1u << N) - 1u;
     const std::byte* const node = base_ + bvh::offset_of(target);
-    const unsigned x = (g.octant & 1u) * kSide, y = (2 + (g.octant >> 1 & 1u)) * kSide, z = (4 + (g.octant >> 2)) * kSide;
-    const F planes[6] = {F::load(node + x), F::load(node + (x ^ kSide)), F::load(node + y), F::load(node + (y ^ kSide)), F::load(node + z), F::load(node + (z ^ kSide))};
+    const unsigned x = (g.octant & 1u) * kSide, y = (2 + (g.octant >> 1 & 1u)) * kSide,
+                   z = (4 + (g.octant >> 2)) * kSide;
+    const F planes[6] = {F::load(node + x),           F::load(node + (x ^ kSide)), F::load(node + y),
+                         F::load(node + (y ^ kSide)), F::load(node + z),           F::load(node + (z ^ kSide))};
     MetChildren<N, AnyHit> met;
     for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
       const unsigned i = unsigned(__builtin_ctzll(rest));
@@ -231,7 +248,8 @@ class Stream {
     g.depths.push(first, g.top);
   }
 
-  /// A function of its own: in the loop it would share registers with it, and GCC then keeps the mask of rays in memory (docs/performance.md).
+  /// A function of its own: in the loop it would share registers with it, and GCC then keeps the mask of rays in memory
+  /// (docs/performance.md).
   [[gnu::noinline]] void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
     const std::byte* const blocks = base_ + bvh::offset_of(target);
     const unsigned count = bvh::block_count(target);
@@ -242,8 +260,10 @@ class Stream {
         g.t[i] = g.best[i].t * beyond;
       }
     };
-    test_leaf<AnyHit>(leaves_, form_, counting_, blocks, count, rays, [&](int i) -> const Ray& { return ray(g, unsigned(i)); }, [&](int i) -> decltype(auto) { return data(g, unsigned(i)); },
-                      [&](int i) -> NearestHit& { return g.best[i]; }, hit);
+    test_leaf<AnyHit>(
+        leaves_, form_, counting_, blocks, count, rays, [&](int i) -> const Ray& { return ray(g, unsigned(i)); },
+        [&](int i) -> decltype(auto) { return data(g, unsigned(i)); }, [&](int i) -> NearestHit& { return g.best[i]; },
+        hit);
   }
 
   const std::byte* const base_;
@@ -280,18 +300,25 @@ struct StreamFunctions {
  private:
   template <class Leaves, bool Padded, class Counting>
   static RowFunctions functions() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-              trace<Leaves, Padded, false, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
-            },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-              trace<Leaves, Padded, true, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { occluded[i] = best.primitive != NearestHit::kNone; });
-            }};
+    return {
+        [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+          trace<Leaves, Padded, false, Counting>(
+              a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+        },
+        [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+          trace<Leaves, Padded, true, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) {
+            occluded[i] = best.primitive != NearestHit::kNone;
+          });
+        }};
   }
   template <class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
-  static ARBORETUM_INLINE void trace(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
+  static ARBORETUM_INLINE void trace(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters,
+                                     const Report& report) {
     constexpr std::size_t kAtOnce = std::size_t{1} << 31;  // a group numbers its rays in 32 bits
     for (std::size_t begin = 0; begin < rays.size(); begin += kAtOnce) {
-      Streams<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row, rays.part(begin, std::min(kAtOnce, rays.size() - begin)), Counting(counters));
+      Streams<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row,
+                                                          rays.part(begin, std::min(kAtOnce, rays.size() - begin)),
+                                                          Counting(counters));
       stream.run([&](std::size_t i, const NearestHit& best) { report(begin + i, best); });
     }
     if constexpr (Counting::kCounting) counters->rays += rays.size();

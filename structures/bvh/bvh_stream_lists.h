@@ -1,15 +1,16 @@
-// Streams that regroup: rays of a batch go down the tree together in lists, after Barringer and Akenine-Moeller, "Dynamic Ray Stream
-// Traversal", ACM TOG 33(4), 2014. bvh_stream.h shares nodes by masks instead, and is faster.
+// Streams that regroup: rays of a batch go down the tree together in lists, after Barringer and Akenine-Moeller,
+// "Dynamic Ray Stream Traversal", ACM TOG 33(4), 2014. bvh_stream.h shares nodes by masks instead, and is faster.
 //
-// A group is parted by the octant of its rays' directions. Each part begins as one list of rays at the root; a node tests every ray
-// of its list against all its children, with the planes in registers, and sorts the rays into a list for each child; lists wait on a
-// stack, children near to far, so that a node's cache lines and its mispredicted branches are paid once for all its rays. Rays that
-// took different ways meet again in the next child that they share. A list of few rays is finished one ray after the other.
+// A group is parted by the octant of its rays' directions. Each part begins as one list of rays at the root; a node
+// tests every ray of its list against all its children, with the planes in registers, and sorts the rays into a list
+// for each child; lists wait on a stack, children near to far, so that a node's cache lines and its mispredicted
+// branches are paid once for all its rays. Rays that took different ways meet again in the next child that they share.
+// A list of few rays is finished one ray after the other.
 //
-// Where we differ: nodes are wide, and the order of children is one for the whole list (of their centres along the mean direction of
-// the part) where theirs is each ray's own, so that a child is visited once. A ray may then visit a node that it would not have alone: it
-// finds the same hit, since a box is dropped only where it begins beyond the nearest hit. Rays that are
-// done (any hit) or have found something nearer than the box leave a list when its turn comes.
+// Where we differ: nodes are wide, and the order of children is one for the whole list (of their centres along the mean
+// direction of the part) where theirs is each ray's own, so that a child is visited once. A ray may then visit a node
+// that it would not have alone: it finds the same hit, since a box is dropped only where it begins beyond the nearest
+// hit. Rays that are done (any hit) or have found something nearer than the box leave a list when its turn comes.
 #pragma once
 
 #include "structures/bvh/bvh_stream.h"
@@ -28,15 +29,18 @@ class StreamLists {
  public:
   /// There is at least one ray.
   StreamLists(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
-      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()), form_(*row.tests->form),
-        counting_(counting), rays_(rays), group_(unsigned(std::min(kStreamRays, rays.size()))), lists_(tree.stack_entries()),
-        entries_(4 * group_), children_(std::size_t(N + 1) * group_), stack_(tree.stack_entries()), room_(group_ * (sizeof(State) + sizeof(LeafState))),
-        states_(reinterpret_cast<State*>(room_.data())), leaf_states_(reinterpret_cast<LeafState*>(room_.data() + group_ * sizeof(State))) {}
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()),
+        form_(*row.tests->form), counting_(counting), rays_(rays), group_(unsigned(std::min(kStreamRays, rays.size()))),
+        lists_(tree.stack_entries()), entries_(4 * group_), children_(std::size_t(N + 1) * group_),
+        stack_(tree.stack_entries()), room_(group_ * (sizeof(State) + sizeof(LeafState))),
+        states_(reinterpret_cast<State*>(room_.data())),
+        leaf_states_(reinterpret_cast<LeafState*>(room_.data() + group_ * sizeof(State))) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
   template <class Report>
   void run(Report&& report) {
-    for (std::size_t begin = 0; begin < rays_.size(); begin += group_) group(begin, std::min(rays_.size(), begin + group_), report);
+    for (std::size_t begin = 0; begin < rays_.size(); begin += group_)
+      group(begin, std::min(rays_.size(), begin + group_), report);
   }
 
  private:
@@ -48,8 +52,8 @@ class StreamLists {
   /// What nodes need of a ray: a cache line.
   struct alignas(64) State {
     Box box;
-    float first;    ///< distance from which boxes count
-    float nearest;  ///< beyond which they do not; -inf when the search is over
+    float first;          ///< distance from which boxes count
+    float nearest;        ///< beyond which they do not; -inf when the search is over
     std::uint32_t place;  ///< in the group
   };
   static_assert(sizeof(State) == 64);
@@ -58,7 +62,8 @@ class StreamLists {
     NearestHit best;
     float tnear;
     typename Leaves::RayData data;
-    ARBORETUM_INLINE LeafState(const Ray& ray, const Leaves& leaves) : best{ray.tfar}, tnear(ray.tnear), data(leaves.prepare(ray)) {}
+    ARBORETUM_INLINE LeafState(const Ray& ray, const Leaves& leaves)
+        : best{ray.tfar}, tnear(ray.tnear), data(leaves.prepare(ray)) {}
   };
   /// Rays that are to visit a node or leaf: entries_[begin ...], the key of each the distance at which it enters.
   struct List {
@@ -76,14 +81,16 @@ class StreamLists {
         report(i, NearestHit{ray.tfar});
         continue;
       }
-      State& s = *new (&states_[rays]) State{Box(ray, max_coordinate_), first_distance(ray), ray.tfar, std::uint32_t(i - begin)};
+      State& s = *new (&states_[rays])
+                     State{Box(ray, max_coordinate_), first_distance(ray), ray.tfar, std::uint32_t(i - begin)};
       new (&leaf_states_[rays++]) LeafState(ray, leaves_);
       ++of_octant[s.box.octant];
       direction[s.box.octant] = direction[s.box.octant] + ray.direction;
     }
     unsigned at[8] = {};
     for (int o = 1; o < 8; ++o) at[o] = at[o - 1] + of_octant[o - 1];
-    for (unsigned i = 0; i < rays; ++i) entries_[at[states_[i].box.octant]++] = stack_entry(__builtin_bit_cast(std::uint32_t, states_[i].first), i);
+    for (unsigned i = 0; i < rays; ++i)
+      entries_[at[states_[i].box.octant]++] = stack_entry(__builtin_bit_cast(std::uint32_t, states_[i].first), i);
     for (int o = 0; o < 8; ++o) {
       if (of_octant[o]) octant({root_, at[o] - of_octant[o], of_octant[o]}, direction[o], rays);
     }
@@ -108,7 +115,8 @@ class StreamLists {
       if (list.target != root.target) depths.pop(top - bottom);
       drop(list);
       if (list.count <= kFewRays) {
-        for (unsigned i = 0; i < list.count; ++i) alone(ray_of(entries_[list.begin + i]), list.target, depths.current());
+        for (unsigned i = 0; i < list.count; ++i)
+          alone(ray_of(entries_[list.begin + i]), list.target, depths.current());
       } else if (bvh::is_leaf(list.target)) {
         leaf(list);
       } else {
@@ -134,7 +142,8 @@ class StreamLists {
     list.count = unsigned(out - first);
   }
 
-  void node(const List& list, const unsigned (&side)[6], Vec3f direction, unsigned free, List*& top, typename Counting::Depth depth) {
+  void node(const List& list, const unsigned (&side)[6], Vec3f direction, unsigned free, List*& top,
+            typename Counting::Depth depth) {
     const std::byte* const node = base_ + bvh::offset_of(list.target);
     const F planes[6] = {F::load(node + side[0]), F::load(node + side[1]), F::load(node + side[2]),
                          F::load(node + side[3]), F::load(node + side[4]), F::load(node + side[5])};
@@ -148,7 +157,8 @@ class StreamLists {
       BoxLanes<N, Padded> box(s.box);
       box.near_x = 0, box.near_y = 2 * Box::kSide, box.near_z = 4 * Box::kSide;
       F entry;
-      unsigned hit = box.test_planes([&](unsigned offset) { return planes[offset / Box::kSide]; }, F(s.first), F(s.nearest), entry);
+      unsigned hit = box.test_planes([&](unsigned offset) { return planes[offset / Box::kSide]; }, F(s.first),
+                                     F(s.nearest), entry);
       if constexpr (Counting::kCounting) {
         counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
         counting_.at_depth(depth, Test::kSlots, Test::boxes(node));
@@ -168,9 +178,12 @@ class StreamLists {
   }
 
   /// The children's lists onto the stack, the nearest on top.
-  ARBORETUM_INLINE void push(const std::byte* node, const F (&planes)[6], StackEntry* const (&tail)[N + 1], Vec3f direction, unsigned free, List*& top) {
+  ARBORETUM_INLINE void push(const std::byte* node, const F (&planes)[6], StackEntry* const (&tail)[N + 1],
+                             Vec3f direction, unsigned free, List*& top) {
     alignas(64) float along[W];
-    ((planes[0] + planes[1]) * F(direction.x) + (planes[2] + planes[3]) * F(direction.y) + (planes[4] + planes[5]) * F(direction.z)).store(along);
+    ((planes[0] + planes[1]) * F(direction.x) + (planes[2] + planes[3]) * F(direction.y) +
+     (planes[4] + planes[5]) * F(direction.z))
+        .store(along);
     const bvh::NodeReference* const child = Test::children(node);
     unsigned order[N], children = 0;
     std::size_t total = 0;
@@ -222,11 +235,14 @@ class StreamLists {
   void alone(unsigned ray, bvh::NodeReference target, typename Counting::Depth depth) {
     State& s = states_[ray];
     Test nodes(s.box, s.first, s.nearest);
-    walk_bvh<AnyHit>(base_, target, nodes, stack_.data(), leaf_states_[ray].best.t, counting_, [&](bvh::NodeReference reference) {
-      if (!leaf(ray, base_ + bvh::offset_of(reference), bvh::block_count(reference))) return false;
-      if constexpr (!AnyHit) nodes.shorten(s.nearest);
-      return AnyHit;
-    }, depth);
+    walk_bvh<AnyHit>(
+        base_, target, nodes, stack_.data(), leaf_states_[ray].best.t, counting_,
+        [&](bvh::NodeReference reference) {
+          if (!leaf(ray, base_ + bvh::offset_of(reference), bvh::block_count(reference))) return false;
+          if constexpr (!AnyHit) nodes.shorten(s.nearest);
+          return AnyHit;
+        },
+        depth);
   }
 
   const std::byte* const base_;
@@ -247,9 +263,10 @@ class StreamLists {
 };
 
 /// What they have compiled in: one leaf, since each costs a unit two seconds to compile.
-using StreamListLeaves = std::conditional_t<
-    kRegisterWidth == 1, TypeList<>,
-    std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>>, TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>>>>;
+using StreamListLeaves =
+    std::conditional_t<kRegisterWidth == 1, TypeList<>,
+                       std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>>,
+                                          TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>>>>;
 
 template <int N>
 void add_stream_list_rows(KernelRows& rows) {

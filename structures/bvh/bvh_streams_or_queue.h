@@ -1,7 +1,9 @@
-// How `auto` traces rays that share little where registers are narrow (SSE): as streams as long as their rays share nodes and leaves, else as rays in flight.
+// How `auto` traces rays that share little where registers are narrow (SSE): as streams as long as their rays share
+// nodes and leaves, else as rays in flight.
 //
-// A stream's turns cost more than a ray's own steps do, and are worth it for what they share. How many rays take a turn together tells: where it is three,
-// rays in flight are 1.3 times as fast, where it is five, as fast (docs/performance.md). With wider registers streams are faster even then.
+// A stream's turns cost more than a ray's own steps do, and are worth it for what they share. How many rays take a turn
+// together tells: where it is three, rays in flight are 1.3 times as fast, where it is five, as fast
+// (docs/performance.md). With wider registers streams are faster even then.
 #pragma once
 
 #include "structures/bvh/bvh_queued.h"
@@ -30,19 +32,36 @@ class BvhStreamsOrQueue {
  private:
   template <class Leaves, bool Padded, class Counting, RowFunctions (*InFlight)()>
   static RowFunctions functions() {
-    return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
-              run(
-                  rays, [&](std::size_t begin, std::size_t count) { return stream<Leaves, Padded, false, Counting>(a, row, rays.part(begin, count), counters, [&](std::size_t i, const NearestHit& best) { hits[begin + i] = to_hit(best); }); },
-                  [&](std::size_t begin, std::size_t count) { InFlight().closest_hit(a, row, rays.part(begin, count), hits.subspan(begin, count), counters); });
-            },
-            [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
-              run(
-                  rays, [&](std::size_t begin, std::size_t count) { return stream<Leaves, Padded, true, Counting>(a, row, rays.part(begin, count), counters, [&](std::size_t i, const NearestHit& best) { occluded[begin + i] = best.primitive != NearestHit::kNone; }); },
-                  [&](std::size_t begin, std::size_t count) { InFlight().any_hit(a, row, rays.part(begin, count), occluded.subspan(begin, count), counters); });
-            }};
+    return {
+        [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
+          run(
+              rays,
+              [&](std::size_t begin, std::size_t count) {
+                return stream<Leaves, Padded, false, Counting>(
+                    a, row, rays.part(begin, count), counters,
+                    [&](std::size_t i, const NearestHit& best) { hits[begin + i] = to_hit(best); });
+              },
+              [&](std::size_t begin, std::size_t count) {
+                InFlight().closest_hit(a, row, rays.part(begin, count), hits.subspan(begin, count), counters);
+              });
+        },
+        [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
+          run(
+              rays,
+              [&](std::size_t begin, std::size_t count) {
+                return stream<Leaves, Padded, true, Counting>(
+                    a, row, rays.part(begin, count), counters, [&](std::size_t i, const NearestHit& best) {
+                      occluded[begin + i] = best.primitive != NearestHit::kNone;
+                    });
+              },
+              [&](std::size_t begin, std::size_t count) {
+                InFlight().any_hit(a, row, rays.part(begin, count), occluded.subspan(begin, count), counters);
+              });
+        }};
   }
 
-  /// Calls streams(begin, count), which returns how many rays took a turn together, and queue(begin, count), until all rays are done.
+  /// Calls streams(begin, count), which returns how many rays took a turn together, and queue(begin, count), until all
+  /// rays are done.
   template <class Streams, class InFlight>
   static void run(const RayBatch& rays, const Streams& streams, const InFlight& queue) {
     for (std::size_t begin = 0, stream_next = kProbe; begin < rays.size();) {
@@ -58,8 +77,10 @@ class BvhStreamsOrQueue {
   }
 
   template <class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
-  static ARBORETUM_INLINE float stream(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters, const Report& report) {
-    Stream<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row, rays, Counting(counters));
+  static ARBORETUM_INLINE float stream(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters,
+                                       const Report& report) {
+    Stream<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row, rays,
+                                                       Counting(counters));
     stream.run(report);
     if constexpr (Counting::kCounting) counters->rays += rays.size();
     return stream.rays_a_turn();

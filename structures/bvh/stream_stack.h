@@ -1,4 +1,5 @@
-// What waits for the groups of a stream (bvh_stream.h): a group's stack, and how the children of a node that its rays meet come onto it.
+// What waits for the groups of a stream (bvh_stream.h): a group's stack, and how the children of a node that its rays
+// meet come onto it.
 #pragma once
 
 #include "simd/lane_order.h"
@@ -8,7 +9,8 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// Of up to 64 rays: nodes, the rays that are to visit each, and the least distance at which one of them enters it. Each is an array of its own, so that children can be stored from registers.
+/// Of up to 64 rays: nodes, the rays that are to visit each, and the least distance at which one of them enters it.
+/// Each is an array of its own, so that children can be stored from registers.
 struct StreamStack {
   std::uint32_t *low = nullptr, *high = nullptr;  ///< rays 0 to 31, and 32 to 63
   bvh::NodeReference* target = nullptr;
@@ -17,18 +19,23 @@ struct StreamStack {
   StreamStack() = default;
   /// In `words(entries)` words of memory.
   StreamStack(std::uint32_t* memory, std::size_t entries)
-      : low(memory), high(low + stride(entries)), target(high + stride(entries)), t(reinterpret_cast<float*>(target + stride(entries))) {}
+      : low(memory), high(low + stride(entries)), target(high + stride(entries)),
+        t(reinterpret_cast<float*>(target + stride(entries))) {}
   [[nodiscard]] static std::size_t words(std::size_t entries) { return 4 * stride(entries); }
 
-  [[nodiscard]] ARBORETUM_INLINE std::uint64_t rays(std::size_t i) const { return low[i] | std::uint64_t(high[i]) << 32; }
+  [[nodiscard]] ARBORETUM_INLINE std::uint64_t rays(std::size_t i) const {
+    return low[i] | std::uint64_t(high[i]) << 32;
+  }
 
  private:
-  /// A register may be stored behind the last entry. Whole cache lines, an odd number: not all arrays begin in the same sets.
+  /// A register may be stored behind the last entry. Whole cache lines, an odd number: not all arrays begin in the same
+  /// sets.
   static std::size_t stride(std::size_t entries) { return ((entries + 16 + 15) / 16 | 1) * 16; }
 };
 
-/// Which rays of a group meet which of a node's N children, and the least distances at which they enter them. Rays are bits, children lanes: bytes by ray, read again as a register, would be waited for, since no single store
-/// wrote what is read.
+/// Which rays of a group meet which of a node's N children, and the least distances at which they enter them. Rays are
+/// bits, children lanes: bytes by ray, read again as a register, would be waited for, since no single store wrote what
+/// is read.
 template <int N, bool AnyHit>
 class MetChildrenInLanes {
   static constexpr int W = N < 4 ? 4 : N;
@@ -42,16 +49,22 @@ class MetChildrenInLanes {
     if constexpr (!AnyHit) least_ = select(meets, min_x86(entry, least_), least_);
   }
 
-  /// The children that some ray met go onto the stack, whose first `begin` entries stay: the nearest on top, for any hit as they stand in the node. Returns the new number of entries.
-  ARBORETUM_INLINE unsigned push(const StreamStack& stack, unsigned begin, const bvh::NodeReference* child, std::uint64_t /*rays*/) const {
-    const unsigned met = ~((low_ | high_) == vi<W>(0)).bits() & ((1u << N) - 1u), count = unsigned(__builtin_popcount(met));
+  /// The children that some ray met go onto the stack, whose first `begin` entries stay: the nearest on top, for any
+  /// hit as they stand in the node. Returns the new number of entries.
+  ARBORETUM_INLINE unsigned push(const StreamStack& stack, unsigned begin, const bvh::NodeReference* child,
+                                 std::uint64_t /*rays*/) const {
+    const unsigned met = ~((low_ | high_) == vi<W>(0)).bits() & ((1u << N) - 1u),
+                   count = unsigned(__builtin_popcount(met));
     const vi<W> children = vi<W>::load(child);
     if constexpr (AnyHit) {
-      compress(met, low_).store(stack.low + begin), compress(met, high_).store(stack.high + begin), compress(met, children).store(stack.target + begin);
+      compress(met, low_).store(stack.low + begin), compress(met, high_).store(stack.high + begin),
+          compress(met, children).store(stack.target + begin);
     } else {
       // Distances are ordered by their bits, the last four of which give way to the lane's number.
-      const vi<W> lane = sort_first_down(compress(met, (least_.as_int() & vi<W>(~15)) | vi<W>::iota()), count) & vi<W>(15);
-      permute(low_, lane).store(stack.low + begin), permute(high_, lane).store(stack.high + begin), permute(children, lane).store(stack.target + begin);
+      const vi<W> lane =
+          sort_first_down(compress(met, (least_.as_int() & vi<W>(~15)) | vi<W>::iota()), count) & vi<W>(15);
+      permute(low_, lane).store(stack.low + begin), permute(high_, lane).store(stack.high + begin),
+          permute(children, lane).store(stack.target + begin);
       permute(least_.as_int(), lane).store(stack.t + begin);
     }
     return begin + count;
@@ -70,7 +83,8 @@ class MetChildrenInLanes {
   vf<W> least_;
 };
 
-/// The same where a register is narrower than a node, or its lanes cannot change places: a bit for each child in a byte by ray.
+/// The same where a register is narrower than a node, or its lanes cannot change places: a bit for each child in a byte
+/// by ray.
 template <int N, bool AnyHit>
 class MetChildrenInBytes {
   static constexpr int W = N < 4 ? 4 : N, kBytes = (W + 7) / 8;
@@ -85,12 +99,14 @@ class MetChildrenInBytes {
     if constexpr (!AnyHit) least_ = select(meets, min_x86(entry, least_), least_);
   }
 
-  ARBORETUM_INLINE unsigned push(const StreamStack& stack, unsigned begin, const bvh::NodeReference* child, std::uint64_t rays) const {
+  ARBORETUM_INLINE unsigned push(const StreamStack& stack, unsigned begin, const bvh::NodeReference* child,
+                                 std::uint64_t rays) const {
     const SixtyFourBytes bytes[2] = {SixtyFourBytes(of_ray_[0]), SixtyFourBytes(of_ray_[kBytes - 1])};
     unsigned top = begin;
     const auto put = [&](unsigned i, float t) {
       const std::uint64_t met = bytes[i >> 3].with_bit(int(i & 7u)) & rays;
-      stack.low[top] = std::uint32_t(met), stack.high[top] = std::uint32_t(met >> 32), stack.target[top] = child[i], stack.t[top] = t;
+      stack.low[top] = std::uint32_t(met), stack.high[top] = std::uint32_t(met >> 32), stack.target[top] = child[i],
+      stack.t[top] = t;
       ++top;
     };
     if constexpr (AnyHit) {
@@ -106,7 +122,8 @@ class MetChildrenInBytes {
         for (; at != order && at[-1] < e; --at) *at = at[-1];
         *at = e;
       }
-      for (const std::uint64_t* e = order; e != end; ++e) put(unsigned(*e), __builtin_bit_cast(float, std::uint32_t(*e >> 32)));
+      for (const std::uint64_t* e = order; e != end; ++e)
+        put(unsigned(*e), __builtin_bit_cast(float, std::uint32_t(*e >> 32)));
     }
     return top;
   }
@@ -118,7 +135,8 @@ class MetChildrenInBytes {
 };
 
 template <int N, bool AnyHit>
-using MetChildren = std::conditional_t<kOrdersLanes<(N < 4 ? 4 : N)>, MetChildrenInLanes<N, AnyHit>, MetChildrenInBytes<N, AnyHit>>;
+using MetChildren =
+    std::conditional_t<kOrdersLanes<(N < 4 ? 4 : N)>, MetChildrenInLanes<N, AnyHit>, MetChildrenInBytes<N, AnyHit>>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

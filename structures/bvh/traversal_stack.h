@@ -27,8 +27,8 @@ inline constexpr int kPrefetchLines = 5;
 /// Puts the children that `hit` names, two or more, on the stack, far to near, and takes the nearest off again as the
 /// result. Bit i of `hit` is the child with reference child[i * Stride], entered at the distance with the bits key[i].
 template <int Stride = 1>
-ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const bvh::NodeReference* child, const std::uint32_t* key,
-                                                  unsigned hit, StackEntry*& top) {
+ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const bvh::NodeReference* child,
+                                                  const std::uint32_t* key, unsigned hit, StackEntry*& top) {
   const auto next = [&] {
     const int i = __builtin_ctz(hit);
     hit &= hit - 1;
@@ -66,7 +66,8 @@ ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const b
 
 /// The same without an order: the last child is taken, the others wait.
 template <int Stride = 1>
-ARBORETUM_INLINE bvh::NodeReference push_unordered(const std::byte* base, const bvh::NodeReference* child, unsigned hit, StackEntry*& top) {
+ARBORETUM_INLINE bvh::NodeReference push_unordered(const std::byte* base, const bvh::NodeReference* child, unsigned hit,
+                                                   StackEntry*& top) {
   for (; hit & (hit - 1); hit &= hit - 1) {
     const bvh::NodeReference reference = child[__builtin_ctz(hit) * Stride];
     const auto* target = reinterpret_cast<const char*>(base + bvh::offset_of(reference));

@@ -76,7 +76,8 @@ class Emitter {
   }
 
   void leaf(const WideNode& from, std::size_t offset) const {
-    boxes_.prefetch([&](std::size_t i) { return tree_.primitives[i]; }, from.first, from.first + from.count, tree_.primitives.size() - 1);
+    boxes_.prefetch([&](std::size_t i) { return tree_.primitives[i]; }, from.first, from.first + from.count,
+                    tree_.primitives.size() - 1);
     LeafPrimitives room;
     form_.fill(base_ + offset, mesh_, tree_.leaf_primitives(from, room));
   }
@@ -111,10 +112,12 @@ template <class Format>
 void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
   if (p.max_leaf_blocks < 1 || p.max_leaf_blocks > kMaxLeafBlocks) {
-    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. " + std::to_string(kMaxLeafBlocks));
+    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. " +
+                    std::to_string(kMaxLeafBlocks));
   }
   if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
-  if (p.collapse != "optimal" && p.collapse != "greedy") throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
+  if (p.collapse != "optimal" && p.collapse != "greedy")
+    throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
   if (mesh.size() >= (1u << 30)) throw UserError(std::string(kName) + " takes at most 2^30 - 1 triangles");
 
   const LeafForm* form = find_leaf_form(settings.leaf);
@@ -124,8 +127,9 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   build_binary_tree(mesh, settings, form->width, tree, report);
 
   double start = wall_seconds();
-  const WideTree wide = collapse(std::move(tree), {unsigned(kBranching), form->width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
-                                                   p.collapse == "optimal", sizeof(typename Format::Node), form->bytes, Format::kGranule});
+  const WideTree wide = collapse(
+      std::move(tree), {unsigned(kBranching), form->width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
+                        p.collapse == "optimal", sizeof(typename Format::Node), form->bytes, Format::kGranule});
   report.phases.emplace_back("collapse", wall_seconds() - start);
 
   start = wall_seconds();

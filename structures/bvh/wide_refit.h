@@ -66,8 +66,8 @@ class Refitter {
 template <class Format>
 void WideBvh<Format>::refit(const TriangleMesh& mesh) {
   if (mesh.size() != triangles_) {
-    throw UserError(std::string(kName) + " was built from " + std::to_string(triangles_) + " triangles and cannot be refitted to " +
-                    std::to_string(mesh.size()) + "; build it anew");
+    throw UserError(std::string(kName) + " was built from " + std::to_string(triangles_) +
+                    " triangles and cannot be refitted to " + std::to_string(mesh.size()) + "; build it anew");
   }
   require_finite(mesh);
   set_scene(mesh, Refitter<Format>(mesh, *find_leaf_form(leaf_), arena_.data()).subtree(root_, 0));

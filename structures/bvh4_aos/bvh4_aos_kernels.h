@@ -1,8 +1,10 @@
-// One ray against the four boxes of a bvh4_aos node: 16 lanes as 4 x 4, one register with AVX-512, two with AVX2, four with SSE.
+// One ray against the four boxes of a bvh4_aos node: 16 lanes as 4 x 4, one register with AVX-512, two with AVX2, four
+// with SSE.
 //
-// Lanes x y z of a group hold one box's planes, lane w the ray's own interval: with r.w = 1 and the planes' w = 0 the same operation that
-// gives the distances leaves tnear (near) or tfar (far) there, so that the reduction over a group yields the clipped interval. Near planes
-// are chosen by the direction's signs, as in box_test.h, whose constants and promises these are.
+// Lanes x y z of a group hold one box's planes, lane w the ray's own interval: with r.w = 1 and the planes' w = 0 the
+// same operation that gives the distances leaves tnear (near) or tfar (far) there, so that the reduction over a group
+// yields the clipped interval. Near planes are chosen by the direction's signs, as in box_test.h, whose constants and
+// promises these are.
 #pragma once
 
 #include "simd/swizzle.h"
@@ -27,10 +29,13 @@ struct AosNodeTest {
   Lanes r, f, g;
   vm<16> upper_is_near, upper_is_far;  ///< in lane w both: there the maximum's is a number, the minimum's a reference
 
-  ARBORETUM_INLINE AosNodeTest(const Ray& ray, float max_coordinate) : AosNodeTest(BoxRay<4, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
+  ARBORETUM_INLINE AosNodeTest(const Ray& ray, float max_coordinate)
+      : AosNodeTest(BoxRay<4, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
   ARBORETUM_INLINE AosNodeTest(const BoxRay<4, Padded>& b, float first, float last)
-      : r(repeat_four<16>(four(b.r.x, b.r.y, b.r.z, 1.0f))), f(repeat_four<16>(four(b.f.x, b.f.y, b.f.z, -first))), g(repeat_four<16>(four(b.g.x, b.g.y, b.g.z, -last))),
-        upper_is_near(vm<16>::from_bits((b.octant | 8u) * 0x1111u)), upper_is_far(vm<16>::from_bits((~b.octant & 15u) * 0x1111u)) {}
+      : r(repeat_four<16>(four(b.r.x, b.r.y, b.r.z, 1.0f))), f(repeat_four<16>(four(b.f.x, b.f.y, b.f.z, -first))),
+        g(repeat_four<16>(four(b.g.x, b.g.y, b.g.z, -last))),
+        upper_is_near(vm<16>::from_bits((b.octant | 8u) * 0x1111u)),
+        upper_is_far(vm<16>::from_bits((~b.octant & 15u) * 0x1111u)) {}
 
   ARBORETUM_INLINE unsigned test(const std::byte* node, vf<W>& entry) const {
     const Lanes lower = Lanes::load(node), upper = Lanes::load(node + 64);
@@ -45,7 +50,8 @@ struct AosNodeTest {
     const auto larger = []<int V>(vf<V> a, vf<V> b) { return max_x86(a, b); };
     const auto smaller = []<int V>(vf<V> a, vf<V> b) { return min_x86(a, b); };
     if constexpr (kInGroups) {
-      enter = larger(enter, permute_in_fours<2, 3, 0, 1>(enter)), leave = smaller(leave, permute_in_fours<2, 3, 0, 1>(leave));
+      enter = larger(enter, permute_in_fours<2, 3, 0, 1>(enter)),
+      leave = smaller(leave, permute_in_fours<2, 3, 0, 1>(leave));
       entry = larger(enter, permute_in_fours<1, 0, 3, 2>(enter));
       return (entry <= smaller(leave, permute_in_fours<1, 0, 3, 2>(leave))).bits() & 0x1111u;
     } else {
@@ -83,7 +89,9 @@ struct AosPacketNodes {
   static ARBORETUM_INLINE vf<4> planes(const std::byte* node, unsigned k) {
     return four(plane(node, k, 0), plane(node, k, 1), plane(node, k, 2), plane(node, k, 3));
   }
-  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) { return Single<true>::children(node)[4 * i]; }
+  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) {
+    return Single<true>::children(node)[4 * i];
+  }
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
 

@@ -1,11 +1,16 @@
-// Why a box holds its triangles at every time. Let K be the number of key frames, u = 2^-24, m the largest |coordinate| of a
-// triangle in any frame, and c(t) one coordinate of a corner, exactly linear between key frames.
-// - linear_bounds() fits a line L through the first and last frame's smallest coordinate and lowers it by the most that any key
-//   frame lies below it. So L(t_k) <= c(t_k) at every key time t_k = k / (K - 1), and as both are linear in between, L <= c on [0, 1].
-// - A corner is computed as a (1 - w) + b w, where w is off by u (K - 1) at most (the rounding of time * (K - 1)): that moves it by
-//   (K - 1) u |b - a| <= 2 (K - 1) u m; the roundings of 1 - w, of two products and a sum add less than 4.1 u m. The line is
-//   lowered by (2 K + 8) u m, which also covers the double arithmetic of the fit and a time that rounds across a key frame (c is continuous).
-// - Lines are rounded down to float at both ends. A node stores p = L(0) and q <= L(1) - p, rounded down: p + q t <= L(t) on [0, 1].
+// Why a box holds its triangles at every time. Let K be the number of key frames, u = 2^-24, m the largest |coordinate|
+// of a triangle in any frame, and c(t) one coordinate of a corner, exactly linear between key frames.
+// - linear_bounds() fits a line L through the first and last frame's smallest coordinate and lowers it by the most that
+// any key
+//   frame lies below it. So L(t_k) <= c(t_k) at every key time t_k = k / (K - 1), and as both are linear in between, L
+//   <= c on [0, 1].
+// - A corner is computed as a (1 - w) + b w, where w is off by u (K - 1) at most (the rounding of time * (K - 1)): that
+// moves it by
+//   (K - 1) u |b - a| <= 2 (K - 1) u m; the roundings of 1 - w, of two products and a sum add less than 4.1 u m. The
+//   line is lowered by (2 K + 8) u m, which also covers the double arithmetic of the fit and a time that rounds across
+//   a key frame (c is continuous).
+// - Lines are rounded down to float at both ends. A node stores p = L(0) and q <= L(1) - p, rounded down: p + q t <=
+// L(t) on [0, 1].
 // - Union: the minimum of the ends of two lines is a line that is below both.
 // Upper planes are the mirror image. What the kernel's evaluation of p + q t adds is part of the box test's pad
 // (bvh4_motion_kernels.h).
@@ -44,7 +49,8 @@ class Converter {
  public:
   Converter(const TriangleMesh& mesh, const bvh::Bvh4& from) : from_(from) {
     bounds_.resize(mesh.size());
-    tbb::parallel_for(std::size_t{0}, mesh.size(), [&](std::size_t i) { bounds_[i] = linear_bounds(mesh, std::uint32_t(i)); });
+    tbb::parallel_for(std::size_t{0}, mesh.size(),
+                      [&](std::size_t i) { bounds_[i] = linear_bounds(mesh, std::uint32_t(i)); });
   }
 
   [[nodiscard]] std::size_t bytes() const {
@@ -103,7 +109,8 @@ class Converter {
     return bvh::is_leaf(reference) ? round_up(bvh::block_count(reference) * sizeof(Block)) : sizeof(Node);
   }
   unsigned read(NodeReference reference, Bounds3f* boxes, NodeReference* children) const {
-    return bvh::SoaNodes<4>::read(*reinterpret_cast<const bvh::Node<4>*>(from_.base() + bvh::offset_of(reference)), boxes, children);
+    return bvh::SoaNodes<4>::read(*reinterpret_cast<const bvh::Node<4>*>(from_.base() + bvh::offset_of(reference)),
+                                  boxes, children);
   }
 
   const bvh::Bvh4& from_;
@@ -156,7 +163,8 @@ const StructureInfo& Bvh4Motion::static_info() {
 }
 
 void Bvh4Motion::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
-  if (settings.leaf != Block::kName) throw UserError("bvh4_motion has no leaf '" + settings.leaf + "'; it has triangle4i");
+  if (settings.leaf != Block::kName)
+    throw UserError("bvh4_motion has no leaf '" + settings.leaf + "'; it has triangle4i");
   mesh_ = &mesh;
   bvh::Bvh4 still;
   TriangleMesh half_time;
@@ -167,7 +175,8 @@ void Bvh4Motion::build(const TriangleMesh& mesh, const BuildSettings& settings, 
   const Converter converter(mesh, still);
   const std::size_t bytes = converter.bytes();
   if (bytes > std::numeric_limits<NodeReference>::max())
-    throw UserError("bvh4_motion would take " + std::to_string(bytes >> 20) + " MiB; its 32-bit references reach 4 GiB: use a smaller mesh");
+    throw UserError("bvh4_motion would take " + std::to_string(bytes >> 20) +
+                    " MiB; its 32-bit references reach 4 GiB: use a smaller mesh");
   arena_ = Arena();
   arena_ = Arena(bytes);
   bounds_ = {};

@@ -1,6 +1,6 @@
-// bvh4_motion: a four-wide BVH of a mesh that moves: one tree for all times, whose boxes move linearly from time 0 to time 1.
-// After BVH4MB of Embree (Woop, Benthin, Wald, SIGGRAPH 2013 talk); there a pair of key frames has a tree of its own, here one
-// tree holds any number of them.
+// bvh4_motion: a four-wide BVH of a mesh that moves: one tree for all times, whose boxes move linearly from time 0 to
+// time 1. After BVH4MB of Embree (Woop, Benthin, Wald, SIGGRAPH 2013 talk); there a pair of key frames has a tree of
+// its own, here one tree holds any number of them.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@
 
 namespace arboretum::bvh4_motion {
 
-/// Planes as in bvh::Node, at time 0; how far each moves until time 1; children as in structures/bvh/bvh.h. A slot without
-/// a child has lower = +inf, upper = -inf, and stands still. 224 bytes.
+/// Planes as in bvh::Node, at time 0; how far each moves until time 1; children as in structures/bvh/bvh.h. A slot
+/// without a child has lower = +inf, upper = -inf, and stands still. 224 bytes.
 struct alignas(32) Node {
   float planes[6][4];
   float motion[6][4];

@@ -1,7 +1,8 @@
 // One ray of a time through the moving four-wide BVH: planes and vertices are interpolated in registers.
 //
-// Padded boxes: a plane is p + q t with |p|, |p + q| <= M, so |q| <= 2 M; computing it is off by u |q t| + u M <= 3 u M (one rounding
-// less where it is fused). Times |r| that is less than what box_test.h leaves of its pad: it needs 4 u (M + |o|)|r| of 8 u (M + |o|)|r|.
+// Padded boxes: a plane is p + q t with |p|, |p + q| <= M, so |q| <= 2 M; computing it is off by u |q t| + u M <= 3 u M
+// (one rounding less where it is fused). Times |r| that is less than what box_test.h leaves of its pad: it needs 4 u (M
+// + |o|)|r| of 8 u (M + |o|)|r|.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
@@ -15,7 +16,8 @@ template <bool Padded>
 struct MovingNodeTest : SoaNodeTest<4, Padded> {
   vf<4> time;
 
-  ARBORETUM_INLINE MovingNodeTest(const Ray& ray, float max_coordinate, float at) : SoaNodeTest<4, Padded>(ray, max_coordinate), time(at) {}
+  ARBORETUM_INLINE MovingNodeTest(const Ray& ray, float max_coordinate, float at)
+      : SoaNodeTest<4, Padded>(ray, max_coordinate), time(at) {}
   ARBORETUM_INLINE unsigned test(const std::byte* node, vf<4>& entry) const {
     const auto planes = [&](unsigned offset) {
       return madd(vf<4>::load(node + offsetof(bvh4_motion::Node, motion) + offset), time, vf<4>::load(node + offset));
@@ -45,8 +47,9 @@ template <class Leaves, bool Padded, class Counting>
 class MotionKernel {
  public:
   MotionKernel(const Accel& accel, const KernelRow& row, Counting counting)
-      : accel_(static_cast<const bvh4_motion::Bvh4Motion&>(accel)), tests_(*find_leaf_tests(VertexBlock<4>::kName, row.intersector, kIsa)),
-        form_(*row.tests->form), counting_(counting), stack_(accel_.stack_entries()) {}
+      : accel_(static_cast<const bvh4_motion::Bvh4Motion&>(accel)),
+        tests_(*find_leaf_tests(VertexBlock<4>::kName, row.intersector, kIsa)), form_(*row.tests->form),
+        counting_(counting), stack_(accel_.stack_entries()) {}
 
   template <bool AnyHit>
   bool trace(const Ray& ray, float time, NearestHit& best) {
@@ -58,23 +61,25 @@ class MotionKernel {
     PreparedRay data;
     tests_.prepare(ray, data);
     const std::byte* const base = accel_.base();
-    const bool hit = walk_bvh<AnyHit>(base, accel_.root(), nodes, stack_.data(), best.t, counting_, [&](bvh::NodeReference reference) {
-      const std::byte* const blocks = base + bvh::offset_of(reference);
-      const unsigned count = bvh::block_count(reference);
-      counting_.leaf(form_, blocks, count);
-      const auto* block = reinterpret_cast<const IndexBlock<4>*>(blocks);
-      for (const auto* const end = block + count; block != end; ++block) {
-        const VertexBlock<4> now = posed(*block, from, to, at.weight);
-        const auto* bytes = reinterpret_cast<const std::byte*>(&now);
-        if constexpr (AnyHit) {
-          if (tests_.any_hit(data, bytes, 1, nullptr, ray.tnear, ray.tfar)) return true;
-        } else {
-          tests_.closest_hit(data, bytes, 1, nullptr, ray.tnear, best);
-        }
-      }
-      if constexpr (!AnyHit) nodes.shorten(best.t);
-      return false;
-    });
+    const bool hit = walk_bvh<AnyHit>(base, accel_.root(), nodes, stack_.data(), best.t, counting_,
+                                      [&](bvh::NodeReference reference) {
+                                        const std::byte* const blocks = base + bvh::offset_of(reference);
+                                        const unsigned count = bvh::block_count(reference);
+                                        counting_.leaf(form_, blocks, count);
+                                        const auto* block = reinterpret_cast<const IndexBlock<4>*>(blocks);
+                                        for (const auto* const end = block + count; block != end; ++block) {
+                                          const VertexBlock<4> now = posed(*block, from, to, at.weight);
+                                          const auto* bytes = reinterpret_cast<const std::byte*>(&now);
+                                          if constexpr (AnyHit) {
+                                            if (tests_.any_hit(data, bytes, 1, nullptr, ray.tnear, ray.tfar))
+                                              return true;
+                                          } else {
+                                            tests_.closest_hit(data, bytes, 1, nullptr, ray.tnear, best);
+                                          }
+                                        }
+                                        if constexpr (!AnyHit) nodes.shorten(best.t);
+                                        return false;
+                                      });
     if (!AnyHit && tests_.finish && best.primitive != NearestHit::kNone) tests_.finish(data, best);
     return hit;
   }

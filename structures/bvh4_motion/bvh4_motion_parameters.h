@@ -10,7 +10,8 @@
 
 namespace arboretum::bvh4_motion {
 
-[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<Bvh4Motion>, std::string_view builder) {
+[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<Bvh4Motion>,
+                                                                      std::string_view builder) {
   return builder_parameters(std::type_identity<bvh::Bvh4>{}, builder);
 }
 

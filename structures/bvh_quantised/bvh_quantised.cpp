@@ -30,8 +30,10 @@ struct Distance {
 
 Grid grid_over(float lower, float upper) noexcept {
   const Distance d(upper, lower);
-  if (d.high == 0.0) return {lower, kBias};  // flat: every q is 0, and a step of 1 makes no subnormal numbers on the way
-  int exponent = std::clamp(std::ilogb(d.high) - int(kPlaneBits - 1) + kBias, kLeast, kMost);  // d.high is at least 2^9 steps, or the step is the least
+  // Flat: every q is 0, and a step of 1 makes no subnormal numbers on the way
+  if (d.high == 0.0) return {lower, kBias};
+  // d.high is at least 2^9 steps, or the step is the least
+  int exponent = std::clamp(std::ilogb(d.high) - int(kPlaneBits - 1) + kBias, kLeast, kMost);
   while (steps(d, exponent) > kMostSteps || (steps(d, exponent) == kMostSteps && d.low > 0.0)) ++exponent;
   return {lower, std::uint8_t(exponent)};
 }
@@ -49,7 +51,9 @@ unsigned plane_above(const Grid& grid, float x) noexcept {
   return unsigned(whole == exact && d.low > 0.0 ? whole + 1.0 : whole);
 }
 
-float plane_of(const Grid& grid, unsigned q) noexcept { return float(q) * std::ldexp(1.0f, grid.exponent - kBias) + grid.origin; }
+float plane_of(const Grid& grid, unsigned q) noexcept {
+  return float(q) * std::ldexp(1.0f, grid.exponent - kBias) + grid.origin;
+}
 
 template <int N>
 Grid grid_of(const Node<N>& node, int axis) noexcept {
@@ -64,7 +68,8 @@ template Grid grid_of(const Node<4>&, int) noexcept;
 template Grid grid_of(const Node<8>&, int) noexcept;
 
 template <int N>
-void QuantisedNodes<N>::write(Node& node, const Bounds3f* boxes, const bvh::NodeReference* references, unsigned count) noexcept {
+void QuantisedNodes<N>::write(Node& node, const Bounds3f* boxes, const bvh::NodeReference* references,
+                              unsigned count) noexcept {
   std::memset(static_cast<void*>(&node), 0, sizeof node);
   Bounds3f all;
   for (unsigned i = 0; i < count; ++i) all.extend(boxes[i]), node.child[i] = references[i];

@@ -1,12 +1,14 @@
-// One ray against the quantised boxes of a node: planes are decoded on the way, near and far ones chosen by the direction's signs as
-// in box_test.h, whose constants and promises these are.
+// One ray against the quantised boxes of a node: planes are decoded on the way, near and far ones chosen by the
+// direction's signs as in box_test.h, whose constants and promises these are.
 //
-// With FMA the grid is moved into the ray's parameter once a node: t = q * (step * r) + (origin * r - f), one fused operation a plane.
-// step * r is exact (step is a power of two); where it underflows, what is lost, 2^-149 times q < 2^30, is far below the pad's 2^-100. Padded: beside the
-// roundings that box_test.h counts, origin * r - f rounds by u (M + |o|)|r|, and planes reach to M + step <= 1.004 M: under 5.1 u (M + |o|)|r|
-// in all, still below e = 8 u (M + |o|)|r|. So the interval holds the dequantised box's, and that box holds the child's (bvh_quantised.h).
+// With FMA the grid is moved into the ray's parameter once a node: t = q * (step * r) + (origin * r - f), one fused
+// operation a plane. step * r is exact (step is a power of two); where it underflows, what is lost, 2^-149 times q <
+// 2^30, is far below the pad's 2^-100. Padded: beside the roundings that box_test.h counts, origin * r - f rounds by u
+// (M + |o|)|r|, and planes reach to M + step <= 1.004 M: under 5.1 u (M + |o|)|r| in all, still below e = 8 u (M +
+// |o|)|r|. So the interval holds the dequantised box's, and that box holds the child's (bvh_quantised.h).
 //
-// Without FMA t = (q * step + (origin - o)) * r, o padded: one rounding more than box_test.h counts, so under 5 u (M + |o| + e)|r|, less than e |r|.
+// Without FMA t = (q * step + (origin - o)) * r, o padded: one rounding more than box_test.h counts, so under 5 u (M +
+// |o| + e)|r|, less than e |r|.
 #pragma once
 
 #include "simd/swizzle.h"
@@ -21,8 +23,8 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// Axes stand in lanes, again and again in each four: what a node needs of a ray is then two or three registers and costs as many operations, from
-/// which each axis' value is spread within its four.
+/// Axes stand in lanes, again and again in each four: what a node needs of a ray is then two or three registers and
+/// costs as many operations, from which each axis' value is spread within its four.
 template <int N, bool Padded>
 struct QuantisedNodeTest {
   static constexpr int W = N, kSlots = N, kStride = 1;
@@ -30,12 +32,14 @@ struct QuantisedNodeTest {
   using F = vf<W>;
   using Node = bvh_quantised::Node<N>;
   F r, f, g, tnear, tfar;
-  std::size_t near_x, near_y, near_z;  ///< offsets within Node::planes, in bytes; those of the far planes are kSide ^ these
+  /// offsets within Node::planes, in bytes; those of the far planes are kSide ^ these
+  std::size_t near_x, near_y, near_z;
   static constexpr std::size_t kSide = N * sizeof(std::uint32_t);
 
   ARBORETUM_INLINE QuantisedNodeTest(const Ray& ray, float max_coordinate)
       : QuantisedNodeTest(BoxRay<N, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
-  ARBORETUM_INLINE QuantisedNodeTest(BoxRay<N, Padded> b, float first, float last) : QuantisedNodeTest(first, last, within_range(b)) {}
+  ARBORETUM_INLINE QuantisedNodeTest(BoxRay<N, Padded> b, float first, float last)
+      : QuantisedNodeTest(first, last, within_range(b)) {}
 
   ARBORETUM_INLINE unsigned test(const std::byte* at, F& entry) const {
     const auto* node = reinterpret_cast<const Node*>(at);
@@ -44,31 +48,40 @@ struct QuantisedNodeTest {
     const auto x = [](F a) { return permute_in_fours<0, 0, 0, 0>(a); };
     const auto y = [](F a) { return permute_in_fours<1, 1, 1, 1>(a); };
     const auto z = [](F a) { return permute_in_fours<2, 2, 2, 2>(a); };
-    const auto q = [planes](std::size_t offset, unsigned axis) { return to_float(vi<W>::load(planes + offset) & vi<W>(std::int32_t(bvh_quantised::plane_mask(axis)))); };
+    const auto q = [planes](std::size_t offset, unsigned axis) {
+      return to_float(vi<W>::load(planes + offset) & vi<W>(std::int32_t(bvh_quantised::plane_mask(axis))));
+    };
     F nx, ny, nz, lx, ly, lz;
     if constexpr (kHasFma) {
       const F s = step * r, c = msub(origin, r, f), d = Padded ? msub(origin, r, g) : c;
       nx = madd(q(near_x, 0), x(s), x(c)), ny = madd(q(near_y, 1), y(s), y(c)), nz = madd(q(near_z, 2), z(s), z(c));
-      lx = madd(q(near_x ^ kSide, 0), x(s), x(d)), ly = madd(q(near_y ^ kSide, 1), y(s), y(d)), lz = madd(q(near_z ^ kSide, 2), z(s), z(d));
+      lx = madd(q(near_x ^ kSide, 0), x(s), x(d)), ly = madd(q(near_y ^ kSide, 1), y(s), y(d)),
+      lz = madd(q(near_z ^ kSide, 2), z(s), z(d));
     } else {
       const F c = origin - f, d = origin - g;
-      nx = (q(near_x, 0) * x(step) + x(c)) * x(r), ny = (q(near_y, 1) * y(step) + y(c)) * y(r), nz = (q(near_z, 2) * z(step) + z(c)) * z(r);
-      lx = (q(near_x ^ kSide, 0) * x(step) + x(d)) * x(r), ly = (q(near_y ^ kSide, 1) * y(step) + y(d)) * y(r), lz = (q(near_z ^ kSide, 2) * z(step) + z(d)) * z(r);
+      nx = (q(near_x, 0) * x(step) + x(c)) * x(r), ny = (q(near_y, 1) * y(step) + y(c)) * y(r),
+      nz = (q(near_z, 2) * z(step) + z(c)) * z(r);
+      lx = (q(near_x ^ kSide, 0) * x(step) + x(d)) * x(r), ly = (q(near_y ^ kSide, 1) * y(step) + y(d)) * y(r),
+      lz = (q(near_z ^ kSide, 2) * z(step) + z(d)) * z(r);
     }
     entry = max_x86(max_x86(nx, ny), max_x86(nz, tnear));
     const F exit = min_x86(min_x86(lx, ly), min_x86(lz, tfar));
     return (entry <= exit).bits() & node->children;
   }
   ARBORETUM_INLINE void shorten(float t) { tfar = F(t); }
-  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) { return reinterpret_cast<const Node*>(node)->child; }
-  static unsigned boxes(const std::byte* node) { return unsigned(__builtin_popcount(reinterpret_cast<const Node*>(node)->children)); }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return reinterpret_cast<const Node*>(node)->child;
+  }
+  static unsigned boxes(const std::byte* node) {
+    return unsigned(__builtin_popcount(reinterpret_cast<const Node*>(node)->children));
+  }
 
  private:
   using Box = BoxRay<N, Padded>;
 
   ARBORETUM_INLINE QuantisedNodeTest(float first, float last, const Box& b)
-      : r(axes(b.r)), f(axes(b.f)), g(axes(b.g)), tnear(first), tfar(last),
-        near_x((b.octant & 1u) * kSide), near_y((b.octant >> 1 & 1u) * kSide), near_z((b.octant >> 2) * kSide) {}
+      : r(axes(b.r)), f(axes(b.f)), g(axes(b.g)), tnear(first), tfar(last), near_x((b.octant & 1u) * kSide),
+        near_y((b.octant >> 1 & 1u) * kSide), near_z((b.octant >> 2) * kSide) {}
 
   static ARBORETUM_INLINE F axes(Vec3f a) { return repeat_four<W>(four(a.x, a.y, a.z, 0.0f)); }
   static ARBORETUM_INLINE vf<4> steps(const Node* node) {
@@ -79,8 +92,8 @@ struct QuantisedNodeTest {
     }
   }
 
-  /// origin * r alone may overflow where the distance itself does not: 2^106 <= 2 e says that (M + |o|)|r| is about 2^126 or more. Such an
-  /// axis is left out: no box is missed for it.
+  /// origin * r alone may overflow where the distance itself does not: 2^106 <= 2 e says that (M + |o|)|r| is about
+  /// 2^126 or more. Such an axis is left out: no box is missed for it.
   static ARBORETUM_INLINE const Box& within_range(Box& b) {
     if constexpr (kHasFma && Padded) {
       const Vec3f pad = b.f - b.g;
@@ -120,9 +133,11 @@ struct QuantisedPacketNodes {
   template <class F>
   static ARBORETUM_INLINE F distance(const std::byte* at, unsigned k, int i, F r, F c) {
     const auto* node = reinterpret_cast<const Node*>(at);
-    const F q(float(std::int32_t(node->planes[k & 1u][i] & bvh_quantised::plane_mask(k / 2)))), size(step(node, k / 2)), origin(node->origin[k / 2]);
+    const F q(float(std::int32_t(node->planes[k & 1u][i] & bvh_quantised::plane_mask(k / 2)))), size(step(node, k / 2)),
+        origin(node->origin[k / 2]);
     if constexpr (kHasFma) {
-      // Where origin * r overflows (within_range(), which packets do not pass), infinity becomes NaN, which leaves the axis out.
+      // Where origin * r overflows (within_range(), which packets do not pass), infinity becomes NaN, which leaves the
+      // axis out.
       const F moved = msub(origin, r, c);
       return madd(q, size * r, moved + (moved - moved));
     } else {
@@ -136,7 +151,9 @@ struct QuantisedPacketNodes {
     const vf<N> nowhere(k & 1u ? -std::numeric_limits<float>::infinity() : std::numeric_limits<float>::infinity());
     return select(vm<N>::from_bits(node->children), p, nowhere);
   }
-  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) { return Single<true>::children(node)[i]; }
+  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) {
+    return Single<true>::children(node)[i];
+  }
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
 

@@ -52,16 +52,10 @@ const StructureInfo& EmbreeAccel::static_info() {
   return info;
 }
 
-void EmbreeAccel::DeviceRelease::operator()(RTCDeviceTy* device) const noexcept {
-  rtcReleaseDevice(device);
-}
-void EmbreeAccel::SceneRelease::operator()(RTCSceneTy* scene) const noexcept {
-  rtcReleaseScene(scene);
-}
+void EmbreeAccel::DeviceRelease::operator()(RTCDeviceTy* device) const noexcept { rtcReleaseDevice(device); }
+void EmbreeAccel::SceneRelease::operator()(RTCSceneTy* scene) const noexcept { rtcReleaseScene(scene); }
 
-EmbreeAccel::~EmbreeAccel() {
-  release();
-}
+EmbreeAccel::~EmbreeAccel() { release(); }
 
 void EmbreeAccel::release() noexcept {
   scene_.reset();
@@ -96,8 +90,7 @@ void EmbreeAccel::open_device(Isa isa) {
   // (tbb::global_control), so our builders would run on its threads too. The build runs in an arena of N
   // threads instead; see build().
   device_.reset(rtcNewDevice(("isa=" + name + ",set_affinity=0").c_str()));
-  if (!device_)
-    throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
+  if (!device_) throw std::runtime_error("embree: no device, error " + std::to_string(int(rtcGetDeviceError(nullptr))));
   if (!device_runs(device_.get(), isa)) {
     throw UserError("embree: this libembree was built without " + name + "; leave out isa " +
                     std::string(to_string(isa)));
@@ -128,8 +121,8 @@ void EmbreeAccel::build(const TriangleMesh& mesh, const BuildSettings& settings,
     rtcSetGeometryMask(geometry, ~0u);
     const std::size_t vertices = mesh.vertices.size();
     if (mesh.vertices.capacity() > vertices) {
-      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices.data(),
-                                 0, sizeof(Vec3f), vertices);
+      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices.data(), 0,
+                                 sizeof(Vec3f), vertices);
     } else if (void* copy = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                     sizeof(Vec3f), vertices)) {
       std::copy(mesh.vertices.begin(), mesh.vertices.end(), static_cast<Vec3f*>(copy));
@@ -150,7 +143,8 @@ void EmbreeAccel::build(const TriangleMesh& mesh, const BuildSettings& settings,
 const EmbreeAccel& EmbreeAccel::expect(Isa isa, Form form) const {
   if (isa_ == isa && form_ == form) return *this;
   const auto name = [](Isa i, Form f) { return std::string(to_string(i)).append(", ").append(kLeaves[int(f)]); };
-  throw std::logic_error("embree: a kernel of " + name(isa, form) + " was called on a scene built for " + name(isa_, form_));
+  throw std::logic_error("embree: a kernel of " + name(isa, form) + " was called on a scene built for " +
+                         name(isa_, form_));
 }
 
 }  // namespace arboretum::embree

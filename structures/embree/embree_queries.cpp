@@ -1,8 +1,8 @@
 // Embree's ways of tracing a batch: one ray a call, packets, streams.
 //
-// The rays come as an array of ours and go back as an array of hits, whatever Embree wants in between: every conversion is made here,
-// within the time that is measured. Packets are structures of arrays: rays are transposed into them four at a time. A stream is an
-// array of Embree's own rays (rtcIntersect1M), filled a tile at a time.
+// The rays come as an array of ours and go back as an array of hits, whatever Embree wants in between: every conversion
+// is made here, within the time that is measured. Packets are structures of arrays: rays are transposed into them four
+// at a time. A stream is an array of Embree's own rays (rtcIntersect1M), filled a tile at a time.
 #include <immintrin.h>
 
 #include <algorithm>
@@ -16,23 +16,25 @@
 namespace arboretum::embree {
 namespace {
 
-/// Rays of a tile handed to a stream: what was fastest (docs/performance.md). Any hit without the coherent flag sorts a tile by octant
-/// and gains from a longer one, all else from a tile that stays in the first cache.
+/// Rays of a tile handed to a stream: what was fastest (docs/performance.md). Any hit without the coherent flag sorts a
+/// tile by octant and gains from a longer one, all else from a tile that stays in the first cache.
 constexpr std::size_t kStreamTile = 64, kSortedTile = 1024;
 
-/// Embree's own bound on the numbers of a ray (its FLT_LARGE). A build with assertions, such as Debian's, aborts on anything beyond
-/// it, NaN and infinities included.
+/// Embree's own bound on the numbers of a ray (its FLT_LARGE). A build with assertions, such as Debian's, aborts on
+/// anything beyond it, NaN and infinities included.
 constexpr float kLargest = 1.844e18f;
 
-/// Whether the ray may be handed to Embree: is_valid() in one pass, the bound, and some t >= 0, since a build with assertions aborts
-/// on tnear < 0 (what hands it over raises it to 0). False with a NaN anywhere.
+/// Whether the ray may be handed to Embree: is_valid() in one pass, the bound, and some t >= 0, since a build with
+/// assertions aborts on tnear < 0 (what hands it over raises it to 0). False with a NaN anywhere.
 inline bool accepts(const Ray& ray) noexcept {
   const auto in_range = [](Vec3f a) {
-    return unsigned(std::abs(a.x) <= kLargest) & unsigned(std::abs(a.y) <= kLargest) & unsigned(std::abs(a.z) <= kLargest);
+    return unsigned(std::abs(a.x) <= kLargest) & unsigned(std::abs(a.y) <= kLargest) &
+           unsigned(std::abs(a.z) <= kLargest);
   };
   const Vec3f d = ray.direction;
   const unsigned some_direction = unsigned(d.x != 0.0f) | unsigned(d.y != 0.0f) | unsigned(d.z != 0.0f);
-  return (in_range(ray.origin) & in_range(d) & some_direction & unsigned(ray.tnear <= ray.tfar) & unsigned(ray.tfar >= 0.0f)) != 0;
+  return (in_range(ray.origin) & in_range(d) & some_direction & unsigned(ray.tnear <= ray.tfar) &
+          unsigned(ray.tfar >= 0.0f)) != 0;
 }
 
 /// What Embree is told beside scene and rays, in either version of its API.
@@ -109,11 +111,10 @@ inline Hit to_hit(const RTCRayHit& query) noexcept {
 }
 
 /// -infinity where something was hit; accepts() saw it >= 0.
-inline std::uint8_t is_occluded(float tfar) noexcept {
-  return tfar < 0.0f;
-}
+inline std::uint8_t is_occluded(float tfar) noexcept { return tfar < 0.0f; }
 
-/// Calls trace(the indices of N rays that Embree takes) again and again, the last time with what remains; miss(index) for the others.
+/// Calls trace(the indices of N rays that Embree takes) again and again, the last time with what remains; miss(index)
+/// for the others.
 template <std::size_t N, class Miss, class Trace>
 void in_groups(std::span<const Ray> rays, Miss&& miss, Trace&& trace) {
   std::size_t index[N], count = 0;
@@ -195,7 +196,8 @@ class Packet {
   };
   /// The k-th of each `from` side by side in the k-th `to`.
   static void transpose(const Four& from, const FourTo& to) noexcept {
-    __m128 a = _mm_load_ps(from.at[0]), b = _mm_load_ps(from.at[1]), c = _mm_load_ps(from.at[2]), d = _mm_load_ps(from.at[3]);
+    __m128 a = _mm_load_ps(from.at[0]), b = _mm_load_ps(from.at[1]), c = _mm_load_ps(from.at[2]),
+           d = _mm_load_ps(from.at[3]);
     _MM_TRANSPOSE4_PS(a, b, c, d);
     _mm_store_ps(to.at[0], a), _mm_store_ps(to.at[1], b), _mm_store_ps(to.at[2], c), _mm_store_ps(to.at[3], d);
   }
@@ -227,52 +229,59 @@ template <int K>
 void closest_packets(RTCScene scene, RayBatch batch, std::span<Hit> hits) {
   Context context(batch.coherent);
   Packet<K> packet;
-  in_groups<K>(batch.rays, [&](std::size_t i) { hits[i] = {}; }, [&](std::span<const std::size_t> index) {
-    packet.load(batch.rays, index);
-    context.call(PacketOf<K>::closest_hit, packet.valid, scene, &packet.query);
-    for (std::size_t lane = 0; lane < index.size(); ++lane) hits[index[lane]] = packet.hit(lane);
-  });
+  in_groups<K>(
+      batch.rays, [&](std::size_t i) { hits[i] = {}; },
+      [&](std::span<const std::size_t> index) {
+        packet.load(batch.rays, index);
+        context.call(PacketOf<K>::closest_hit, packet.valid, scene, &packet.query);
+        for (std::size_t lane = 0; lane < index.size(); ++lane) hits[index[lane]] = packet.hit(lane);
+      });
 }
 
 template <int K>
 void any_packets(RTCScene scene, RayBatch batch, std::span<std::uint8_t> occluded) {
   Context context(batch.coherent);
   Packet<K> packet;
-  in_groups<K>(batch.rays, [&](std::size_t i) { occluded[i] = 0; }, [&](std::span<const std::size_t> index) {
-    packet.load(batch.rays, index);
-    context.call(PacketOf<K>::any_hit, packet.valid, scene, &packet.query.ray);
-    for (std::size_t lane = 0; lane < index.size(); ++lane) occluded[index[lane]] = is_occluded(packet.query.ray.tfar[lane]);
-  });
+  in_groups<K>(
+      batch.rays, [&](std::size_t i) { occluded[i] = 0; },
+      [&](std::span<const std::size_t> index) {
+        packet.load(batch.rays, index);
+        context.call(PacketOf<K>::any_hit, packet.valid, scene, &packet.query.ray);
+        for (std::size_t lane = 0; lane < index.size(); ++lane)
+          occluded[index[lane]] = is_occluded(packet.query.ray.tfar[lane]);
+      });
 }
 
 #if RTC_VERSION_MAJOR < 4
 void closest_stream(RTCScene scene, RayBatch batch, std::span<Hit> hits) {
   Context context(batch.coherent);
   RTCRayHit tile[kStreamTile];
-  in_groups<kStreamTile>(batch.rays, [&](std::size_t i) { hits[i] = {}; }, [&](std::span<const std::size_t> index) {
-    for (std::size_t k = 0; k < index.size(); ++k) tile[k] = to_query(batch[index[k]]);
-    context.call_stream(&rtcIntersect1M, scene, tile, index.size());
-    for (std::size_t k = 0; k < index.size(); ++k) hits[index[k]] = to_hit(tile[k]);
-  });
+  in_groups<kStreamTile>(
+      batch.rays, [&](std::size_t i) { hits[i] = {}; },
+      [&](std::span<const std::size_t> index) {
+        for (std::size_t k = 0; k < index.size(); ++k) tile[k] = to_query(batch[index[k]]);
+        context.call_stream(&rtcIntersect1M, scene, tile, index.size());
+        for (std::size_t k = 0; k < index.size(); ++k) hits[index[k]] = to_hit(tile[k]);
+      });
 }
 
 template <std::size_t N>
 void any_stream(RTCScene scene, RayBatch batch, std::span<std::uint8_t> occluded) {
   Context context(batch.coherent);
   RTCRay tile[N];
-  in_groups<N>(batch.rays, [&](std::size_t i) { occluded[i] = 0; }, [&](std::span<const std::size_t> index) {
-    for (std::size_t k = 0; k < index.size(); ++k) tile[k] = to_embree(batch[index[k]]);
-    context.call_stream(&rtcOccluded1M, scene, tile, index.size());
-    for (std::size_t k = 0; k < index.size(); ++k) occluded[index[k]] = is_occluded(tile[k].tfar);
-  });
+  in_groups<N>(
+      batch.rays, [&](std::size_t i) { occluded[i] = 0; },
+      [&](std::span<const std::size_t> index) {
+        for (std::size_t k = 0; k < index.size(); ++k) tile[k] = to_embree(batch[index[k]]);
+        context.call_stream(&rtcOccluded1M, scene, tile, index.size());
+        for (std::size_t k = 0; k < index.size(); ++k) occluded[index[k]] = is_occluded(tile[k].tfar);
+      });
 }
 #endif
 
 }  // namespace
 
-bool has_streams() noexcept {
-  return RTC_VERSION_MAJOR < 4;
-}
+bool has_streams() noexcept { return RTC_VERSION_MAJOR < 4; }
 
 void EmbreeAccel::closest_hit(Mode mode, RayBatch rays, std::span<Hit> hits) const {
   switch (mode) {

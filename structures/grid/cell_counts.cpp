@@ -69,8 +69,7 @@ Level make_level(const Vec3f& lower, const Extent& extent, const Index3& counts)
   for (std::size_t a = 0; a < 3; ++a) {
     level.lower[a] = lower[a];
     float cell = float(extent[a] / counts[a]);
-    while (double(cell) * counts[a] < extent[a])
-      cell = std::nextafter(cell, std::numeric_limits<float>::infinity());
+    while (double(cell) * counts[a] < extent[a]) cell = std::nextafter(cell, std::numeric_limits<float>::infinity());
     level.cell[a] = cell, level.inverse[a] = 1.0f / cell, level.last[a] = float(counts[a] - 1);
   }
   return level;

@@ -1,4 +1,5 @@
-// How many cells a grid or a level of it has: nearly cubic ones, as many as are wanted and the expected number of references allows.
+// How many cells a grid or a level of it has: nearly cubic ones, as many as are wanted and the expected number of
+// references allows.
 #pragma once
 
 #include <array>

@@ -35,10 +35,11 @@ const StructureInfo& Grid::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "grid with 3-D DDA, one or two levels of cells";
-    i.only_single_rays = "its rays step from cell to cell each at its own distances: those of a packet are in different cells at any step, and nothing of a step can be shared";
+    i.only_single_rays =
+        "its rays step from cell to cell each at its own distances: those of a packet are in different cells at any "
+        "step, and nothing of a step can be shared";
     i.builders = {"two_level", "uniform"};
-    for_each_type(AllBlocks{},
-                  [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
     return i;
   }();
   return info;

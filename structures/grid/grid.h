@@ -42,9 +42,7 @@ struct alignas(64) Level {
   float last[3];        ///< cells on each axis less one, at most 65535
   std::uint32_t first;  ///< its first cell among all cells
   [[nodiscard]] std::uint32_t cells_on(int axis) const noexcept { return std::uint32_t(last[axis]) + 1u; }
-  [[nodiscard]] std::uint64_t size() const noexcept {
-    return std::uint64_t(cells_on(0)) * cells_on(1) * cells_on(2);
-  }
+  [[nodiscard]] std::uint64_t size() const noexcept { return std::uint64_t(cells_on(0)) * cells_on(1) * cells_on(2); }
 };
 static_assert(sizeof(Level) == 64);
 

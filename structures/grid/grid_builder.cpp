@@ -36,8 +36,7 @@ Sizes sum_sizes(const TriangleMesh& mesh, const Extent& extent) {
 
 /// Counts, then places each triangle in its cells; each cell's list ends up in rising order. False where
 /// there would be more than `limit` references.
-bool fill_lists(const TriangleMesh& mesh, const Level& level, double pad, std::uint64_t limit,
-                LeafLists& lists) {
+bool fill_lists(const TriangleMesh& mesh, const Level& level, double pad, std::uint64_t limit, LeafLists& lists) {
   const CellGeometry geometry(level, pad);
   const std::size_t cells = level.size();
   MeteredVector<std::uint32_t> cursor(cells);
@@ -163,8 +162,7 @@ class InnerBuilder {
 };
 
 /// Replaces the lists of crowded cells by inner grids.
-void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
-                     Cells& cells) {
+void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, Cells& cells) {
   constexpr std::size_t kCells = 256;
   const std::size_t outer = cells.lists.size();
   std::vector<InnerGrids> parts((outer + kCells - 1) / kCells);
@@ -181,9 +179,8 @@ void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& paramete
     places[k + 1] = {places[k].level + parts[k].owners.size(), places[k].cell + parts[k].counts.size(),
                      places[k].id + parts[k].ids.size()};
     for (const auto& owner : parts[k].owners) {
-      cells.codes[owner.cell] = LeafCode(places[k].level + 1 + std::uint64_t(&owner - parts[k].owners.data()))
-                                    << kLeafShift |
-                                kNoLeaf;
+      cells.codes[owner.cell] =
+          LeafCode(places[k].level + 1 + std::uint64_t(&owner - parts[k].owners.data())) << kLeafShift | kNoLeaf;
     }
   }
   for (std::size_t c = 0; c < outer; ++c) kept += cells.codes[c] == kEmptyLeaf ? cells.lists[c].size() : 0;
@@ -224,8 +221,8 @@ void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& paramete
 
 }  // namespace
 
-void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, bool two_level,
-                 unsigned leaf_width, Cells& cells, BuildReport& report) {
+void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, bool two_level, unsigned leaf_width,
+                 Cells& cells, BuildReport& report) {
   PhaseClock phase(report);
   const Bounds3f bounds = mesh.bounds();
   const double largest = largest_coordinate(bounds);
@@ -242,8 +239,8 @@ void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, 
   }
   const Sizes sizes = sum_sizes(mesh, extent);
   const double n = double(mesh.size());
-  const std::uint64_t limit = std::min<std::uint64_t>(
-      std::uint64_t(two_level ? kOuterReferences : kMostReferences) * mesh.size(), 0xfffffff0u);
+  const std::uint64_t limit =
+      std::min<std::uint64_t>(std::uint64_t(two_level ? kOuterReferences : kMostReferences) * mesh.size(), 0xfffffff0u);
   // The outer grid of two has cells for inner ones to refine; alone it has all of them.
   double wanted = std::max(1.0, wanted_cells(parameters, n, two_level ? kOuterShare : 1.0));
   for (;; wanted *= 0.5) {

@@ -14,7 +14,7 @@ inline constexpr double kOuterShare = 1.0 / 32;
 
 /// Cells and their triangles for a mesh that is not empty. `leaf_width` triangles cost one block. Parallel in
 /// the caller's TBB arena, the same for any number of threads.
-void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, bool two_level,
-                 unsigned leaf_width, Cells& cells, BuildReport& report);
+void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, bool two_level, unsigned leaf_width,
+                 Cells& cells, BuildReport& report);
 
 }  // namespace arboretum::grid

@@ -15,11 +15,7 @@ template <class Leaf>
 class FarWalk {
  public:
   FarWalk(const grid::Grid& grid, const Ray& ray, const float& tfar, Leaf& leaf)
-      : grid_(grid),
-        box_(BoxRay<2, true>(ray, grid.max_coordinate())),
-        tnear_(ray.tnear),
-        tfar_(tfar),
-        leaf_(leaf) {
+      : grid_(grid), box_(BoxRay<2, true>(ray, grid.max_coordinate())), tnear_(ray.tnear), tfar_(tfar), leaf_(leaf) {
     for (int a = 0; a < 3; ++a) negative_[a] = __builtin_signbit(ray.direction[std::size_t(a)]);
   }
 
@@ -39,14 +35,11 @@ class FarWalk {
     middle[axis] = (low[axis] + high[axis]) / 2, after[axis] = middle[axis] + 1;
     alignas(64) bvh::Node<2> node{};
     for (int a = 0; a < 3; ++a) {
-      node.planes[2 * a][0] = face(level, a, low[a]),
-                      node.planes[2 * a + 1][0] = face(level, a, middle[a] + 1);
-      node.planes[2 * a][1] = face(level, a, after[a]),
-                      node.planes[2 * a + 1][1] = face(level, a, high[a] + 1);
+      node.planes[2 * a][0] = face(level, a, low[a]), node.planes[2 * a + 1][0] = face(level, a, middle[a] + 1);
+      node.planes[2 * a][1] = face(level, a, after[a]), node.planes[2 * a + 1][1] = face(level, a, high[a] + 1);
     }
     vf<4> entry;
-    const unsigned hit =
-        box_.test(reinterpret_cast<const std::byte*>(&node), vf<4>(tnear_), vf<4>(tfar_), entry);
+    const unsigned hit = box_.test(reinterpret_cast<const std::byte*>(&node), vf<4>(tnear_), vf<4>(tfar_), entry);
     alignas(16) float near[4];
     entry.store(near);
     const bool first_is_after = negative_[axis];
@@ -78,12 +71,12 @@ ARBORETUM_INLINE bool within_walk_bounds(const grid::Grid& grid, const Ray& ray)
   const grid::Level& outer = grid.levels()[0];
   float away = 0.0f, largest = 0.0f;
   for (int a = 0; a < 3; ++a) {
-    const float d = __builtin_fabsf((&ray.direction.x)[a]),
-                o = __builtin_fabsf((&ray.origin.x)[a] - outer.lower[a]);
+    const float d = __builtin_fabsf((&ray.direction.x)[a]), o = __builtin_fabsf((&ray.origin.x)[a] - outer.lower[a]);
     largest = d > largest ? d : largest, away = o > away ? o : away;
   }
   const float all = grid.max_coordinate() + 32.0f * grid.reach();
-  return (all < 0x1p120f) && (away <= 16.0f * grid.reach()) && (all <= 0x1p60f * largest) && (grid.pad() >= 0x1p-80f * largest);
+  return (all < 0x1p120f) && (away <= 16.0f * grid.reach()) && (all <= 0x1p60f * largest) &&
+         (grid.pad() >= 0x1p-80f * largest);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

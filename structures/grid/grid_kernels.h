@@ -14,8 +14,8 @@ struct GridSingle {
   using Scratch = NoScratch;
   /// True where any hit is found.
   template <bool AnyHit, class Visits>
-  static ARBORETUM_INLINE bool trace(const grid::Grid& grid, const Ray& ray, NearestHit& best,
-                                     const Counting& counting, Scratch&, Visits& visits) {
+  static ARBORETUM_INLINE bool trace(const grid::Grid& grid, const Ray& ray, NearestHit& best, const Counting& counting,
+                                     Scratch&, Visits& visits) {
     if constexpr (Padded) {
       if (__builtin_expect(!within_walk_bounds(grid, ray), 0)) return far(grid, ray, best, visits);
     }
@@ -62,7 +62,8 @@ struct GridSingle {
 
  private:
   template <class Visits>
-  static __attribute__((noinline)) bool far(const grid::Grid& grid, const Ray& ray, const NearestHit& best, Visits& visits) {
+  static __attribute__((noinline)) bool far(const grid::Grid& grid, const Ray& ray, const NearestHit& best,
+                                            Visits& visits) {
     auto leaf = [&](LeafCode code) { return visits(code); };
     return FarWalk(grid, ray, best.t, leaf).search(grid.levels()[0]);
   }

@@ -9,7 +9,8 @@
 
 namespace arboretum::grid {
 
-[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<Grid>, std::string_view builder) {
+[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<Grid>,
+                                                                      std::string_view builder) {
   std::vector<std::string_view> names{"grid_density"};
   if (builder == "two_level") names.insert(names.end(), {"traversal_cost", "intersection_cost"});
   return names;

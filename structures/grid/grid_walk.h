@@ -20,10 +20,7 @@ struct GridRay {
   vm<4> negative;  ///< by the sign bit: -0 goes with the negative directions
 
   ARBORETUM_INLINE explicit GridRay(const Ray& ray)
-      : origin(F::load(&ray.origin)),
-        direction(F::load(&ray.direction)),
-        reciprocal(0.0f),
-        fixed(false),
+      : origin(F::load(&ray.origin)), direction(F::load(&ray.direction)), reciprocal(0.0f), fixed(false),
         negative(false) {
     const F size = abs(direction);
     fixed = (size <= F(largest_component(ray.direction) * 0x1p-60f)) | vm<4>::from_bits(8);
@@ -47,8 +44,7 @@ struct GridWalk {
     const F a = lower * ray.reciprocal, b = upper * ray.reciprocal;
     F enter = select(ray.negative, b, a), leave = select(ray.negative, a, b);
     const vm<4> outside = ray.fixed & ((lower > F(0.0f)) | (upper < F(0.0f))) & vm<4>::from_bits(7);
-    enter = select(ray.fixed, select(outside, infinity, -infinity), enter),
-    leave = select(ray.fixed, infinity, leave);
+    enter = select(ray.fixed, select(outside, infinity, -infinity), enter), leave = select(ray.fixed, infinity, leave);
     near = reduce_max(max_x86(enter, F(near))), far = reduce_min(min_x86(leave, F(far)));
   }
 

@@ -1,7 +1,7 @@
-// Binned SAH: references are counted by the bins in which their boxes begin and end (Popov, Guenther, Seidel, Slusallek,
-// "Experiences with streaming construction of SAH kd-trees", RT 2006; Shevtsov, Soupikov, Kapustin, "Highly parallel fast kd-tree
-// construction", EG 2007). The bins span the references' common bounds, not the cell, so that the first and last planes are those
-// that cut off empty space exactly.
+// Binned SAH: references are counted by the bins in which their boxes begin and end (Popov, Guenther, Seidel,
+// Slusallek, "Experiences with streaming construction of SAH kd-trees", RT 2006; Shevtsov, Soupikov, Kapustin, "Highly
+// parallel fast kd-tree construction", EG 2007). The bins span the references' common bounds, not the cell, so that the
+// first and last planes are those that cut off empty space exactly.
 #include <algorithm>
 #include <cstring>
 
@@ -16,12 +16,13 @@ namespace {
 
 constexpr unsigned kMaxBins = 64;
 
-/// begins[b][axis]: boxes whose lower bound lies in bin b; ends[b + 1][axis]: whose upper bound does, one on a plane belonging to the
-/// bin before. The fourth lane holds nothing.
+/// begins[b][axis]: boxes whose lower bound lies in bin b; ends[b + 1][axis]: whose upper bound does, one on a plane
+/// belonging to the bin before. The fourth lane holds nothing.
 struct Bins {
   alignas(16) std::int32_t begins[kMaxBins][4], ends[kMaxBins + 1][4];
   void clear(int n) {
-    std::memset(begins, 0, std::size_t(n) * sizeof begins[0]), std::memset(ends, 0, std::size_t(n + 1) * sizeof ends[0]);
+    std::memset(begins, 0, std::size_t(n) * sizeof begins[0]),
+        std::memset(ends, 0, std::size_t(n + 1) * sizeof ends[0]);
   }
 };
 
@@ -34,13 +35,15 @@ struct BinMap {
     for (std::size_t k = 0; k < 3; ++k) {
       const float extent = bounds.upper[k] - bounds.lower[k];
       lower[k] = bounds.lower[k];
-      const bool thick = extent > std::numeric_limits<float>::min() * float(kMaxBins) && extent < std::numeric_limits<float>::max();
+      const bool thick =
+          extent > std::numeric_limits<float>::min() * float(kMaxBins) && extent < std::numeric_limits<float>::max();
       scale[k] = thick ? float(n) / extent : 0.0f;
       width[k] = thick ? extent / float(n) : 0.0f;
     }
   }
   void count(const Reference& r, Bins& out) const {
-    const __m128 low = _mm_load_ps(lower), by = _mm_load_ps(scale), last = _mm_set1_ps(float(bins - 1)), most = _mm_set1_ps(float(bins));
+    const __m128 low = _mm_load_ps(lower), by = _mm_load_ps(scale), last = _mm_set1_ps(float(bins - 1)),
+                 most = _mm_set1_ps(float(bins));
     const __m128 begin = _mm_min_ps(_mm_mul_ps(_mm_sub_ps(_mm_loadu_ps(&r.box.lower.x), low), by), last);
     // Behind the upper corner stands the id, which is subnormal as a float: slow to multiply.
     const __m128 upper = _mm_and_ps(_mm_loadu_ps(&r.box.upper.x), _mm_castsi128_ps(_mm_setr_epi32(-1, -1, -1, 0)));
@@ -66,7 +69,8 @@ class Binned {
     }
   };
 
-  Binned(const TriangleMesh& mesh, const CostModel& model, unsigned bins) : mesh_(mesh), model_(model), max_bins_(bins) {}
+  Binned(const TriangleMesh& mesh, const CostModel& model, unsigned bins)
+      : mesh_(mesh), model_(model), max_bins_(bins) {}
 
   Split find(const State& state, const Bounds3f& cell, bool parallel) const {
     const References& references = state.references;
@@ -89,7 +93,8 @@ class Binned {
     return cheapest(map, bins, bounds, cell, n);
   }
 
-  void divide(const State& state, const Split& split, const Bounds3f& cell, State& left, State& right, bool parallel) const {
+  void divide(const State& state, const Split& split, const Bounds3f& cell, State& left, State& right,
+              bool parallel) const {
     const References& in = state.references;
     left.references.clear(), right.references.clear();
     if (!parallel || in.size() < 2 * kChunk) {
@@ -107,8 +112,11 @@ class Binned {
  private:
   static Bounds3f bounds_of(const References& references, bool parallel) {
     const auto over = [](const Reference* r, const Reference* end) {
-      __m128 lower = _mm_set1_ps(std::numeric_limits<float>::infinity()), upper = _mm_set1_ps(-std::numeric_limits<float>::infinity());
-      for (; r != end; ++r) lower = _mm_min_ps(_mm_loadu_ps(&r->box.lower.x), lower), upper = _mm_max_ps(_mm_loadu_ps(&r->box.upper.x), upper);
+      __m128 lower = _mm_set1_ps(std::numeric_limits<float>::infinity()),
+             upper = _mm_set1_ps(-std::numeric_limits<float>::infinity());
+      for (; r != end; ++r)
+        lower = _mm_min_ps(_mm_loadu_ps(&r->box.lower.x), lower),
+        upper = _mm_max_ps(_mm_loadu_ps(&r->box.upper.x), upper);
       alignas(16) float l[4], u[4];
       _mm_store_ps(l, lower), _mm_store_ps(u, upper);
       return Bounds3f{{l[0], l[1], l[2]}, {u[0], u[1], u[2]}};
@@ -137,16 +145,20 @@ class Binned {
     }
   }
 
-  /// The bins' planes are compared in float, three axes at once; what is best on an axis, and the planes that cut off empty space, exactly.
-  Split cheapest(const BinMap& map, const Bins& bins, const Bounds3f& bounds, const Bounds3f& cell, std::size_t n) const {
+  /// The bins' planes are compared in float, three axes at once; what is best on an axis, and the planes that cut off
+  /// empty space, exactly.
+  Split cheapest(const BinMap& map, const Bins& bins, const Bounds3f& bounds, const Bounds3f& cell,
+                 std::size_t n) const {
     const AxisCost cost[3] = {{model_, cell, 0}, {model_, cell, 1}, {model_, cell, 2}};
     // Shares of the sides of plane b: left + b * step and right - b * step.
     alignas(16) float share_left[4] = {}, share_right[4] = {}, share_step[4] = {};
     for (std::size_t k = 0; k < 3; ++k) {
-      share_left[k] = float(cost[k].share_left(map.lower[k])), share_right[k] = float(cost[k].share_right(map.lower[k]));
+      share_left[k] = float(cost[k].share_left(map.lower[k])),
+      share_right[k] = float(cost[k].share_right(map.lower[k]));
       share_step[k] = float(cost[k].share_left(double(map.lower[k]) + map.width[k]) - cost[k].share_left(map.lower[k]));
     }
-    const __m128 from_left = _mm_load_ps(share_left), from_right = _mm_load_ps(share_right), step = _mm_load_ps(share_step);
+    const __m128 from_left = _mm_load_ps(share_left), from_right = _mm_load_ps(share_right),
+                 step = _mm_load_ps(share_step);
     const __m128 per_block = _mm_set1_ps(float(model_.per_block)), one = _mm_set1_ps(1.0f);
     __m128i left = _mm_setzero_si128(), right = _mm_sub_epi32(_mm_set1_epi32(std::int32_t(n)), row(bins.ends[0]));
     __m128 least = _mm_set1_ps(std::numeric_limits<float>::infinity());
@@ -158,7 +170,8 @@ class Binned {
                                     _mm_mul_ps(_mm_sub_ps(from_right, moved), blocks(right, per_block, one)));
       const __m128 less = _mm_cmplt_ps(sum, least);
       least = _mm_min_ps(sum, least);
-      at = _mm_or_si128(_mm_and_si128(_mm_castps_si128(less), _mm_set1_epi32(b)), _mm_andnot_si128(_mm_castps_si128(less), at));
+      at = _mm_or_si128(_mm_and_si128(_mm_castps_si128(less), _mm_set1_epi32(b)),
+                        _mm_andnot_si128(_mm_castps_si128(less), at));
     }
     alignas(16) std::int32_t chosen[4];
     _mm_store_si128(reinterpret_cast<__m128i*>(chosen), at);
@@ -169,7 +182,8 @@ class Binned {
       cost[k].consider(bounds.upper[k], n, 0, true, best);
       if (chosen[k] == 0 || map.scale[k] == 0.0f) continue;
       std::size_t begun = 0, ended = std::size_t(bins.ends[0][k]);
-      for (int b = 0; b < chosen[k]; ++b) begun += std::size_t(bins.begins[b][k]), ended += std::size_t(bins.ends[b + 1][k]);
+      for (int b = 0; b < chosen[k]; ++b)
+        begun += std::size_t(bins.begins[b][k]), ended += std::size_t(bins.ends[b + 1][k]);
       cost[k].consider(map.plane(chosen[k], k), begun, n - ended, true, best);
     }
     return best;
@@ -181,8 +195,8 @@ class Binned {
     return _mm_and_ps(_mm_cmpgt_ps(n, _mm_setzero_ps()), _mm_max_ps(_mm_mul_ps(n, per_block), one));
   }
 
-  void divide(const Reference* r, const Reference* end, const Split& split, const Bounds3f& cell,
-              References& left, References& right) const {
+  void divide(const Reference* r, const Reference* end, const Split& split, const Bounds3f& cell, References& left,
+              References& right) const {
     for (; r != end; ++r) {
       switch (side_of(r->box, split)) {
         case Side::left: left.push_back(*r); break;
@@ -214,8 +228,8 @@ class Binned {
 
 }  // namespace
 
-void build_binned(const TriangleMesh& mesh, const BuilderParameters& parameters, const CostModel& model, const Limits& limits,
-                  const Bounds3f& cell, Part& out, BuildReport& report) {
+void build_binned(const TriangleMesh& mesh, const BuilderParameters& parameters, const CostModel& model,
+                  const Limits& limits, const Bounds3f& cell, Part& out, BuildReport& report) {
   PhaseClock phase(report);
   Binned::State root{make_references(mesh)};
   phase.ends("references");

@@ -11,8 +11,8 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-/// A convex polygon. Each of the six planes adds one corner; where rounding has bent it, no plane can add more than half as
-/// many as there were: 3, 4, 6, 9, 13, 19, 28.
+/// A convex polygon. Each of the six planes adds one corner; where rounding has bent it, no plane can add more than
+/// half as many as there were: 3, 4, 6, 9, 13, 19, 28.
 struct Polygon {
   std::array<Point, 28> point;
   int size = 0;
@@ -42,7 +42,8 @@ struct Extent {
   Point lower{kNone, kNone, kNone}, neg_upper{kNone, kNone, kNone};
 
   void add(const Point& p) noexcept {
-    for (std::size_t k = 0; k < 3; ++k) lower[k] = std::min(lower[k], p[k]), neg_upper[k] = std::min(neg_upper[k], -p[k]);
+    for (std::size_t k = 0; k < 3; ++k)
+      lower[k] = std::min(lower[k], p[k]), neg_upper[k] = std::min(neg_upper[k], -p[k]);
   }
   /// Rounded outward, cut to the box.
   [[nodiscard]] Bounds3f within(const Bounds3f& box) const noexcept {
@@ -64,7 +65,8 @@ const Polygon& clip_to(const std::array<Vec3f, 3>& corners, const Bounds3f& box,
   for (std::size_t i = 0; i < 3; ++i) polygon[0].point[i] = {corners[i].x, corners[i].y, corners[i].z};
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t k = std::size_t(axis);
-    const float low = std::min({corners[0][k], corners[1][k], corners[2][k]}), high = std::max({corners[0][k], corners[1][k], corners[2][k]});
+    const float low = std::min({corners[0][k], corners[1][k], corners[2][k]}),
+                high = std::max({corners[0][k], corners[1][k], corners[2][k]});
     if (low < box.lower[k]) clip(polygon[now], axis, box.lower[k], 1.0, polygon[1 - now]), now = 1 - now;
     if (polygon[now].size == 0) break;
     if (high > box.upper[k]) clip(polygon[now], axis, box.upper[k], -1.0, polygon[1 - now]), now = 1 - now;
@@ -83,7 +85,8 @@ Bounds3f clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box
   return extent.within(box);
 }
 
-void clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box, int axis, float plane, Bounds3f& left, Bounds3f& right) noexcept {
+void clipped_bounds(const std::array<Vec3f, 3>& corners, const Bounds3f& box, int axis, float plane, Bounds3f& left,
+                    Bounds3f& right) noexcept {
   Polygon polygon[2];
   const Polygon& part = clip_to(corners, box, polygon);
   const auto k = std::size_t(axis);

@@ -30,12 +30,14 @@ void count(const Place& node, std::size_t& pairs, std::size_t& leaves, std::size
   count(node.child(0), pairs, leaves, blocks, width), count(node.child(1), pairs, leaves, blocks, width);
 }
 
-/// Places pairs in groups of up to four, a cache line: a pair, its children's pairs, then theirs, breadth first; then the groups
-/// below, depth first. A ray that goes down meets a new line every second level or later.
+/// Places pairs in groups of up to four, a cache line: a pair, its children's pairs, then theirs, breadth first; then
+/// the groups below, depth first. A ray that goes down meets a new line every second level or later.
 class Writer {
  public:
-  Writer(std::byte* base, std::size_t next_leaf, unsigned width, std::size_t block_bytes, MeteredVector<LeafPlan>& leaves)
-      : base_(base), next_leaf_(next_leaf), width_(width), block_bytes_(block_bytes), align_(block_bytes % 64 == 0 ? 64 : 32), leaves_(leaves) {}
+  Writer(std::byte* base, std::size_t next_leaf, unsigned width, std::size_t block_bytes,
+         MeteredVector<LeafPlan>& leaves)
+      : base_(base), next_leaf_(next_leaf), width_(width), block_bytes_(block_bytes),
+        align_(block_bytes % 64 == 0 ? 64 : 32), leaves_(leaves) {}
 
   Node node(const Place& place, std::size_t pair_offset) {
     if (!place.is_leaf()) return Node::inner(place.plane(), place.axis(), pair_offset);
@@ -108,7 +110,8 @@ Layout lay_out(const Part& tree, unsigned width, std::size_t block_bytes) {
   // A leaf may be followed by a gap of less than `align`.
   const std::size_t bytes = node_bytes + blocks * block_bytes + (block_bytes % align == 0 ? 0 : leaves * (align - 1));
   if (bytes > Node::kMostBytes) {
-    throw UserError("kdtree would take " + std::to_string(bytes >> 20) + " MiB; its links reach 16 GiB: use leaves of indices or a smaller mesh");
+    throw UserError("kdtree would take " + std::to_string(bytes >> 20) +
+                    " MiB; its links reach 16 GiB: use leaves of indices or a smaller mesh");
   }
   Layout out;
   out.leaves.reserve(leaves);

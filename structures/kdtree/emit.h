@@ -24,8 +24,8 @@ struct Layout {
   MeteredVector<LeafPlan> leaves;
 };
 
-/// Lays the tree out for blocks of `width` triangles and `block_bytes`: all nodes in their places, leaf blocks still to be filled. Throws
-/// UserError where 32-bit links cannot reach.
+/// Lays the tree out for blocks of `width` triangles and `block_bytes`: all nodes in their places, leaf blocks still to
+/// be filled. Throws UserError where 32-bit links cannot reach.
 [[nodiscard]] Layout lay_out(const Part& tree, unsigned width, std::size_t block_bytes);
 
 }  // namespace arboretum::kdtree

@@ -25,8 +25,10 @@ constexpr std::size_t kReferences = 8;  ///< references at most, times the trian
 
 void check(const BuilderParameters& p, const TriangleMesh& mesh) {
   if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
-  if (p.max_depth > kDeepest) throw UserError("max_depth: " + std::to_string(p.max_depth) + " is not within 0 .. " + std::to_string(kDeepest));
-  if (!(p.empty_bonus >= 0.0f && p.empty_bonus <= 0.95f)) throw UserError("empty_bonus: " + std::to_string(p.empty_bonus) + " is not within 0 .. 0.95");
+  if (p.max_depth > kDeepest)
+    throw UserError("max_depth: " + std::to_string(p.max_depth) + " is not within 0 .. " + std::to_string(kDeepest));
+  if (!(p.empty_bonus >= 0.0f && p.empty_bonus <= 0.95f))
+    throw UserError("empty_bonus: " + std::to_string(p.empty_bonus) + " is not within 0 .. 0.95");
   if (p.max_leaf_blocks < 1) throw UserError("max_leaf_blocks: 0 is not at least 1");
   if (mesh.size() >= (1u << 28)) throw UserError("kdtree takes at most 2^28 - 1 triangles");
 }
@@ -40,7 +42,9 @@ const StructureInfo& KdTree::static_info() {
     i.summary = "kd-tree: axis-aligned planes, triangles clipped to their cells, 8-byte nodes";
     i.builders = {"binned_sah", "sweep_sah"};
     for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
-    i.no_streams = "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its own in every node, which the stack would have to hold for each of them";
+    i.no_streams =
+        "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its "
+        "own in every node, which the stack would have to hold for each of them";
     return i;
   }();
   return info;
@@ -48,7 +52,9 @@ const StructureInfo& KdTree::static_info() {
 
 void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   check(settings.parameters, mesh);
-  const Builder builder = settings.builder == "binned_sah" ? &build_binned : settings.builder == "sweep_sah" ? &build_sweep : nullptr;
+  const Builder builder = settings.builder == "binned_sah"  ? &build_binned
+                          : settings.builder == "sweep_sah" ? &build_sweep
+                                                            : nullptr;
   if (!builder) throw UserError("kdtree has no builder '" + settings.builder + "'");
   const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
     leaf_ = settings.leaf, vertices_ = mesh.vertices.data();
@@ -90,7 +96,8 @@ bool KdTree::visit(StructureVisitor& visitor) const {
       if (node.is_leaf()) {
         primitives.clear();
         append_primitives(reinterpret_cast<const Block*>(base() + node.offset()), node.blocks(), primitives);
-        visitor.leaf({cell, primitives, depth, node.blocks(), unsigned(Block::kWidth), sizeof(Node) + node.blocks() * sizeof(Block)});
+        visitor.leaf({cell, primitives, depth, node.blocks(), unsigned(Block::kWidth),
+                      sizeof(Node) + node.blocks() * sizeof(Block)});
         continue;
       }
       Bounds3f child[2] = {cell, cell};

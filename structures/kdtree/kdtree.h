@@ -1,9 +1,9 @@
-// kdtree: a binary space partition by axis-aligned planes, leaves in the same blocks as the BVHs' (Havran, "Heuristic Ray
-// Shooting Algorithms", 2000; Wald and Havran, "On building fast kd-trees for ray tracing, and on doing that in O(N log N)",
-// RT 2006). A triangle that a plane cuts is named on both sides.
+// kdtree: a binary space partition by axis-aligned planes, leaves in the same blocks as the BVHs' (Havran, "Heuristic
+// Ray Shooting Algorithms", 2000; Wald and Havran, "On building fast kd-trees for ray tracing, and on doing that in O(N
+// log N)", RT 2006). A triangle that a plane cuts is named on both sides.
 //
-// Nodes are 8 bytes; siblings are neighbours, and up to four pairs that follow each other stand on a cache line. Nodes and
-// leaf blocks lie in one arena, nodes first, and are named in units of 16 bytes, which reaches 16 GiB.
+// Nodes are 8 bytes; siblings are neighbours, and up to four pairs that follow each other stand on a cache line. Nodes
+// and leaf blocks lie in one arena, nodes first, and are named in units of 16 bytes, which reaches 16 GiB.
 #pragma once
 
 #include <bit>
@@ -17,7 +17,8 @@
 namespace arboretum::kdtree {
 
 /// An inner node: `split` is the plane, the low two bits of `link` its axis, the others where the pair of children is.
-/// A leaf: `split` holds the bits of its number of blocks (0: an empty cell), the low bits are 3, the others name its blocks.
+/// A leaf: `split` holds the bits of its number of blocks (0: an empty cell), the low bits are 3, the others name its
+/// blocks.
 struct Node {
   float split;
   std::uint32_t link;

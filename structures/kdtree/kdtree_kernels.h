@@ -16,7 +16,8 @@ inline void add_kernels(std::type_identity<kdtree::KdTree>, KernelRows& rows) {
   add_rows<kdtree::KdTree, SingleRayFunctions<KdKernel>>(rows, "single", UsualLeaves{});
   add_queued_rows<kdtree::KdTree, KdQueued, SingleRayFunctions<KdKernel>>(rows, UsualLeaves{});
   add_packet_rows<kdtree::KdTree, KdPacketFamily>(rows, KdPacketLeaves{});
-  add_rows<kdtree::KdTree, AutoFunctions<KdPacketFamily, KdPacketLeaves, SingleRayFunctions<KdKernel>>>(rows, "auto", UsualLeaves{});
+  add_rows<kdtree::KdTree, AutoFunctions<KdPacketFamily, KdPacketLeaves, SingleRayFunctions<KdKernel>>>(rows, "auto",
+                                                                                                        UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

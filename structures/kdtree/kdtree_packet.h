@@ -1,20 +1,23 @@
-// Packets: up to 64 rays go through a kd-tree together (Wald, Slusallek, Benthin and Wagner, "Interactive Rendering with Coherent Ray
-// Tracing", Eurographics 2001), each with an interval of t of its own in a lane and a bit in the mask of those that are in a cell.
+// Packets: up to 64 rays go through a kd-tree together (Wald, Slusallek, Benthin and Wagner, "Interactive Rendering
+// with Coherent Ray Tracing", Eurographics 2001), each with an interval of t of its own in a lane and a bit in the mask
+// of those that are in a cell.
 //
-// Rays that share an octant share near and far on every axis, and so one traversal; a packet of mixed signs is one masked traversal an octant.
-// A plane is tested in two steps, the first after Reshetov, Soupikov and Hurley ("Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005): where the interval
-// of distances at which any ray of the packet meets it lies before or behind all that is left of the rays, they all go one way, and none
-// of their intervals changes. Else each ray is tested, W at a time. A far side waits on the stack with its rays and their intervals. Where no more
-// than `threshold` rays are left they go on alone (kdtree_single.h).
+// Rays that share an octant share near and far on every axis, and so one traversal; a packet of mixed signs is one
+// masked traversal an octant. A plane is tested in two steps, the first after Reshetov, Soupikov and Hurley
+// ("Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005): where the interval of distances at which any ray of the packet
+// meets it lies before or behind all that is left of the rays, they all go one way, and none of their intervals
+// changes. Else each ray is tested, W at a time. A far side waits on the stack with its rays and their intervals. Where
+// no more than `threshold` rays are left they go on alone (kdtree_single.h).
 //
-// A ray's own tests are those of kdtree_single.h, operation by operation, and its cells come in the same order. So it visits just the cells that it would
-// visit alone, and its answer is the same bit for bit, with `fast` planes, too. NaN, from values beyond float's range, is a ray's own affair: it
-// visits both sides, whatever lies in other lanes.
+// A ray's own tests are those of kdtree_single.h, operation by operation, and its cells come in the same order. So it
+// visits just the cells that it would visit alone, and its answer is the same bit for bit, with `fast` planes, too.
+// NaN, from values beyond float's range, is a ray's own affair: it visits both sides, whatever lies in other lanes.
 //
-// The packet's interval. With r and o of the rays within [r0, r1] and [o0, o1], r of one sign, a plane at s is met at (s - o) r, whose ends are
-// products of ends. What a ray computes is off by its pad, 8 u (M + |o|)|r|, and by the roundings of kdtree_single.h, 5 u (M + |o|)|r|; the interval's
-// own roundings are 4 u (M + |o|)|r|: it is widened by 2^-19 (M + |o|)|r| = 32 u (M + |o|)|r|. Where that is not far below float's range
-// (a ray that gets r = 2^60 / |d|max may have such an r) there is no interval, and all rays are tested everywhere.
+// The packet's interval. With r and o of the rays within [r0, r1] and [o0, o1], r of one sign, a plane at s is met at
+// (s - o) r, whose ends are products of ends. What a ray computes is off by its pad, 8 u (M + |o|)|r|, and by the
+// roundings of kdtree_single.h, 5 u (M + |o|)|r|; the interval's own roundings are 4 u (M + |o|)|r|: it is widened by
+// 2^-19 (M + |o|)|r| = 32 u (M + |o|)|r|. Where that is not far below float's range (a ray that gets r = 2^60 / |d|max
+// may have such an r) there is no interval, and all rays are tested everywhere.
 #pragma once
 
 #include "structures/kdtree/kdtree_single.h"
@@ -23,7 +26,8 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// Rays side by side with the constants of KdRay, computed W rays at a time by its operations, so they are the same bits.
+/// Rays side by side with the constants of KdRay, computed W rays at a time by its operations, so they are the same
+/// bits.
 struct KdLanes : LaneRays {
   alignas(64) float r[3][kMost], enter[3][kMost], leave[3][kMost];
   std::uint64_t overflown;  ///< those of which an axis is left out
@@ -64,22 +68,28 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   using Base::best, Base::times_alone;
 
   KdPackets(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()),
-        max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f), stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
+      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())),
+        bounds_(tree.bounds()), max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f),
+        stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
 
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
     Base::trace(
-        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W>(count, ray_at, pad_, max_coordinate_, each); },
+        rays, count, threshold,
+        [&](const auto& ray_at, const auto& each) {
+          lanes_.template prepare<W>(count, ray_at, pad_, max_coordinate_, each);
+        },
         [&](Mask mask, unsigned octant) { traverse(mask, octant); });
   }
 
  private:
   using typename Base::Mask;
   using F = vf<W>;
-  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::kMost, Base::lanes_, Base::leaves_, Base::rays_;
+  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::kMost, Base::lanes_,
+      Base::leaves_, Base::rays_;
 
-  /// A cell that waits, or the one at hand: its rays, where they enter and leave it, and bounds of both for all of them.
+  /// A cell that waits, or the one at hand: its rays, where they enter and leave it, and bounds of both for all of
+  /// them.
   struct alignas(64) Cell {
     float begin[kMost], end[kMost];
     std::uint64_t node;
@@ -100,7 +110,8 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     }
   };
 
-  /// Also tells the leaves what they need of the group. Rays that fill two registers or less are not worth an interval of planes.
+  /// Also tells the leaves what they need of the group. Rays that fill two registers or less are not worth an interval
+  /// of planes.
   Interval interval_of(Mask group) {
     Interval v;
     v.usable = chunks_ > 2 && (lanes_.overflown & group) == 0;
@@ -137,8 +148,9 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     }
   }
 
-  /// The rays of a cell at a plane: those that are in the near side and in the far side. The cell becomes its far side, the one behind it on the
-  /// stack the near side; a side that is not asked for stays as it is, and the near side alone is the cell itself.
+  /// The rays of a cell at a plane: those that are in the near side and in the far side. The cell becomes its far side,
+  /// the one behind it on the stack the near side; a side that is not asked for stays as it is, and the near side alone
+  /// is the cell itself.
   template <bool Near, bool Far>
   ARBORETUM_INLINE void divide(Cell* cell, float plane, unsigned axis, Mask mask, Mask& near, Mask& far) const {
     near = far = 0;
@@ -183,7 +195,8 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
         const unsigned axis = link & 3u;
         if (axis == 3) break;
         if (Base::few(mask)) {
-          Base::go_on_alone(mask, [&](int i, auto& ray) { return alone(i, ray, node, *top, far_side, depths.current()); });
+          Base::go_on_alone(mask,
+                            [&](int i, auto& ray) { return alone(i, ray, node, *top, far_side, depths.current()); });
           goto pop;
         }
         const float plane = __builtin_bit_cast(float, std::uint32_t(node));
@@ -245,7 +258,8 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     }
   }
 
-  /// Ends the rays of a cell at what they have met. Returns those that enter it before, and bounds of where they enter and leave.
+  /// Ends the rays of a cell at what they have met. Returns those that enter it before, and bounds of where they enter
+  /// and leave.
   ARBORETUM_INLINE Mask shorten(Cell& cell, Mask mask, float& first, float& last) const {
     const F infinity(std::numeric_limits<float>::infinity());
     F least = infinity, most = -infinity;
@@ -265,18 +279,24 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   }
 
   template <class RayData>
-  bool alone(int i, RayData& ray, std::uint64_t node, const Cell& cell, const unsigned (&far_side)[3], typename Counting::Depth depth) {
+  bool alone(int i, RayData& ray, std::uint64_t node, const Cell& cell, const unsigned (&far_side)[3],
+             typename Counting::Depth depth) {
     KdRay planes;
-    for (int a = 0; a < 3; ++a) planes.r[a] = lanes_.r[a][i], planes.enter[a] = lanes_.enter[a][i], planes.leave[a] = lanes_.leave[a][i], planes.far[a] = far_side[a];
+    for (int a = 0; a < 3; ++a)
+      planes.r[a] = lanes_.r[a][i], planes.enter[a] = lanes_.enter[a][i], planes.leave[a] = lanes_.leave[a][i],
+      planes.far[a] = far_side[a];
     return search(node, cell.begin[i], cell.end[i], planes, rays_[i], ray, best_[i], depth);
   }
-  __attribute__((noinline)) bool search(std::uint64_t node, float begin, float end, const KdRay& planes, const Ray& ray, typename Leaves::RayData& data, NearestHit& best,
+  __attribute__((noinline)) bool search(std::uint64_t node, float begin, float end, const KdRay& planes, const Ray& ray,
+                                        typename Leaves::RayData& data, NearestHit& best,
                                         typename Counting::Depth depth) {
-    return search_kdtree<AnyHit>(base_, node, begin, end, planes, single_stack_.data(), ray, leaves_, data, best, form_, counting_, depth);
+    return search_kdtree<AnyHit>(base_, node, begin, end, planes, single_stack_.data(), ray, leaves_, data, best, form_,
+                                 counting_, depth);
   }
 
   /// A node visit of a packet counts as one of each of its rays.
-  void count([[maybe_unused]] Mask mask, [[maybe_unused]] Mask near, [[maybe_unused]] Mask far, [[maybe_unused]] typename Counting::Depth depth) const {
+  void count([[maybe_unused]] Mask mask, [[maybe_unused]] Mask near, [[maybe_unused]] Mask far,
+             [[maybe_unused]] typename Counting::Depth depth) const {
     if constexpr (Counting::kCounting) {
       counting_.at_depth(depth, Base::rays_of_packet_, unsigned(__builtin_popcountll(mask)));
       for (; mask; mask &= mask - 1) {
@@ -287,7 +307,9 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   }
 
   /// A node's pair of children, or a leaf's blocks.
-  ARBORETUM_INLINE const std::byte* place_of(std::uint64_t node) const { return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4; }
+  ARBORETUM_INLINE const std::byte* place_of(std::uint64_t node) const {
+    return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
+  }
   ARBORETUM_INLINE void prefetch(std::uint64_t node) const {
     const auto* at = reinterpret_cast<const char*>(place_of(node));
     for (int line = 0; line < 4; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
@@ -311,9 +333,10 @@ struct KdPacketFamily {
 };
 
 /// What the wider packets have compiled in: one leaf, since each costs a unit seconds to compile.
-using KdPacketLeaves = std::conditional_t<
-    kRegisterWidth == 1, TypeList<>,
-    std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>>, TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>>>>;
+using KdPacketLeaves =
+    std::conditional_t<kRegisterWidth == 1, TypeList<>,
+                       std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>>,
+                                          TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>>>>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

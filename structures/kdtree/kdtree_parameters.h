@@ -9,8 +9,10 @@
 
 namespace arboretum::kdtree {
 
-[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<KdTree>, std::string_view builder) {
-  std::vector<std::string_view> names{"traversal_cost", "intersection_cost", "max_leaf_blocks", "empty_bonus", "max_depth"};
+[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<KdTree>,
+                                                                      std::string_view builder) {
+  std::vector<std::string_view> names{"traversal_cost", "intersection_cost", "max_leaf_blocks", "empty_bonus",
+                                      "max_depth"};
   if (builder == "binned_sah") names.push_back("bins");
   return names;
 }

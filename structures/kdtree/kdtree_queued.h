@@ -1,9 +1,10 @@
 // Many rays in flight through a kd-tree (traversal/queued_rays.h).
 //
-// A ray's next cell is the top of its stack. A step takes it, writes the far side and on top of it the near side, and moves the top by
-// those that the ray meets, so that it has no branch whatever the ray does: near, far, both or neither. Cells beyond a new hit leave
-// the stack when it is found; what is pushed later begins before it ends, and no cell ends beyond the nearest hit, so the steps
-// compare nothing with it and yet visit just the cells of kdtree_single.h.
+// A ray's next cell is the top of its stack. A step takes it, writes the far side and on top of it the near side, and
+// moves the top by those that the ray meets, so that it has no branch whatever the ray does: near, far, both or
+// neither. Cells beyond a new hit leave the stack when it is found; what is pushed later begins before it ends, and no
+// cell ends beyond the nearest hit, so the steps compare nothing with it and yet visit just the cells of
+// kdtree_single.h.
 #pragma once
 
 #include "structures/kdtree/kdtree_single.h"
@@ -25,12 +26,14 @@ class KdQueuedWalk {
     typename Leaves::RayData data;
   };
 
-  KdQueuedWalk(const Accel& accel, const KernelRow& row) : KdQueuedWalk(static_cast<const kdtree::KdTree&>(accel), row) {}
+  KdQueuedWalk(const Accel& accel, const KernelRow& row)
+      : KdQueuedWalk(static_cast<const kdtree::KdTree&>(accel), row) {}
 
   std::size_t stack_entries() const { return stack_entries_; }
 
   ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
-    State& s = *new (state) State{KdRay(ray, max_coordinate_, pad_), stack + 1, ray.tnear, NearestHit{ray.tfar}, leaves_.prepare(ray)};
+    State& s = *new (state) State{KdRay(ray, max_coordinate_, pad_), stack + 1, ray.tnear, NearestHit{ray.tfar},
+                                  leaves_.prepare(ray)};
     stack[0] = {kdtree::kEmptyCell, 0.0f, 0.0f};
     float begin = ray.tnear, end = ray.tfar;
     s.planes.clip(bounds_, begin, end);
@@ -91,11 +94,14 @@ class KdQueuedWalk {
 
  private:
   KdQueuedWalk(const kdtree::KdTree& tree, const KernelRow& row)
-      : base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()), max_coordinate_(tree.max_coordinate()),
-        pad_(row.box == "padded" ? KdRay::kPad : 0.0f), leaves_(row, tree.vertices()), stack_entries_(tree.stack_entries() + 2) {}
+      : base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()),
+        max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f),
+        leaves_(row, tree.vertices()), stack_entries_(tree.stack_entries() + 2) {}
 
   /// A node's pair of children, or a leaf's blocks.
-  ARBORETUM_INLINE const std::byte* place_of(Target node) const { return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4; }
+  ARBORETUM_INLINE const std::byte* place_of(Target node) const {
+    return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
+  }
 
   const std::byte* base_;
   std::uint64_t root_;

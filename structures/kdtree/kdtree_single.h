@@ -1,19 +1,21 @@
 // One ray through a kd-tree, front to back; closest hit and any hit.
 //
-// A cell's interval of t is what its planes leave of the ray. A plane at s on an axis with origin o and direction d is met at
-// t = (s - o) / d, computed as s * r - o * r. Padded, the side that the ray comes from ends at t + e and the other begins at t - e,
-// with e = 2^-21 (M + |o|)|r|, M the scene's largest |coordinate|; traversal/box_test.h proves for boxes that this covers the rounding of
-// r, o * r and t, fused or not (unfused, s * r rounds by another u M |r|: 5 u in all, still under e). So no cell is missed that the exact ray touches, neither
-// cells without thickness nor neighbours across a plane that the ray lies in: a component below 2^-60 of the largest gets
-// r = 2^60 / |d|max, and where the origin is within the pad of such a plane both sides are visited. Rays with such a component
-// get this pad for it with `fast`, too; otherwise `fast` pads nothing and keeps no promise. The two differ in constants, not in code.
-// An axis whose constants overflow is left out: both sides of its planes are visited. So they are where a t is NaN, by the way comparisons are written.
+// A cell's interval of t is what its planes leave of the ray. A plane at s on an axis with origin o and direction d is
+// met at t = (s - o) / d, computed as s * r - o * r. Padded, the side that the ray comes from ends at t + e and the
+// other begins at t - e, with e = 2^-21 (M + |o|)|r|, M the scene's largest |coordinate|; traversal/box_test.h proves
+// for boxes that this covers the rounding of r, o * r and t, fused or not (unfused, s * r rounds by another u M |r|: 5
+// u in all, still under e). So no cell is missed that the exact ray touches, neither cells without thickness nor
+// neighbours across a plane that the ray lies in: a component below 2^-60 of the largest gets r = 2^60 / |d|max, and
+// where the origin is within the pad of such a plane both sides are visited. Rays with such a component get this pad
+// for it with `fast`, too; otherwise `fast` pads nothing and keeps no promise. The two differ in constants, not in
+// code. An axis whose constants overflow is left out: both sides of its planes are visited. So they are where a t is
+// NaN, by the way comparisons are written.
 //
-// A hit counts wherever it lies on the ray, in its cell or beyond. A cell is left out only when it begins, rounded down, beyond the
-// nearest hit: one that begins at an equal t may hold the triangle with the lower id.
+// A hit counts wherever it lies on the ray, in its cell or beyond. A cell is left out only when it begins, rounded
+// down, beyond the nearest hit: one that begins at an equal t may hold the triangle with the lower id.
 //
-// A step has no branch but the one that leaves the loop at a leaf: both children are loaded while t is computed, and the
-// one that is not taken is written to the stack whether it stays there or not.
+// A step has no branch but the one that leaves the loop at a leaf: both children are loaded while t is computed, and
+// the one that is not taken is written to the stack whether it stays there or not.
 #pragma once
 
 #include "traversal/batch_stack.h"
@@ -36,11 +38,13 @@ struct KdRay {
   static constexpr float kPad = 0x1p-21f;
   static constexpr float kAllOfT = std::numeric_limits<float>::max();
 
-  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component| of the ray's direction and origin; `pad`: kPad, or 0 for `fast` planes. Returns
-  /// the lanes whose axis counts: where constants may have overflown, or a parallel ray comes from so far that its pad is less than t (traversal/box_test.h), it is left out, with a
-  /// reciprocal of 1 and constants by which every plane is met at all t.
+  /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component|
+  /// of the ray's direction and origin; `pad`: kPad, or 0 for `fast` planes. Returns the lanes whose axis counts: where
+  /// constants may have overflown, or a parallel ray comes from so far that its pad is less than t
+  /// (traversal/box_test.h), it is left out, with a reciprocal of 1 and constants by which every plane is met at all t.
   template <class F, class Origin>
-  static ARBORETUM_INLINE auto constants(F o, F d, F largest, const Origin& origin, float max_coordinate, float pad, F& r, F& enter, F& leave) {
+  static ARBORETUM_INLINE auto constants(F o, F d, F largest, const Origin& origin, float max_coordinate, float pad,
+                                         F& r, F& enter, F& leave) {
     r = F(1.0f) / d;
     F share(pad), least(pad * 0x1p-79f);
     // Branches, rarely taken: no division waits for `largest`.
@@ -49,7 +53,8 @@ struct KdRay {
       r = select(parallel, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
       share = select(parallel, F(kPad), share), least = select(parallel, F(0x1p-100f), least);
     }
-    // In this order, since a share of a tiny scene may be nothing. Where the product overflows the axis is left out, as below.
+    // In this order, since a share of a tiny scene may be nothing. Where the product overflows the axis is left out, as
+    // below.
     const F at = o * r;
     F e = share * ((F(max_coordinate) + abs(o)) * abs(r)) + least;
     if (__builtin_expect(any(parallel), 0)) e = pad_or_leave_out(e, parallel, F(max_coordinate), origin(), largest);
@@ -66,7 +71,9 @@ struct KdRay {
   ARBORETUM_INLINE KdRay(const Ray& ray, float max_coordinate, float pad) {
     using F = vf<4>;  // the axes stand in lanes
     F rs, in, out;
-    constants(F::load(&ray.origin), F::load(&ray.direction), F(largest_component(ray.direction)), [&] { return F(largest_component(ray.origin)); }, max_coordinate, pad, rs, in, out);
+    constants(
+        F::load(&ray.origin), F::load(&ray.direction), F(largest_component(ray.direction)),
+        [&] { return F(largest_component(ray.origin)); }, max_coordinate, pad, rs, in, out);
     rs.store(r), in.store(enter), out.store(leave);
     const unsigned negative = sign_mask(rs);
     for (unsigned k = 0; k < 3; ++k) far[k] = negative >> k & 1u ? 0u : 8u;
@@ -94,11 +101,13 @@ struct KdRay {
   ARBORETUM_INLINE float leaving(float plane, unsigned axis) const { return fused(plane, r[axis], leave[axis]); }
 };
 
-/// One ray from `node` on, within [begin, end] of it; what `leaves` keep for it is `data`. Returns whether an any hit was found; a closest hit
-/// updates `best`. `depth`: of the node, where it is counted.
+/// One ray from `node` on, within [begin, end] of it; what `leaves` keep for it is `data`. Returns whether an any hit
+/// was found; a closest hit updates `best`. `depth`: of the node, where it is counted.
 template <bool AnyHit, class Leaves, class Counting>
-ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t node, float begin, float end, const KdRay& planes, KdStackEntry* const stack, const Ray& ray,
-                                    const Leaves& leaves, typename Leaves::RayData& data, NearestHit& best, const LeafForm& form, const Counting& counting,
+ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t node, float begin, float end,
+                                    const KdRay& planes, KdStackEntry* const stack, const Ray& ray,
+                                    const Leaves& leaves, typename Leaves::RayData& data, NearestHit& best,
+                                    const LeafForm& form, const Counting& counting,
                                     typename Counting::Depth depth = {}) {
   KdStackEntry* top = stack;
   typename Counting::Depths depths(depth);
@@ -113,7 +122,8 @@ ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t n
       std::uint64_t near, far;
       std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
       const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
-      const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell), skip_far = (enter > end) | (far == kdtree::kEmptyCell);
+      const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell),
+                 skip_far = (enter > end) | (far == kdtree::kEmptyCell);
       // A plane decides about two cells; a lane each.
       counting.node(2, 2, 2u - skip_near - skip_far);
       counting.at_depth(depths.current(), 2, 2);
@@ -156,7 +166,8 @@ using KdStack = BatchStack<KdStackEntry, 80>;
 template <class Leaves, class Counting>
 class KdSingle {
  public:
-  KdSingle(const Accel& accel, const KernelRow& row, Counting counting) : KdSingle(static_cast<const kdtree::KdTree&>(accel), row, counting) {}
+  KdSingle(const Accel& accel, const KernelRow& row, Counting counting)
+      : KdSingle(static_cast<const kdtree::KdTree&>(accel), row, counting) {}
 
   template <bool AnyHit>
   ARBORETUM_INLINE bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
@@ -164,16 +175,17 @@ class KdSingle {
     const KdRay planes(ray, max_coordinate_, pad_);
     float begin = ray.tnear, end = best.t;
     planes.clip(bounds_, begin, end);
-    const bool hit = !(begin > end) && search_kdtree<AnyHit>(base_, root_, begin, end, planes, stack_.data(), ray, leaves_, data, best, form_, counting_);
+    const bool hit = !(begin > end) && search_kdtree<AnyHit>(base_, root_, begin, end, planes, stack_.data(), ray,
+                                                             leaves_, data, best, form_, counting_);
     if constexpr (!AnyHit) leaves_.finish(data, best);
     return hit;
   }
 
  private:
   KdSingle(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
-      : base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()), max_coordinate_(tree.max_coordinate()),
-        pad_(row.box == "padded" ? KdRay::kPad : 0.0f), leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting),
-        stack_(tree.stack_entries()) {}
+      : base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()),
+        max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f),
+        leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), stack_(tree.stack_entries()) {}
 
   const std::byte* base_;
   std::uint64_t root_;

@@ -18,8 +18,8 @@ namespace {
 
 }  // namespace
 
-void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell, Bounds3f& left,
-                      Bounds3f& right) noexcept {
+void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell,
+                      Bounds3f& left, Bounds3f& right) noexcept {
   const std::size_t axis = std::size_t(split.axis);
   Bounds3f left_half = reference.box, right_half = reference.box;
   left_half.upper[axis] = right_half.lower[axis] = split.plane;

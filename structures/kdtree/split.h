@@ -11,7 +11,8 @@
 
 namespace arboretum::kdtree {
 
-/// A triangle's part in a cell: the bounds of that part and the triangle's id. A triangle has one reference in a cell at most.
+/// A triangle's part in a cell: the bounds of that part and the triangle's id. A triangle has one reference in a cell
+/// at most.
 struct Reference {
   Bounds3f box;
   std::uint32_t id;
@@ -47,19 +48,20 @@ enum class Side : std::uint8_t { left, right, both };
   return split.flat_left ? Side::left : Side::right;
 }
 
-/// Parts a reference of a cell that the plane cuts. A side that the triangle does not reach gets an empty box, but never both of them:
-/// where rounding says so, both keep the reference's own box, cut at the plane.
-void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell, Bounds3f& left,
-                      Bounds3f& right) noexcept;
+/// Parts a reference of a cell that the plane cuts. A side that the triangle does not reach gets an empty box, but
+/// never both of them: where rounding says so, both keep the reference's own box, cut at the plane.
+void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell,
+                      Bounds3f& left, Bounds3f& right) noexcept;
 
 inline constexpr std::size_t kChunk = 1u << 13;  ///< references that a task takes at a time, within one cell
 
-/// Surface area heuristic (Wald and Havran 2006, section 2.2) for leaves of blocks: n references take n / width block tests, one
-/// at least. Costs are in block tests; a step through a plane is a fixed part of a box node's.
+/// Surface area heuristic (Wald and Havran 2006, section 2.2) for leaves of blocks: n references take n / width block
+/// tests, one at least. Costs are in block tests; a step through a plane is a fixed part of a box node's.
 struct CostModel {
   double step, block, keep;  ///< keep: factor for a split that leaves one side empty
   double per_block;          ///< 1 / width
-  unsigned width, max_leaf;  ///< triangles in a block; references above which planes are tried even where they seem not to pay
+  /// triangles in a block; references above which planes are tried even where they seem not to pay
+  unsigned width, max_leaf;
 
   CostModel(const BuilderParameters& p, unsigned leaf_width) noexcept
       : step(p.traversal_cost), block(p.intersection_cost), keep(1.0 - p.empty_bonus), per_block(1.0 / leaf_width),
@@ -91,7 +93,8 @@ class AxisCost {
   [[nodiscard]] double share_left(double plane) const noexcept { return (face_ + rim_ * (plane - low_)) * inverse_; }
   [[nodiscard]] double share_right(double plane) const noexcept { return (face_ + rim_ * (high_ - plane)) * inverse_; }
 
-  /// Takes the plane into `best` if it lies inside the cell and costs less, `left` and `right` references being on its sides.
+  /// Takes the plane into `best` if it lies inside the cell and costs less, `left` and `right` references being on its
+  /// sides.
   void consider(float plane, std::size_t left, std::size_t right, bool flat_left, Split& best) const noexcept {
     if (!(plane > low_ && plane < high_)) return;
     double cost = share_left(plane) * model_.blocks(left) + share_right(plane) * model_.blocks(right);

@@ -1,6 +1,6 @@
-// Exact-sweep SAH in O(n log n) (Wald and Havran 2006, section 4.3): every bound of every reference is a plane to try. The bounds
-// are sorted once for each axis; a split filters the sorted lists, and only the references that it cuts bring new bounds,
-// which are few: they are sorted and merged in.
+// Exact-sweep SAH in O(n log n) (Wald and Havran 2006, section 4.3): every bound of every reference is a plane to try.
+// The bounds are sorted once for each axis; a split filters the sorted lists, and only the references that it cuts
+// bring new bounds, which are few: they are sorted and merged in.
 #include <algorithm>
 
 #include <tbb/parallel_for.h>
@@ -12,7 +12,8 @@
 namespace arboretum::kdtree {
 namespace {
 
-/// A bound: where it is, of which of the cell's references, and what it is. At one place ends come before flat boxes, these before begins.
+/// A bound: where it is, of which of the cell's references, and what it is. At one place ends come before flat boxes,
+/// these before begins.
 struct Event {
   float at;
   std::uint32_t code;  ///< kind << 30 | reference
@@ -23,7 +24,9 @@ struct Event {
 };
 static_assert(sizeof(Event) == 8);
 /// Total but for equal events: no sort can give two results. -0 and 0 are one place.
-[[nodiscard]] bool operator<(const Event& a, const Event& b) noexcept { return a.at < b.at || (a.at == b.at && a.code < b.code); }
+[[nodiscard]] bool operator<(const Event& a, const Event& b) noexcept {
+  return a.at < b.at || (a.at == b.at && a.code < b.code);
+}
 
 using Events = MeteredVector<Event>;
 
@@ -74,8 +77,7 @@ class Sweep {
     return split;
   }
 
-  void divide(State& state, const Split& split, const Bounds3f& cell, State& left, State& right,
-              bool parallel) const {
+  void divide(State& state, const Split& split, const Bounds3f& cell, State& left, State& right, bool parallel) const {
     const References& in = state.references;
     const std::size_t n = in.size();
     left.references.clear(), right.references.clear();
@@ -102,7 +104,8 @@ class Sweep {
     for (std::size_t c = 0; c < chunks; ++c) {
       auto next_cut = cut[c].begin();
       for (std::size_t i = c * per_chunk, end = std::min(n, i + per_chunk); i < end; ++i) {
-        state.to_left[i] = std::uint32_t(left.references.size()), state.to_right[i] = std::uint32_t(right.references.size());
+        state.to_left[i] = std::uint32_t(left.references.size()),
+        state.to_right[i] = std::uint32_t(right.references.size());
         switch (Side(state.sides[i])) {
           case Side::left: left.references.push_back(in[i]); break;
           case Side::right: right.references.push_back(in[i]); break;
@@ -148,10 +151,11 @@ class Sweep {
     return best;
   }
 
-  /// The events of one side along one axis: those of references that the plane does not cut, in their order, merged with the
-  /// new ones.
+  /// The events of one side along one axis: those of references that the plane does not cut, in their order, merged
+  /// with the new ones.
   static void filter(const Events& events, const State& state, Side side, const std::vector<std::uint32_t>& index,
-                     const std::vector<std::uint32_t>& added, const References& references, std::size_t axis, State& to) {
+                     const std::vector<std::uint32_t>& added, const References& references, std::size_t axis,
+                     State& to) {
     Events& out = to.events[axis];
     out.clear();
     out.resize(2 * references.size());
@@ -177,8 +181,8 @@ class Sweep {
 
 }  // namespace
 
-void build_sweep(const TriangleMesh& mesh, const BuilderParameters&, const CostModel& model, const Limits& limits, const Bounds3f& cell,
-                 Part& out, BuildReport& report) {
+void build_sweep(const TriangleMesh& mesh, const BuilderParameters&, const CostModel& model, const Limits& limits,
+                 const Bounds3f& cell, Part& out, BuildReport& report) {
   PhaseClock phase(report);
   Sweep::State root;
   root.references = make_references(mesh);

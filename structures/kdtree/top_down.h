@@ -4,12 +4,12 @@
 //   find(state, cell, parallel)                        the cheapest Split, or none;
 //   divide(state, split, cell, left, right, parallel)  the references of its two sides.
 // Large cells are split one after the other with all threads at work inside, and their two sides become tasks; below
-// kOneTask references a task builds a whole subtree. What is decided depends on the references alone, so the tree is the same for
-// any number of threads.
+// kOneTask references a task builds a whole subtree. What is decided depends on the references alone, so the tree is
+// the same for any number of threads.
 //
-// Where a finished subtree costs more than one leaf in its place, it becomes that leaf. A cell with more references than a leaf should
-// hold is split by planes that do not pay at first sight, up to kDoubtful of them in a row (Wald and Havran 2006 stop at
-// once); for smaller cells that gave no better tree on any scene tried.
+// Where a finished subtree costs more than one leaf in its place, it becomes that leaf. A cell with more references
+// than a leaf should hold is split by planes that do not pay at first sight, up to kDoubtful of them in a row (Wald and
+// Havran 2006 stop at once); for smaller cells that gave no better tree on any scene tried.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,8 @@
 
 namespace arboretum::kdtree {
 
-/// A node of a Part: a leaf has axis 3, and `first` and `count` name its ids; else its children are nodes first, first + 1.
+/// A node of a Part: a leaf has axis 3, and `first` and `count` name its ids; else its children are nodes first, first
+/// + 1.
 struct BuildNode {
   float plane;
   std::uint32_t axis, first, count;
@@ -48,9 +49,12 @@ class TopDown {
  public:
   using State = typename Method::State;
 
-  TopDown(const Method& method, const CostModel& model, const Limits& limits) : method_(method), model_(model), limits_(limits) {}
+  TopDown(const Method& method, const CostModel& model, const Limits& limits)
+      : method_(method), model_(model), limits_(limits) {}
 
-  void build(State&& root, const Bounds3f& cell, Part& out) const { large(std::move(root), {cell, limits_.references, 0, 0}, out); }
+  void build(State&& root, const Bounds3f& cell, Part& out) const {
+    large(std::move(root), {cell, limits_.references, 0, 0}, out);
+  }
 
  private:
   static constexpr std::size_t kOneTask = 1u << 12;  ///< smaller subtrees are built by one task
@@ -100,7 +104,8 @@ class TopDown {
     { State done = std::move(state); }
     out.axis = split.axis, out.plane = split.plane;
     out.child[0] = std::make_unique<Part>(), out.child[1] = std::make_unique<Part>();
-    tbb::parallel_invoke([&] { large(std::move(left), l, *out.child[0]); }, [&] { large(std::move(right), r, *out.child[1]); });
+    tbb::parallel_invoke([&] { large(std::move(left), l, *out.child[0]); },
+                         [&] { large(std::move(right), r, *out.child[1]); });
   }
 
   /// Builds one part, sequentially. States are used again, one pair for each level.

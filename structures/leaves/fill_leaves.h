@@ -1,5 +1,5 @@
-// Filling blocks of edges or vertices four triangles at a time: the same blocks as fill_blocks(), bit for bit. Written once for all
-// instruction sets: SSE2 is in every x86-64.
+// Filling blocks of edges or vertices four triangles at a time: the same blocks as fill_blocks(), bit for bit. Written
+// once for all instruction sets: SSE2 is in every x86-64.
 #pragma once
 
 #include <emmintrin.h>
@@ -13,10 +13,12 @@ template <class Block>
 inline constexpr bool kFillsByFours =
     (Block::kForm == TriangleForm::edges || Block::kForm == TriangleForm::vertices) && Block::kWidth % 4 == 0;
 
-/// Lanes whose points are clearly not collinear in the plane. In float, so fewer than clearly_not_collinear() finds: the same bound for
-/// this precision, and what products lose by underflow. NaN and overflow count as not clear.
-[[nodiscard]] inline __m128 clearly_not_collinear(__m128 ax, __m128 ay, __m128 bx, __m128 by, __m128 cx, __m128 cy) noexcept {
-  const __m128 left = _mm_mul_ps(_mm_sub_ps(bx, ax), _mm_sub_ps(cy, ay)), right = _mm_mul_ps(_mm_sub_ps(by, ay), _mm_sub_ps(cx, ax));
+/// Lanes whose points are clearly not collinear in the plane. In float, so fewer than clearly_not_collinear() finds:
+/// the same bound for this precision, and what products lose by underflow. NaN and overflow count as not clear.
+[[nodiscard]] inline __m128 clearly_not_collinear(__m128 ax, __m128 ay, __m128 bx, __m128 by, __m128 cx,
+                                                  __m128 cy) noexcept {
+  const __m128 left = _mm_mul_ps(_mm_sub_ps(bx, ax), _mm_sub_ps(cy, ay)),
+               right = _mm_mul_ps(_mm_sub_ps(by, ay), _mm_sub_ps(cx, ax));
   const __m128 magnitude = _mm_castsi128_ps(_mm_set1_epi32(0x7fffffff));
   const __m128 sum = _mm_add_ps(_mm_and_ps(left, magnitude), _mm_and_ps(right, magnitude));
   const __m128 bound = _mm_add_ps(_mm_mul_ps(sum, _mm_set1_ps(8.0f * 0x1p-24f)), _mm_set1_ps(0x1p-120f));
@@ -25,7 +27,8 @@ inline constexpr bool kFillsByFours =
 
 /// Lanes [lane, lane + 4) of a block, of which `ids` are triangles.
 template <class Block>
-void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleVertices& vertices, std::span<const std::uint32_t> ids) noexcept {
+void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleVertices& vertices,
+               std::span<const std::uint32_t> ids) noexcept {
   const __m128 none = _mm_set1_ps(std::numeric_limits<float>::quiet_NaN());
   __m128 corner[3][4];
   for (std::size_t i = 0; i < 4; ++i) {
@@ -37,7 +40,8 @@ void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleV
       corner[0][i] = corner[1][i] = corner[2][i] = none;
     }
   }
-  Points4 a(corner[0][0], corner[0][1], corner[0][2], corner[0][3]), b(corner[1][0], corner[1][1], corner[1][2], corner[1][3]),
+  Points4 a(corner[0][0], corner[0][1], corner[0][2], corner[0][3]),
+      b(corner[1][0], corner[1][1], corner[1][2], corner[1][3]),
       c(corner[2][0], corner[2][1], corner[2][2], corner[2][3]);
   // Nearly all triangles are clear in the first projection, walls along an axis in one of the others.
   const int all = (1 << ids.size()) - 1;
@@ -51,9 +55,10 @@ void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleV
       if ((clear >> i & 1) == 0 && has_zero_area(corners[0], corners[1], corners[2])) flat[i] = ~0u;
     }
     const __m128 nan = _mm_load_ps(reinterpret_cast<const float*>(flat));  // all bits set are a NaN
-    for (Points4* p : {&a, &b, &c}) p->x = _mm_or_ps(p->x, nan), p->y = _mm_or_ps(p->y, nan), p->z = _mm_or_ps(p->z, nan);
+    for (Points4* p : {&a, &b, &c})
+      p->x = _mm_or_ps(p->x, nan), p->y = _mm_or_ps(p->y, nan), p->z = _mm_or_ps(p->z, nan);
   }
-  const auto store = [lane](float (&rows)[3][Block::kWidth], __m128 x, __m128 y, __m128 z) {
+  const auto store = [lane](float(&rows)[3][Block::kWidth], __m128 x, __m128 y, __m128 z) {
     _mm_storeu_ps(rows[0] + lane, x), _mm_storeu_ps(rows[1] + lane, y), _mm_storeu_ps(rows[2] + lane, z);
   };
   store(block.v0, a.x, a.y, a.z);

@@ -51,8 +51,7 @@ void LeafStore::fill(const TriangleMesh& mesh, const LeafLists& lists, std::stri
                      std::string_view structure, bool share, LeafCode* codes) {
   leaf_ = leaf, vertices_ = mesh.vertices.data();
   blocks_ = Arena(), long_leaves_.clear();
-  const MeteredVector<std::uint32_t> same_as =
-      share ? find_equal_lists(lists) : MeteredVector<std::uint32_t>();
+  const MeteredVector<std::uint32_t> same_as = share ? find_equal_lists(lists) : MeteredVector<std::uint32_t>();
   const auto original = [&](std::size_t i) { return share ? std::size_t(same_as[i]) : i; };
   const bool known = with_block(leaf, [&]<class Block>(std::type_identity<Block>) {
     std::uint64_t next = 0;

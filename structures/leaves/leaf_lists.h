@@ -45,8 +45,8 @@ class LeafStore {
   /// the same for any number of threads. Throws UserError when there would be 2^28 blocks; `structure` is its
   /// name in the message. Without `share` equal lists get blocks of their own: for structures in which there
   /// are none.
-  void fill(const TriangleMesh& mesh, const LeafLists& lists, std::string_view leaf,
-            std::string_view structure, bool share, LeafCode* codes);
+  void fill(const TriangleMesh& mesh, const LeafLists& lists, std::string_view leaf, std::string_view structure,
+            bool share, LeafCode* codes);
 
   /// Saves or loads (structures/archive.h).
   void archive(Archive& archive);
@@ -56,9 +56,7 @@ class LeafStore {
   [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }
   /// The mesh's vertices, which leaf blocks of indices name.
   [[nodiscard]] const Vec3f* vertices() const noexcept { return vertices_; }
-  [[nodiscard]] std::size_t bytes() const noexcept {
-    return blocks_.bytes() + long_leaves_.size() * sizeof(LongLeaf);
-  }
+  [[nodiscard]] std::size_t bytes() const noexcept { return blocks_.bytes() + long_leaves_.size() * sizeof(LongLeaf); }
   /// The blocks of a code that is neither empty nor kNoLeaf.
   [[nodiscard]] LongLeaf range(LeafCode code) const noexcept {
     const LeafCode count = code & kLeafCountMask;

@@ -1,4 +1,5 @@
-// What packets through structures with shared leaves (leaf_lists.h) have in common: leaves by their code, and rays that go on alone.
+// What packets through structures with shared leaves (leaf_lists.h) have in common: leaves by their code, and rays that
+// go on alone.
 #pragma once
 
 #include "structures/leaves/leaf_lists.h"
@@ -16,7 +17,8 @@ class ListedPacketLeaves : protected PacketLeaves<W, Leaves, AnyHit, Counting, R
   using typename Base::Mask;
 
  protected:
-  ListedPacketLeaves(const KernelRow& row, const LeafStore& store, Counting counting) : Base(row, store.vertices(), counting), store_(store) {}
+  ListedPacketLeaves(const KernelRow& row, const LeafStore& store, Counting counting)
+      : Base(row, store.vertices(), counting), store_(store) {}
 
   void leaf(LeafCode code, Mask mask) {
     const LongLeaf range = store_.range(code);
@@ -40,7 +42,9 @@ class ListedPacketLeaves : protected PacketLeaves<W, Leaves, AnyHit, Counting, R
   }
 
  private:
-  ARBORETUM_INLINE const std::byte* blocks_of(LongLeaf range) const { return store_.blocks() + range.first * Base::leaves_.block_bytes(); }
+  ARBORETUM_INLINE const std::byte* blocks_of(LongLeaf range) const {
+    return store_.blocks() + range.first * Base::leaves_.block_bytes();
+  }
 
   const LeafStore& store_;
 };

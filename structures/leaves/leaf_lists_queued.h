@@ -1,5 +1,5 @@
-// What rays in flight (traversal/queued_rays.h) through structures with shared leaves (leaf_lists.h) have in common: the tree, leaves by their code, and
-// targets that are a node's number, a leaf's code or the end.
+// What rays in flight (traversal/queued_rays.h) through structures with shared leaves (leaf_lists.h) have in common:
+// the tree, leaves by their code, and targets that are a node's number, a leaf's code or the end.
 #pragma once
 
 #include "structures/leaves/leaf_lists.h"
@@ -32,7 +32,8 @@ class ListedQueuedWalk {
 
  protected:
   ListedQueuedWalk(const Accel& accel, const KernelRow& row)
-      : tree_(static_cast<const Tree&>(accel)), store_(tree_.leaves()), leaves_(row, store_.vertices()), padded_(row.box == "padded") {}
+      : tree_(static_cast<const Tree&>(accel)), store_(tree_.leaves()), leaves_(row, store_.vertices()),
+        padded_(row.box == "padded") {}
 
   /// A ray's constants, made of those for N boxes.
   template <class Constants, int N>
@@ -47,7 +48,8 @@ class ListedQueuedWalk {
     for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
   }
 
-  /// Returns whether the search ends: any hit has its answer. `State` has tnear beside what traversal/queued_rays.h asks for.
+  /// Returns whether the search ends: any hit has its answer. `State` has tnear beside what traversal/queued_rays.h
+  /// asks for.
   template <class State>
   ARBORETUM_INLINE bool test(State& s, LeafCode code) const {
     const LongLeaf range = store_.range(code);
@@ -60,7 +62,9 @@ class ListedQueuedWalk {
     return false;
   }
 
-  ARBORETUM_INLINE const std::byte* blocks_of(LongLeaf range) const { return store_.blocks() + range.first * leaves_.block_bytes(); }
+  ARBORETUM_INLINE const std::byte* blocks_of(LongLeaf range) const {
+    return store_.blocks() + range.first * leaves_.block_bytes();
+  }
 
   const Tree& tree_;
   const LeafStore& store_;

@@ -18,9 +18,10 @@ const StructureInfo& Octree::static_info() {
     i.name = kName;
     i.summary = "sparse octree, children in the order of the ray's octant";
     i.builders = {"octants"};
-    for_each_type(AllBlocks{},
-                  [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
-    i.no_streams = "not built: a stream reads the children's boxes from the node; here they come from the node's place in the cube, which a stream's stack (a node and a mask of its rays) does not hold";
+    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.no_streams =
+        "not built: a stream reads the children's boxes from the node; here they come from the node's place in the "
+        "cube, which a stream's stack (a node and a mask of its rays) does not hold";
     return i;
   }();
   return info;
@@ -29,8 +30,8 @@ const StructureInfo& Octree::static_info() {
 void Octree::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
   if (p.max_depth > kMostLevels) {
-    throw UserError("max_depth: " + std::to_string(p.max_depth) + " is not within 0 .. " +
-                    std::to_string(kMostLevels) + " for octree");
+    throw UserError("max_depth: " + std::to_string(p.max_depth) + " is not within 0 .. " + std::to_string(kMostLevels) +
+                    " for octree");
   }
   if (mesh.size() >= (1u << 30)) throw UserError("octree takes at most 2^30 - 1 triangles");
   Tree tree;

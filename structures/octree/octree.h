@@ -52,9 +52,7 @@ class Octree final : public Accel {
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
   void archive(Archive& archive) override;
-  [[nodiscard]] std::size_t bytes() const noexcept override {
-    return nodes_.size() * sizeof(Node) + leaves_.bytes();
-  }
+  [[nodiscard]] std::size_t bytes() const noexcept override { return nodes_.size() * sizeof(Node) + leaves_.bytes(); }
 
   [[nodiscard]] const Node* nodes() const noexcept { return nodes_.data(); }  ///< the root first
   [[nodiscard]] const Cube& cube() const noexcept { return cube_; }

@@ -30,11 +30,7 @@ class Grower {
  public:
   Grower(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, unsigned depth,
          const Cube& cube, float max_coordinate)
-      : mesh_(mesh),
-        parameters_(parameters),
-        width_(leaf_width),
-        depth_(depth),
-        cube_(cube),
+      : mesh_(mesh), parameters_(parameters), width_(leaf_width), depth_(depth), cube_(cube),
         slack_(0x1p-40 * max_coordinate + 0x1p-120) {}
 
   /// Appends the subtree of a cell with these triangles; it may hold `budget` references. Cost is that of a
@@ -55,8 +51,7 @@ class Grower {
     double below = 0;  // a child's faces have a quarter of the cell's area
     const auto child = [&](unsigned c, Subtree& into) {
       const double share = budget * double(children[c].size()) / references;
-      grow(children[c], level + 1, {2 * at[0] + (c & 1), 2 * at[1] + (c >> 1 & 1), 2 * at[2] + (c >> 2)},
-           share, into);
+      grow(children[c], level + 1, {2 * at[0] + (c & 1), 2 * at[1] + (c >> 1 & 1), 2 * at[2] + (c >> 2)}, share, into);
       Ids().swap(children[c]);
     };
     if (ids.size() > kParallel) {
@@ -95,8 +90,7 @@ class Grower {
     for (std::size_t a = 0; a < 3; ++a) {
       for (unsigned i = 0; i < 3; ++i) face[a][i] = cube_.face(a, level + 1, 2 * at[a] + i);
       for (unsigned i = 0; i < 2; ++i)
-        center[a][i] = 0.5 * (face[a][i] + face[a][i + 1]),
-        half[a][i] = 0.5 * (face[a][i + 1] - face[a][i]) + slack_;
+        center[a][i] = 0.5 * (face[a][i] + face[a][i + 1]), half[a][i] = 0.5 * (face[a][i + 1] - face[a][i]) + slack_;
     }
     for (std::uint32_t id : ids) {
       const auto corners = mesh_.corners(id);
@@ -106,8 +100,7 @@ class Grower {
                     high = std::max({corners[0][a], corners[1][a], corners[2][a]});
         sides[a] = unsigned(low <= face[a][1] + slack_) | unsigned(high >= face[a][1] - slack_) << 1;
       }
-      const unsigned count =
-          unsigned(std::popcount(sides[0]) * std::popcount(sides[1]) * std::popcount(sides[2]));
+      const unsigned count = unsigned(std::popcount(sides[0]) * std::popcount(sides[1]) * std::popcount(sides[2]));
       const auto is_candidate = [&](unsigned c) {
         return (sides[0] >> (c & 1) & sides[1] >> (c >> 1 & 1) & sides[2] >> (c >> 2) & 1) != 0;
       };
@@ -120,8 +113,8 @@ class Grower {
       bool any = false;
       for (unsigned c = 0; c < 8; ++c) {
         const unsigned x = c & 1, y = c >> 1 & 1, z = c >> 2;
-        if (is_candidate(c) && triangle.touches({center[0][x], center[1][y], center[2][z]},
-                                                {half[0][x], half[1][y], half[2][z]})) {
+        if (is_candidate(c) &&
+            triangle.touches({center[0][x], center[1][y], center[2][z]}, {half[0][x], half[1][y], half[2][z]})) {
           children[c].push_back(id), any = true;
         }
       }
@@ -170,8 +163,8 @@ class Layout {
 
 }  // namespace
 
-void build_tree(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
-                Tree& tree, BuildReport& report) {
+void build_tree(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, Tree& tree,
+                BuildReport& report) {
   PhaseClock phase(report);
   const Bounds3f bounds = mesh.bounds();
   const float largest = largest_coordinate(bounds);

@@ -14,7 +14,7 @@ struct Tree {
 };
 
 /// For a mesh that is not empty. Parallel in the caller's TBB arena, the same for any number of threads.
-void build_tree(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
-                Tree& tree, BuildReport& report);
+void build_tree(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, Tree& tree,
+                BuildReport& report);
 
 }  // namespace arboretum::octree

@@ -16,10 +16,12 @@ struct OctreeSingle {
   using Scratch = NoScratch;
 
   template <bool AnyHit, class Visits>
-  static ARBORETUM_INLINE bool trace(const octree::Octree& tree, const Ray& ray, NearestHit& best, const Counting& counting, Scratch&, Visits& visits) {
+  static ARBORETUM_INLINE bool trace(const octree::Octree& tree, const Ray& ray, NearestHit& best,
+                                     const Counting& counting, Scratch&, Visits& visits) {
     const OctreeRay box(BoxRay<8, Padded>(ray, tree.max_coordinate()));
     LeafCode last = kEmptyLeaf;
-    return search_octree<AnyHit>(tree, box, {{0, 0, 0, 0}, tree.nodes()[0], 0}, ray.tnear, best, last, counting, visits);
+    return search_octree<AnyHit>(tree, box, {{0, 0, 0, 0}, tree.nodes()[0], 0}, ray.tnear, best, last, counting,
+                                 visits);
   }
 };
 
@@ -28,7 +30,8 @@ inline void add_kernels(std::type_identity<octree::Octree>, KernelRows& rows) {
   Single::add(rows);
   add_queued_rows<octree::Octree, OctreeQueued, Single::Functions>(rows, TypeList<>{});
   add_packet_rows<octree::Octree, OctreePacketFamily>(rows, TypeList<>{});
-  add_rows<octree::Octree, AutoFunctions<OctreePacketFamily, TypeList<>, Single::Functions>>(rows, "auto", TypeList<>{});
+  add_rows<octree::Octree, AutoFunctions<OctreePacketFamily, TypeList<>, Single::Functions>>(rows, "auto",
+                                                                                             TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

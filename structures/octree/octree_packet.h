@@ -1,11 +1,12 @@
 // Packets: up to 64 rays go through an octree together, with a mask of those that are in a cell.
 //
-// Rays that share an octant share the order of children (octree_single.h), and so one traversal; a packet of mixed signs is one masked traversal an octant.
-// The three planes of an axis are the same for all rays of a cell: each ray meets them in a lane, and then each child is three selections and a comparison. A child waits
-// on the stack with its rays; where no more than `threshold` are left in a cell they go on alone.
+// Rays that share an octant share the order of children (octree_single.h), and so one traversal; a packet of mixed
+// signs is one masked traversal an octant. The three planes of an axis are the same for all rays of a cell: each ray
+// meets them in a lane, and then each child is three selections and a comparison. A child waits on the stack with its
+// rays; where no more than `threshold` are left in a cell they go on alone.
 //
-// A ray's tests are those of octree_single.h, operation by operation, so with `padded` boxes its answer is the same bit for bit: it visits the leaves that it would
-// visit alone, and some that begin beyond its nearest hit.
+// A ray's tests are those of octree_single.h, operation by operation, so with `padded` boxes its answer is the same bit
+// for bit: it visits the leaves that it would visit alone, and some that begin beyond its nearest hit.
 #pragma once
 
 #include "structures/leaves/leaf_lists_packet.h"
@@ -29,7 +30,10 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
   /// Traces `count` rays, 1 to kMost; their hits are then in best().
   void trace(const Ray* rays, int count, int threshold) {
     Base::trace(
-        rays, count, threshold, [&](const auto& ray_at, const auto& each) { lanes_.template prepare<W, 8>(count, ray_at, padded_, BoxPad{tree_.max_coordinate()}, each); },
+        rays, count, threshold,
+        [&](const auto& ray_at, const auto& each) {
+          lanes_.template prepare<W, 8>(count, ray_at, padded_, BoxPad{tree_.max_coordinate()}, each);
+        },
         [&](Mask mask, unsigned octant) { traverse(mask, octant); });
   }
 
@@ -60,7 +64,8 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
       } else if (Base::few(e.mask)) {
         Base::go_on_alone(e.mask, [&](int i, auto& visits) {
           const auto of = [i](const auto& axes) { return Vec3f{axes[0][i], axes[1][i], axes[2][i]}; };
-          return search_octree<AnyHit>(tree_, OctreeRay(of(lanes_.r), of(lanes_.near), of(lanes_.far)), e.cell, rays_[i].tnear, best_[i], last_leaf_[i], counting_, visits);
+          return search_octree<AnyHit>(tree_, OctreeRay(of(lanes_.r), of(lanes_.near), of(lanes_.far)), e.cell,
+                                       rays_[i].tnear, best_[i], last_leaf_[i], counting_, visits);
         });
         if constexpr (!AnyHit) last = Base::farthest(group);
       } else {
@@ -97,8 +102,10 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
     return rays;
   }
 
-  /// The rays of `mask` that are in each of the children that exist, by their number as the rays meet them, and where the first of those enters it.
-  ARBORETUM_INLINE void children(const OctreePlanes& planes, unsigned exist, Mask mask, Mask (&in)[8], float (&first)[8]) const {
+  /// The rays of `mask` that are in each of the children that exist, by their number as the rays meet them, and where
+  /// the first of those enters it.
+  ARBORETUM_INLINE void children(const OctreePlanes& planes, unsigned exist, Mask mask, Mask (&in)[8],
+                                 float (&first)[8]) const {
     [[maybe_unused]] F earliest[8];
     if constexpr (!AnyHit) {
       for (F& f : earliest) f = F(std::numeric_limits<float>::infinity());

@@ -1,7 +1,8 @@
 // Many rays in flight through an octree (traversal/queued_rays.h), by the steps of octree_single.h.
 //
-// A node has no place of its own, it comes with the visit: each ray keeps the cell of its next step, and a target names what of memory that step reads, the
-// cell's children or a leaf's blocks. A leaf that the ray comes from is no step: neighbouring cells may share one.
+// A node has no place of its own, it comes with the visit: each ray keeps the cell of its next step, and a target names
+// what of memory that step reads, the cell's children or a leaf's blocks. A leaf that the ray comes from is no step:
+// neighbouring cells may share one.
 #pragma once
 
 #include "structures/leaves/leaf_lists_queued.h"
@@ -33,7 +34,14 @@ class OctreeQueuedWalk : public ListedQueuedWalk<octree::Octree, Leaves, AnyHit>
   std::size_t stack_entries() const { return kMostOctreeCells; }
 
   ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
-    new (state) State{Base::template constants<OctreeRay, 8>(ray), {{{0, 0, 0, 0}, tree_.nodes()[0], 0}, 0.0f}, stack, stack, ray.tnear, kEmptyLeaf, NearestHit{ray.tfar}, Base::leaves_.prepare(ray)};
+    new (state) State{Base::template constants<OctreeRay, 8>(ray),
+                      {{{0, 0, 0, 0}, tree_.nodes()[0], 0}, 0.0f},
+                      stack,
+                      stack,
+                      ray.tnear,
+                      kEmptyLeaf,
+                      NearestHit{ray.tfar},
+                      Base::leaves_.prepare(ray)};
   }
   ARBORETUM_INLINE Target first(State& s) const { return next(s); }
 
@@ -65,7 +73,9 @@ class OctreeQueuedWalk : public ListedQueuedWalk<octree::Octree, Leaves, AnyHit>
     } while (pop_octree<AnyHit>(s.top, s.stack, s.cell, s.best.t));
     return Base::kEnd;
   }
-  static ARBORETUM_INLINE Target pop(State& s) { return pop_octree<AnyHit>(s.top, s.stack, s.cell, s.best.t) ? next(s) : Base::kEnd; }
+  static ARBORETUM_INLINE Target pop(State& s) {
+    return pop_octree<AnyHit>(s.top, s.stack, s.cell, s.best.t) ? next(s) : Base::kEnd;
+  }
 };
 
 template <class Leaves, bool, bool AnyHit>

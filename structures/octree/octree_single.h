@@ -28,12 +28,14 @@ struct alignas(16) OctreeCell {
 /// Cells that wait at most, below one whose children are being pushed.
 inline constexpr unsigned kMostOctreeCells = 7 * (octree::kMostLevels + 1) + 8;
 
-/// The three planes of each axis that a cell's children have: its first face as rays of the octant meet them, the middle, its last face.
+/// The three planes of each axis that a cell's children have: its first face as rays of the octant meet them, the
+/// middle, its last face.
 struct OctreePlanes {
   using F = vf<4>;
   vi<4> twice;
   F in, middle, out;
-  ARBORETUM_INLINE OctreePlanes(const octree::Cube& cube, const OctreeCell& cell, vm<4> negative) : twice(vi<4>::load(cell.at).template shift_left<1>()) {
+  ARBORETUM_INLINE OctreePlanes(const octree::Cube& cube, const OctreeCell& cell, vm<4> negative)
+      : twice(vi<4>::load(cell.at).template shift_left<1>()) {
     const F lower = F::load(cube.lower), size(cube.side / float(2u << cell.level));
     const F a = lower + to_float(twice) * size, b = lower + to_float(twice + vi<4>(2)) * size;
     middle = lower + to_float(twice + vi<4>(1)) * size;
@@ -41,7 +43,8 @@ struct OctreePlanes {
   }
   /// Child `c`, which exists, of `cell`; `children` is the first of them.
   ARBORETUM_INLINE OctreeCell child(const OctreeCell& cell, const octree::Node* children, unsigned c) const {
-    static constexpr std::int32_t kOffsets[8][4] = {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 0, 0}, {0, 0, 1, 0}, {1, 0, 1, 0}, {0, 1, 1, 0}, {1, 1, 1, 0}};
+    static constexpr std::int32_t kOffsets[8][4] = {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 0, 0},
+                                                    {0, 0, 1, 0}, {1, 0, 1, 0}, {0, 1, 1, 0}, {1, 1, 1, 0}};
     OctreeCell to;
     (twice + vi<4>::load(kOffsets[c])).store(to.at);
     to.node = children[__builtin_popcount(cell.node.mask & ((1u << c) - 1u))], to.level = cell.level + 1;
@@ -57,8 +60,8 @@ struct OctreeRay {
   unsigned octant;
 
   ARBORETUM_INLINE OctreeRay(Vec3f r, Vec3f f, Vec3f g)
-      : reciprocal(four(r.x, r.y, r.z, 0)), near_constant(four(f.x, f.y, f.z, 0)), far_constant(four(g.x, g.y, g.z, 0)), negative(reciprocal.as_int() < vi<4>(0)),
-        octant(negative.bits() & 7u) {}
+      : reciprocal(four(r.x, r.y, r.z, 0)), near_constant(four(f.x, f.y, f.z, 0)), far_constant(four(g.x, g.y, g.z, 0)),
+        negative(reciprocal.as_int() < vi<4>(0)), octant(negative.bits() & 7u) {}
   template <bool Padded>
   ARBORETUM_INLINE explicit OctreeRay(const BoxRay<8, Padded>& box) : OctreeRay(box.r, box.f, box.g) {}
   ARBORETUM_INLINE F near(F face) const { return plane_distance(face, reciprocal, near_constant); }
@@ -71,10 +74,11 @@ struct OctreeEntry {
   float t;
 };
 
-/// At the inner cell of `e`, between tnear and the nearest hit: of the children that the ray meets `e` becomes the first, the others go to the stack, far to near. Returns whether there
-/// are any.
+/// At the inner cell of `e`, between tnear and the nearest hit: of the children that the ray meets `e` becomes the
+/// first, the others go to the stack, far to near. Returns whether there are any.
 template <class Counting>
-ARBORETUM_INLINE bool step_octree(const octree::Octree& tree, const OctreeRay& box, OctreeEntry& e, float tnear, float nearest, OctreeEntry*& top, const Counting& counting) {
+ARBORETUM_INLINE bool step_octree(const octree::Octree& tree, const OctreeRay& box, OctreeEntry& e, float tnear,
+                                  float nearest, OctreeEntry*& top, const Counting& counting) {
   using F = vf<8>;
   const vm<8> x = vm<8>::from_bits(0xaa), y = vm<8>::from_bits(0xcc), z = vm<8>::from_bits(0xf0);
   const OctreePlanes planes(tree.cube(), e.cell, box.negative);
@@ -86,12 +90,15 @@ ARBORETUM_INLINE bool step_octree(const octree::Octree& tree, const OctreeRay& b
   const F exit = min_x86(min_x86(select(x, F(out[0]), F(middle_far[0])), select(y, F(out[1]), F(middle_far[1]))),
                          min_x86(select(z, F(out[2]), F(middle_far[2])), F(nearest)));
   unsigned hit = (entry <= exit).bits() & permute_by_octant(e.cell.node.mask, box.octant);
-  if constexpr (Counting::kCounting) counting.node(unsigned(__builtin_popcount(e.cell.node.mask)), 8, unsigned(__builtin_popcount(hit)));
+  if constexpr (Counting::kCounting)
+    counting.node(unsigned(__builtin_popcount(e.cell.node.mask)), 8, unsigned(__builtin_popcount(hit)));
   if (hit == 0) return false;
   alignas(32) float t[8];
   entry.store(t);
   const octree::Node* const children = tree.nodes() + e.cell.node.first;
-  const auto child = [&](unsigned number) { return OctreeEntry{planes.child(e.cell, children, number ^ box.octant), t[number]}; };
+  const auto child = [&](unsigned number) {
+    return OctreeEntry{planes.child(e.cell, children, number ^ box.octant), t[number]};
+  };
   const unsigned first = unsigned(__builtin_ctz(hit));
   for (hit &= hit - 1; hit;) {  // far to near
     const unsigned number = 31u - unsigned(__builtin_clz(hit));
@@ -112,11 +119,12 @@ ARBORETUM_INLINE bool pop_octree(OctreeEntry*& top, const OctreeEntry* stack, Oc
   return true;
 }
 
-/// What lies in the cell `start`, which the ray is taken to enter. visits(code) is called for leaves and ends the search where it is true; `last` is the leaf that the
-/// ray comes from, since neighbouring cells may share one.
+/// What lies in the cell `start`, which the ray is taken to enter. visits(code) is called for leaves and ends the
+/// search where it is true; `last` is the leaf that the ray comes from, since neighbouring cells may share one.
 template <bool AnyHit, class Counting, class Visits>
-ARBORETUM_INLINE bool search_octree(const octree::Octree& tree, const OctreeRay& box, const OctreeCell& start, float tnear, NearestHit& best, LeafCode& last,
-                                    const Counting& counting, Visits& visits) {
+ARBORETUM_INLINE bool search_octree(const octree::Octree& tree, const OctreeRay& box, const OctreeCell& start,
+                                    float tnear, NearestHit& best, LeafCode& last, const Counting& counting,
+                                    Visits& visits) {
   OctreeEntry stack[kMostOctreeCells];
   OctreeEntry* top = stack;
   OctreeEntry e{start, 0.0f};

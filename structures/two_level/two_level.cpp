@@ -33,7 +33,8 @@ Bounds3f image(const AffineMap& map, const Bounds3f& box) {
   for (int row = 0; row < 3; ++row) {
     double low = map.m[row][3], high = low;
     for (int column = 0; column < 3; ++column) {
-      const double a = map.m[row][column] * box.lower[std::size_t(column)], b = map.m[row][column] * box.upper[std::size_t(column)];
+      const double a = map.m[row][column] * box.lower[std::size_t(column)],
+                   b = map.m[row][column] * box.upper[std::size_t(column)];
       low += std::min(a, b), high += std::max(a, b);
     }
     result.lower[std::size_t(row)] = std::nextafter(float(low), -Bounds3f::kInfinity);
@@ -45,7 +46,8 @@ Bounds3f image(const AffineMap& map, const Bounds3f& box) {
 /// Hands on what a structure below shows, as part of the whole tree.
 class BelowVisitor final : public StructureVisitor {
  public:
-  BelowVisitor(StructureVisitor& to, const AffineMap* to_world, std::uint32_t first_primitive, unsigned depth, bool counts_bytes)
+  BelowVisitor(StructureVisitor& to, const AffineMap* to_world, std::uint32_t first_primitive, unsigned depth,
+               bool counts_bytes)
       : to_(to), to_world_(to_world), first_primitive_(first_primitive), depth_(depth), counts_bytes_(counts_bytes) {}
 
   void node(const NodeView& node) override {
@@ -56,7 +58,8 @@ class BelowVisitor final : public StructureVisitor {
   void leaf(const LeafView& leaf) override {
     primitives_.clear();
     for (std::uint32_t p : leaf.primitives) primitives_.push_back(p + first_primitive_);
-    to_.leaf({in_world(leaf.bounds), primitives_, leaf.depth + depth_, leaf.blocks, leaf.block_width, counts_bytes_ ? leaf.bytes : 0});
+    to_.leaf({in_world(leaf.bounds), primitives_, leaf.depth + depth_, leaf.blocks, leaf.block_width,
+              counts_bytes_ ? leaf.bytes : 0});
   }
 
  private:
@@ -91,7 +94,9 @@ const StructureInfo& TwoLevel::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "a BVH over instances, a structure of another kind (parameter below) for each prototype";
-    i.only_single_rays = "each ray enters an instance's own space, where it is another ray: what packets and streams share is lost at every instance";
+    i.only_single_rays =
+        "each ray enters an instance's own space, where it is another ray: what packets and streams share is lost at "
+        "every instance";
     i.builders = binary_builder_names();
     i.takes_below = true;
     for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
@@ -106,8 +111,10 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
   const StructureInfo& below = entry->info;
   const std::string pair = "two_level over " + std::string(below.name) + ": ";
   if (const std::string why = why_not_below(below); !why.empty()) throw UserError(pair + why);
-  if (!has(below.builders, settings.builder)) throw UserError(pair + std::string(below.name) + " has no builder " + settings.builder);
-  if (!has(below.leaves, settings.leaf)) throw UserError(pair + std::string(below.name) + " has no leaf " + settings.leaf);
+  if (!has(below.builders, settings.builder))
+    throw UserError(pair + std::string(below.name) + " has no builder " + settings.builder);
+  if (!has(below.leaves, settings.leaf))
+    throw UserError(pair + std::string(below.name) + " has no leaf " + settings.leaf);
 
   mesh_ = &mesh, below_ = settings.parameters.below, leaf_ = settings.leaf;
   prototypes_.clear(), placed_.clear();
@@ -202,7 +209,8 @@ bool TwoLevel::visit(StructureVisitor& visitor) const {
   bool seen = true;
   const auto show = [&](std::uint32_t index, unsigned depth) {
     const Placed& p = placed_[index];
-    BelowVisitor below(visitor, p.identity ? nullptr : &mesh_->instancing->instances[index].to_world, p.first_primitive, depth, shown.insert(p.below).second);
+    BelowVisitor below(visitor, p.identity ? nullptr : &mesh_->instancing->instances[index].to_world, p.first_primitive,
+                       depth, shown.insert(p.below).second);
     seen = p.below->visit(below) && seen;
   };
   TopVisitor top(visitor, show);

@@ -34,12 +34,12 @@ class TwoLevel final : public Accel {
   [[nodiscard]] static const StructureInfo& static_info();
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
   /// The builder axis goes to the structures below; the top takes it too where it builds binary trees, else binned_sah.
-  /// Throws UserError for a structure below that there is not, that lacks the builder or leaf, or that cannot stand there
-  /// (why_not_below()).
+  /// Throws UserError for a structure below that there is not, that lacks the builder or leaf, or that cannot stand
+  /// there (why_not_below()).
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   void archive(Archive& archive) override;
-  /// The top's nodes, then each instance's nodes and leaves with boxes in world space; bytes of a prototype count where it
-  /// is shown first. False where the structure below cannot be looked into.
+  /// The top's nodes, then each instance's nodes and leaves with boxes in world space; bytes of a prototype count where
+  /// it is shown first. False where the structure below cannot be looked into.
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
   [[nodiscard]] std::size_t bytes() const noexcept override;
 

@@ -1,16 +1,20 @@
-// One ray through two levels: the top's boxes in world space, then for each instance the ray in object space, by the kernel of
-// the structure below: one indirect call an instance. The direction is mapped without being normalised, so t keeps its meaning.
+// One ray through two levels: the top's boxes in world space, then for each instance the ray in object space, by the
+// kernel of the structure below: one indirect call an instance. The direction is mapped without being normalised, so t
+// keeps its meaning.
 //
 // Object space rounds: the mapped ray is off by 2^-24 of its own numbers. Three things come of it.
-// - The top's boxes are padded for it. A hit's point p lies on the object-space triangle; in world space it is off the exact
-//   ray by |L| |eta + t zeta|, where eta and zeta are the roundings of origin and direction: at most u (2|o'| + |p'|) for u = 2^-24, and
-//   so u k (2|o| + |p| + 3|T|) with k = || |L||L^-1| || and T the translation. The pad of box_test.h for a largest coordinate of
-//   reach + k (|o| + reach), reach = M + 2|T|, is more than its own need and this together (8 u of it against 4 u of M + |o|, and
-//   3 u at most of k (...)).
-// - t, u and v of the winner are computed again from the flat mesh's vertices with the same test, so that they are those of a
-//   structure over the flat mesh, bit for bit, wherever both find the same triangle. Where the test misses the flat triangle
-//   (the ray meets its edge) t is that of its plane, in double.
-// - A t close to an end of the interval may lie on the other side of it in world space, as on the surface that a secondary ray starts
+// - The top's boxes are padded for it. A hit's point p lies on the object-space triangle; in world space it is off the
+// exact
+//   ray by |L| |eta + t zeta|, where eta and zeta are the roundings of origin and direction: at most u (2|o'| + |p'|)
+//   for u = 2^-24, and so u k (2|o| + |p| + 3|T|) with k = || |L||L^-1| || and T the translation. The pad of box_test.h
+//   for a largest coordinate of reach + k (|o| + reach), reach = M + 2|T|, is more than its own need and this together
+//   (8 u of it against 4 u of M + |o|, and 3 u at most of k (...)).
+// - t, u and v of the winner are computed again from the flat mesh's vertices with the same test, so that they are
+// those of a
+//   structure over the flat mesh, bit for bit, wherever both find the same triangle. Where the test misses the flat
+//   triangle (the ray meets its edge) t is that of its plane, in double.
+// - A t close to an end of the interval may lie on the other side of it in world space, as on the surface that a
+// secondary ray starts
 //   from. There the t in world space decides, and the search goes on behind a hit that is refused.
 #pragma once
 
@@ -35,7 +39,8 @@ template <class, bool, class Counting>
 class TwoLevelKernel {
  public:
   TwoLevelKernel(const Accel& accel, const KernelRow& row, Counting counting)
-      : accel_(static_cast<const two_level::TwoLevel&>(accel)), row_(row_below(accel_, row)), counting_(counting), stack_(accel_.top().stack_entries()) {
+      : accel_(static_cast<const two_level::TwoLevel&>(accel)), row_(row_below(accel_, row)), counting_(counting),
+        stack_(accel_.top().stack_entries()) {
     const LeafTests* alone = find_leaf_tests(VertexBlock<1>::kName, row.intersector, kIsa);
     tests_ = alone ? alone : row.tests;
   }
@@ -47,18 +52,20 @@ class TwoLevelKernel {
     const float origin = largest_component(ray.origin), k = accel_.magnification();
     SoaNodeTest<4, true> nodes(ray, accel_.reach() + k * (origin + accel_.reach()));
     const bvh::Bvh4& top = accel_.top();
-    walk_bvh<false>(top.base(), top.root(), nodes, stack_.data(), nearest, counting_, [&](bvh::NodeReference reference) {
-      const auto& block = *reinterpret_cast<const IndexBlock<1>*>(top.base() + bvh::offset_of(reference));
-      const bool over = visit<AnyHit>(ray, accel_.placed()[block.id[0]], nearest, best);
-      nodes.shorten(nearest);
-      return over;
-    });
+    walk_bvh<false>(
+        top.base(), top.root(), nodes, stack_.data(), nearest, counting_, [&](bvh::NodeReference reference) {
+          const auto& block = *reinterpret_cast<const IndexBlock<1>*>(top.base() + bvh::offset_of(reference));
+          const bool over = visit<AnyHit>(ray, accel_.placed()[block.id[0]], nearest, best);
+          nodes.shorten(nearest);
+          return over;
+        });
     if (best.is_hit()) nearest_hit = {best.t, best.u, best.v, std::int32_t(best.primitive)};
     return best.is_hit();
   }
 
  private:
-  /// Returns true when the search is over. `nearest` may stay above best.t, so that an equal hit of a lower id is not lost.
+  /// Returns true when the search is over. `nearest` may stay above best.t, so that an equal hit of a lower id is not
+  /// lost.
   template <bool AnyHit>
   bool visit(const Ray& ray, const two_level::Placed& instance, float& nearest, Hit& best) {
     if (instance.identity) {
@@ -78,7 +85,8 @@ class TwoLevelKernel {
     Ray mapped;
     mapped.origin = transform_point(instance.to_object, ray.origin);
     mapped.direction = transform_direction(instance.to_object, ray.direction);
-    const float slack = 0x1p-20f * (largest_component(mapped.origin) + instance.max_coordinate) / largest_component(mapped.direction);
+    const float slack =
+        0x1p-20f * (largest_component(mapped.origin) + instance.max_coordinate) / largest_component(mapped.direction);
     const float doubt = 0x1p10f * slack;  // within it of an end of the interval, world space decides
     const float last = best.is_hit() ? nearest : ray.tfar + slack;
     mapped.tnear = ray.tnear > slack ? ray.tnear - slack : 0.0f;
@@ -101,7 +109,8 @@ class TwoLevelKernel {
   }
 
   /// The first hit of the mapped ray that holds in world space.
-  bool first_accepted(const Ray& ray, const two_level::Placed& instance, Ray& mapped, float doubt, float& nearest, Hit& best) {
+  bool first_accepted(const Ray& ray, const two_level::Placed& instance, Ray& mapped, float doubt, float& nearest,
+                      Hit& best) {
     while (mapped.tnear <= mapped.tfar) {
       const Hit object = closest_below(instance, mapped);
       if (!object.is_hit()) return false;
@@ -130,7 +139,8 @@ class TwoLevelKernel {
     alignas(64) std::byte block[kLargestBlock];
     tests_->form->fill(block, accel_.mesh(), {&primitive, 1});
     NearestHit flat{std::numeric_limits<float>::infinity()};
-    if (tests_->closest_hit(data, block, 1, accel_.mesh().vertices.data(), -std::numeric_limits<float>::infinity(), flat)) {
+    if (tests_->closest_hit(data, block, 1, accel_.mesh().vertices.data(), -std::numeric_limits<float>::infinity(),
+                            flat)) {
       if (tests_->finish) tests_->finish(data, flat);
       return {flat.t, flat.u, flat.v, primitive};
     }

@@ -87,7 +87,9 @@ template <int W>
 inline void sort_first_lanes_down(const Bits* a, const Bits*, const Bits* c, Bits* out) {
   if constexpr (kOrdersLanes<W>) {
     const unsigned count = c[0] % unsigned(W + 1);
-    put<W>(sort_first_down(select(vi<W>::iota() < vi<W>(std::int32_t(count)), n<W>(a) & vi<W>(0x7fffffff), vi<W>(0)), count), out);
+    put<W>(sort_first_down(select(vi<W>::iota() < vi<W>(std::int32_t(count)), n<W>(a) & vi<W>(0x7fffffff), vi<W>(0)),
+                           count),
+           out);
   }
 }
 
@@ -178,7 +180,8 @@ inline constexpr int kLaneOrders = 5;
 
 template <int W>
 inline simd_test::OperationTable table() {
-  return {kOperations<W>, int(sizeof kOperations<W> / sizeof kOperations<W>[0]) - (kOrdersLanes<W> ? 0 : kLaneOrders), kHasFma};
+  return {kOperations<W>, int(sizeof kOperations<W> / sizeof kOperations<W>[0]) - (kOrdersLanes<W> ? 0 : kLaneOrders),
+          kHasFma};
 }
 
 inline simd_test::OperationTable table_of(int width) {

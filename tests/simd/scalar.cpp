@@ -14,7 +14,5 @@
 #include "simd/target_end.h"
 
 namespace arboretum::simd_test {
-OperationTable operations_scalar(int width) {
-  return isa_scalar::test::table_of(width);
-}
+OperationTable operations_scalar(int width) { return isa_scalar::test::table_of(width); }
 }  // namespace arboretum::simd_test

@@ -14,7 +14,5 @@
 #include "simd/target_end.h"
 
 namespace arboretum::simd_test {
-OperationTable operations_sse(int width) {
-  return isa_sse::test::table_of(width);
-}
+OperationTable operations_sse(int width) { return isa_sse::test::table_of(width); }
 }  // namespace arboretum::simd_test

@@ -10,15 +10,11 @@ inline __attribute__((noinline)) float planted_leak(const float* p) {
 }
 
 namespace arboretum::ARBORETUM_ISA_NAMESPACE {
-float uses_planted_leak(const float* p) {
-  return planted_leak(p);
-}
+float uses_planted_leak(const float* p) { return planted_leak(p); }
 inline __attribute__((noinline)) float kept_inside(const float* p) {
   return _mm256_cvtss_f32(_mm256_mul_ps(_mm256_loadu_ps(p), _mm256_loadu_ps(p + 8)));
 }
-float uses_kept_inside(const float* p) {
-  return kept_inside(p);
-}
+float uses_kept_inside(const float* p) { return kept_inside(p); }
 }  // namespace arboretum::ARBORETUM_ISA_NAMESPACE
 
 #include "simd/target_end.h"

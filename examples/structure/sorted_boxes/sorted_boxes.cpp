@@ -77,7 +77,8 @@ void SortedBoxes::build(const TriangleMesh& mesh, const BuildSettings& settings,
     if (mesh.size() > 0) build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
 
     const double start = wall_seconds();
-    const std::vector<References> list = mesh.size() > 0 ? references_by_block(tree, Block::kWidth) : std::vector<References>{};
+    const std::vector<References> list =
+        mesh.size() > 0 ? references_by_block(tree, Block::kWidth) : std::vector<References>{};
     blocks_ = list.size();
     arena_ = Arena(groups() * sizeof(BoxGroup) + blocks_ * sizeof(Block));
     auto* group = reinterpret_cast<BoxGroup*>(arena_.data());
@@ -91,13 +92,15 @@ void SortedBoxes::build(const TriangleMesh& mesh, const BuildSettings& settings,
   });
   if (!known) throw UserError("sorted_boxes has no leaf " + settings.leaf);
 
-  leaf_ = settings.leaf, bounds_ = mesh.bounds(), vertices_ = mesh.vertices.data(), max_coordinate_ = largest_coordinate(bounds_);
+  leaf_ = settings.leaf, bounds_ = mesh.bounds(), vertices_ = mesh.vertices.data(),
+  max_coordinate_ = largest_coordinate(bounds_);
 }
 
 bool SortedBoxes::visit(StructureVisitor& visitor) const {
   if (blocks_ == 0) return true;
   std::vector<Bounds3f> boxes;
-  for (std::size_t i = 0; i < blocks_; ++i) boxes.push_back(read_box(this->boxes()[i / BoxGroup::kWidth], i % BoxGroup::kWidth));
+  for (std::size_t i = 0; i < blocks_; ++i)
+    boxes.push_back(read_box(this->boxes()[i / BoxGroup::kWidth], i % BoxGroup::kWidth));
   visitor.node({.bounds = bounds_, .child_bounds = boxes, .depth = 0, .bytes = groups() * sizeof(BoxGroup)});
   return with_block(leaf_, [&]<class Block>(std::type_identity<Block>) {
     for (std::size_t i = 0; i < blocks_; ++i) {

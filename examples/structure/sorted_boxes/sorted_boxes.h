@@ -1,7 +1,9 @@
-// sorted_boxes: no hierarchy. The triangles stand in leaf blocks, each block has a box, and a ray tests all boxes, eight at a time, then
-// visits the blocks whose boxes it meets from near to far. O(n) a ray; an example of how small a structure can be.
+// sorted_boxes: no hierarchy. The triangles stand in leaf blocks, each block has a box, and a ray tests all boxes,
+// eight at a time, then visits the blocks whose boxes it meets from near to far. O(n) a ray; an example of how small a
+// structure can be.
 //
-// Memory: groups of eight boxes (192 bytes each, the layout that box tests read), then as many blocks as there are boxes.
+// Memory: groups of eight boxes (192 bytes each, the layout that box tests read), then as many blocks as there are
+// boxes.
 #pragma once
 
 // Standard headers that the kernels need stand here: what a kernel header includes is compiled for its instruction set.
@@ -17,7 +19,8 @@
 
 namespace arboretum::sorted_boxes {
 
-/// planes[2 * axis + side][box], side 0 lower, 1 upper. A slot without a box has lower = +inf, upper = -inf: no ray enters it.
+/// planes[2 * axis + side][box], side 0 lower, 1 upper. A slot without a box has lower = +inf, upper = -inf: no ray
+/// enters it.
 struct alignas(64) BoxGroup {
   static constexpr int kWidth = 8;
   float planes[6][kWidth];

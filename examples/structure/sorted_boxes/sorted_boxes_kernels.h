@@ -1,6 +1,6 @@
-// The kernels of sorted_boxes, written once and compiled for each instruction set. A ray tests all boxes, eight at a time, sorts those that
-// it meets by where it enters them, and tests their blocks in that order: until the next box begins beyond the nearest hit, or
-// until anything is hit.
+// The kernels of sorted_boxes, written once and compiled for each instruction set. A ray tests all boxes, eight at a
+// time, sorts those that it meets by where it enters them, and tests their blocks in that order: until the next box
+// begins beyond the nearest hit, or until anything is hit.
 #pragma once
 
 #include "traversal/box_test.h"
@@ -10,8 +10,8 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// A box that the ray meets as one number: the bits of where it enters, then the block. Bits of floats from +0 on order as
-/// integers, so these sort from near to far.
+/// A box that the ray meets as one number: the bits of where it enters, then the block. Bits of floats from +0 on order
+/// as integers, so these sort from near to far.
 using MetBox = std::uint64_t;
 
 [[nodiscard]] ARBORETUM_INLINE MetBox met_box(float entry, std::size_t block) {
@@ -21,12 +21,14 @@ using MetBox = std::uint64_t;
   return __builtin_bit_cast(float, std::uint32_t(box >> 32));
 }
 
-/// The three functions below, a class and one call are all that a structure needs: every leaf and intersector then goes with it.
+/// The three functions below, a class and one call are all that a structure needs: every leaf and intersector then goes
+/// with it.
 template <class Leaves, bool Padded, class Counting>
 class SortedBoxesKernel {
  public:
   SortedBoxesKernel(const Accel& accel, const KernelRow& row, Counting counting)
-      : accel_(static_cast<const sorted_boxes::SortedBoxes&>(accel)), leaves_(row, accel_.vertices()), form_(*row.tests->form), counting_(counting) {}
+      : accel_(static_cast<const sorted_boxes::SortedBoxes&>(accel)), leaves_(row, accel_.vertices()),
+        form_(*row.tests->form), counting_(counting) {}
 
   /// Any hit: whether there is one. Closest hit: updates `best`.
   template <bool AnyHit>
@@ -57,7 +59,8 @@ class SortedBoxesKernel {
     for (std::size_t group = 0; group < accel_.groups(); ++group) {
       vf<W> entry;
       unsigned hit = boxes.test(reinterpret_cast<const std::byte*>(accel_.boxes() + group), tnear, tfar, entry);
-      counting_.node(unsigned(std::min<std::size_t>(W, accel_.blocks() - group * W)), W, unsigned(__builtin_popcount(hit)));
+      counting_.node(unsigned(std::min<std::size_t>(W, accel_.blocks() - group * W)), W,
+                     unsigned(__builtin_popcount(hit)));
       alignas(64) float entries[W];
       entry.store(entries);
       for (; hit != 0; hit &= hit - 1) {

@@ -1,4 +1,5 @@
-// What sorted_boxes reads of BuilderParameters: what the builder of its binary tree does. It takes the leaves as they are.
+// What sorted_boxes reads of BuilderParameters: what the builder of its binary tree does. It takes the leaves as they
+// are.
 #pragma once
 
 #include <string_view>
@@ -10,7 +11,8 @@
 
 namespace arboretum::sorted_boxes {
 
-[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<SortedBoxes>, std::string_view builder) {
+[[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<SortedBoxes>,
+                                                                      std::string_view builder) {
   return binary_builder_parameters(builder);
 }
 
