@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -87,6 +88,11 @@ std::vector<std::string> read_lines(const std::filesystem::path& path) {
     lines.push_back(text.substr(begin, end - begin));
     begin = end + 1;
   }
+}
+
+void flush_output() {
+  errno = 0;
+  if (std::fflush(stdout) != 0) throw std::system_error(errno, std::generic_category());
 }
 
 void write_whole(const std::filesystem::path& path, std::string_view text) {

@@ -33,6 +33,9 @@ class AppendFile {
 [[nodiscard]] std::vector<std::string> read_lines(const std::filesystem::path& path);
 /// Writes beside `path` and renames over it, so that a failure leaves the old file. Throws UserError.
 void write_whole(const std::filesystem::path& path, std::string_view text);
+/// Hands what was printed to the operating system. Throws std::system_error where it does not go there: the reader has
+/// left (EPIPE), the disk is full.
+void flush_output();
 /// Throws UserError where write_whole could not write to `path`, as far as can be seen without writing.
 void require_writable(const std::filesystem::path& path);
 /// Creates the folder, if need be, and tries whether files can be made in it. Throws UserError.

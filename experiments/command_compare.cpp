@@ -63,11 +63,11 @@ ExitStatus command_compare(const CompareCommand& command) {
   write(command.json, comparison_json(comparison, a, b));
   write(command.csv, comparison_csv(comparison));
   if (!command.plot.empty() && !comparison.cells.empty()) {
-    std::fflush(stdout);  // the script may print too
+    flush_output();  // the script may print too
     if (const std::string problem = draw_ratios(comparison_json(comparison, a, b), command.plot); !problem.empty())
       fmt::print(stderr, "warning: {}\n", problem);
   }
-  std::fflush(stdout);
+  flush_output();
   if (status == ExitStatus::kNothingMeasured) fmt::print(stderr, "arboretum: {}\n", why);
   return status;
 }

@@ -255,11 +255,11 @@ ExitStatus dispatch(std::vector<std::string> words) {
   return command_fetch(a.fetched);
 }
 
-/// One line, whatever the message holds.
 /// What a shell reports of a program that SIGPIPE ends, as in `arboretum run … --list | head`: no error, and nobody to
 /// tell of it.
 constexpr int kReaderLeft = 128 + SIGPIPE;
 
+/// One line, whatever the message holds.
 int fail(std::string message) {
   std::ranges::replace(message, '\n', ' ');
   fmt::print(stderr, "arboretum: {}\n", message);

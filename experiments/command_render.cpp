@@ -10,6 +10,7 @@
 
 #include "core/names.h"
 #include "core/timer.h"
+#include "experiments/append_file.h"
 #include "experiments/commands.h"
 #include "experiments/progress.h"
 #include "rendering/heat_map.h"
@@ -174,7 +175,7 @@ void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSet
     fmt::print("effects       no part of heat maps, though asked for: {}\n", fmt::join(no_part, ", "));
   fmt::print("heat map      {} a camera ray: mean {:.2f}, median {}, most {}; the brightest colour is {}\n",
              command.heat_map, map.mean, map.median, map.most, map.top);
-  std::fflush(stdout);
+  flush_output();
   write_png(out, picture.width, picture.height, picture.rgb);
   fmt::print("picture       {} ({} x {} rays)\n", out.string(), map.width, map.height);
 }
@@ -213,7 +214,7 @@ ExitStatus command_render(const RenderCommand& command) {
   for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
   for (const std::string& warning : ready.warnings()) fmt::print("warning       {}\n", warning);
   print_effects(effects, chosen, set, settings.integrator);
-  std::fflush(stdout);
+  flush_output();
 
   const BatchTracer tracer(ready, *built.accel, *built.kernel);
   RenderStatistics statistics;
@@ -225,7 +226,7 @@ ExitStatus command_render(const RenderCommand& command) {
   print_rays(statistics);
   if (statistics.not_finite > 0)
     fmt::print("warning       {} samples were no finite number and are left out\n", statistics.not_finite);
-  std::fflush(stdout);
+  flush_output();
   write_picture(out, picture, stops);
   fmt::print("picture       {} ({}exposure {:+.2f} stops; {:.2f} s)\n", out.string(), exposure ? "" : "automatic ",
              stops, seconds);

@@ -293,7 +293,7 @@ ExitStatus command_run(RunCommand command) {
   if (command.dry_run) return print_dry_run(experiment, plan);
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
-    std::fflush(stdout);
+    flush_output();
     fmt::print(stderr, "arboretum: nothing to measure: {} combinations skipped,{} {} excluded, {} filtered out\n",
                plan.skipped.size(),
                plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded,

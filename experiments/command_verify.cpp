@@ -87,7 +87,7 @@ class Verify {
 
   ExitStatus nothing() const {
     fmt::print("{}", skipped_lines(plan_, {}));
-    std::fflush(stdout);
+    flush_output();
     fmt::print(stderr, "arboretum: nothing to verify: {} combinations skipped, {} filtered out\n", plan_.skipped.size(),
                plan_.filtered);
     return ExitStatus::kNothingMeasured;

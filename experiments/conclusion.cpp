@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "experiments/append_file.h"
 #include "experiments/plotting.h"
 #include "experiments/summary.h"
 
@@ -17,7 +18,7 @@ ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outco
   print_warnings(outcome.warnings);
   const auto [status, why] = verdict(outcome);
   fmt::print("{}\n{}", result_tables(outcome), skipped_lines(plan, outcome));
-  std::fflush(stdout);
+  flush_output();
   if (status == ExitStatus::kNothingMeasured) {
     fmt::print(stderr, "arboretum: {}\n", why);
     return status;

@@ -69,7 +69,12 @@ YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
     throw UserError(fmt::format("{}: holds zero bytes, so it is no YAML text", file_.string()));
   }
   try {
-    root_ = YAML::Load(text);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1)
+      throw UserError(
+          fmt::format("{}: {} YAML documents; a configuration is one: put the others into files of their own",
+                      file_.string(), documents.size()));
+    root_ = documents.empty() ? YAML::Node() : documents.front();
   } catch (const YAML::Exception& e) {
     throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it", file_.string(),
                                 e.mark.line + 1, e.msg));

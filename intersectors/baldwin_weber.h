@@ -18,10 +18,7 @@ struct BaldwinWeber {
   static constexpr bool reads(TriangleForm form) { return form == TriangleForm::transform; }
   static constexpr bool kEveryLeaf = true;
 
-  struct RayData {
-    Vec3f origin, direction;
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {}
-  };
+  using RayData = RayLine;
 
   template <class Block>
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
@@ -30,8 +27,7 @@ struct BaldwinWeber {
     const auto row = [&block](int i) {
       return vf3<W>{F::load(block.number[i]), F::load(block.number[i + 1]), F::load(block.number[i + 2])};
     };
-    const vf3<W> o{F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)};
-    const vf3<W> d{F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)};
+    const vf3<W> o = in_all_lanes<W>(ray.origin), d = in_all_lanes<W>(ray.direction);
     const vf3<W> height = row(8);
     // A line in the plane, or in one parallel to it, makes t infinite or NaN, and the point with it: not inside.
     const F t = -(dot(height, o) + F::load(block.number[11])) / dot(height, d);

@@ -18,10 +18,7 @@ struct HavelHerout {
   static constexpr bool reads(TriangleForm form) { return form == TriangleForm::planes; }
   static constexpr bool kEveryLeaf = true;
 
-  struct RayData {
-    Vec3f origin, direction;
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {}
-  };
+  using RayData = RayLine;
 
   template <class Block>
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
@@ -31,8 +28,7 @@ struct HavelHerout {
       return vf3<W>{F::load(block.number[i]), F::load(block.number[i + 1]), F::load(block.number[i + 2])};
     };
     const auto offset = [&block](int i) { return F::load(block.number[i + 3]); };
-    const vf3<W> o{F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)};
-    const vf3<W> d{F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)};
+    const vf3<W> o = in_all_lanes<W>(ray.origin), d = in_all_lanes<W>(ray.direction);
     const vf3<W> n = normal(0);
     const F det = dot(n, d), t = offset(0) - dot(n, o);
     const vf3<W> p{madd(det, o.x, t * d.x), madd(det, o.y, t * d.y), madd(det, o.z, t * d.z)};

@@ -32,19 +32,14 @@ struct MollerTrumbore {
   }
   static constexpr bool kEveryLeaf = true;
 
-  /// One ray's constants.
-  struct RayData {
-    Vec3f origin, direction;
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {}
-  };
+  using RayData = RayLine;
 
   /// Lanes whose closed triangle the line meets, whatever t is; `hits` is set only where that is any lane.
   template <class Block>
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
     using F = vf<Block::kWidth>;
     return core<F>(
-        {F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)},
-        {F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)}, block,
+        in_all_lanes<Block::kWidth>(ray.origin), in_all_lanes<Block::kWidth>(ray.direction), block,
         [](const float(&p)[Block::kWidth]) { return F::load(p); }, hits);
   }
 
@@ -64,7 +59,7 @@ struct MollerTrumbore {
         from.x.store(to[0]), from.y.store(to[1]), from.z.store(to[2]);
       };
       const Corners<F> t = corners(block, [](const float(&p)[M]) { return F::load(p); });
-      const MollerTrumboreTerms<F> terms(normal(block, t), t.v0 - vf3<M>{F(origin.x), F(origin.y), F(origin.z)});
+      const MollerTrumboreTerms<F> terms(normal(block, t), t.v0 - in_all_lanes<M>(origin));
       store(terms.c, c), store(terms.n, n), store(t.e1, e1), store(t.e2, e2), dot(terms.n, terms.c).store(n_dot_c);
       std::memcpy(id, block.id, sizeof id);
     }

@@ -27,17 +27,13 @@ struct Pluecker {
   static constexpr bool reads(TriangleForm form) { return form == TriangleForm::vertices; }
   static constexpr bool kEveryLeaf = false;
 
-  struct RayData {
-    Vec3f origin, direction;
-    ARBORETUM_INLINE explicit RayData(const Ray& ray) : origin(ray.origin), direction(ray.direction) {}
-  };
+  using RayData = RayLine;
 
   template <class Block>
   static ARBORETUM_INLINE auto intersect(const RayData& ray, const Block& block, TriangleHits<Block::kWidth>& hits) {
     constexpr int W = Block::kWidth;
     using F = vf<W>;
-    const vf3<W> o{F(ray.origin.x), F(ray.origin.y), F(ray.origin.z)};
-    const vf3<W> d{F(ray.direction.x), F(ray.direction.y), F(ray.direction.z)};
+    const vf3<W> o = in_all_lanes<W>(ray.origin), d = in_all_lanes<W>(ray.direction);
     const vf3<W> p0 = vf3<W>{F::load(block.v0[0]), F::load(block.v0[1]), F::load(block.v0[2])} - o;
     const vf3<W> p1 = vf3<W>{F::load(block.v1[0]), F::load(block.v1[1]), F::load(block.v1[2])} - o;
     const vf3<W> p2 = vf3<W>{F::load(block.v2[0]), F::load(block.v2[1]), F::load(block.v2[2])} - o;

@@ -27,7 +27,7 @@ def write(results, drawn):
     parts.append('<h2 id="figures">Figures</h2>' + "\n".join(figure(results.folder, *each) for each in drawn))
     parts.append('<h2 id="all-cells">All cells</h2>' + tables.throughput_table(results))
     parts.append('<h2 id="built">Structures as built</h2>' + tables.structure_table(results))
-    parts.append('<h2 id="skipped">Skipped cells</h2>' + tables.skipped_list(results.skipped))
+    parts.append('<h2 id="skipped">Skipped cells</h2>' + tables.skipped_list(results.skipped, results.complete))
     parts.append('<h2 id="machine">Machine and build</h2>' + tables.facts_table(facts(results.context)))
     parts.append('<h2 id="again">How to reproduce</h2>' + reproduce(results))
     template = Template((Path(__file__).parent / "report_template.html").read_text(encoding="utf-8"))

@@ -219,9 +219,27 @@ def read_rows(folder):
             common = {k: v for k, v in cell.items() if k not in ("repetitions", "benchmarks", "context")}
             repetitions = cell.get("repetitions") or cell.get("benchmarks")
             for row in repetitions if isinstance(repetitions, list) else [{}]:
-                entries.append({**common, **row} if isinstance(row, dict) else dict(common))
-        return choose_rows(entries), context, [], False
+                entries.append(per_iteration({**common, **row}) if isinstance(row, dict) else dict(common))
+        plan = read_plan(folder)
+        return choose_rows(entries), context or plan.get("context") or {}, read_skipped(plan.get("skipped")), False
     raise ResultError(f"{folder}: neither results.json nor cells.jsonl here; give the folder that `run` wrote")
+
+
+def per_iteration(row):
+    """A repetition of cells.jsonl, whose phases are those of all its iterations, as results.json has it."""
+    phases, iterations = row.get("phase_seconds"), row.get("iterations")
+    if isinstance(phases, dict) and is_number(iterations) and iterations > 0:
+        row["phase_seconds"] = {name: seconds / iterations for name, seconds in phases.items() if is_number(seconds)}
+    return row
+
+
+def read_plan(folder):
+    """plan.json, which stands there before anything is measured: the context, and what was skipped; {} where there is none."""
+    try:
+        plan = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return plan if isinstance(plan, dict) else {}
 
 
 def read_skipped(skipped):

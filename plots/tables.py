@@ -171,10 +171,10 @@ def best_table(results):
     return table("fastest", heads, rows)
 
 
-def skipped_list(skipped):
+def skipped_list(skipped, complete):
     """The skipped cells by reason, the most frequent first; each reason opens to its cells."""
     if not skipped:
-        return "<p>None: every combination of the sweep was measured.</p>"
+        return f"<p>None: every combination of the sweep {'was' if complete else 'can be'} measured.</p>"
     reasons = {}
     for name, reason in skipped:
         reasons.setdefault(reason, []).append(name)

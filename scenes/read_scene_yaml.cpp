@@ -211,10 +211,15 @@ class SceneFile {
   std::size_t find_part(const YAML::Node& node) {
     const std::string word = file_.text(node, "an instance's mesh");
     std::vector<std::string> names;
+    std::vector<std::size_t> meant;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (parts_[i].name == word) return i;
+      if (parts_[i].name == word) meant.push_back(i);
       names.push_back(parts_[i].name);
     }
+    if (meant.size() > 1)
+      file_.fail(node, fmt::format("{} meshes are called '{}'; give them names, as {{file: path, name: other}}",
+                                   meant.size(), one_line(word)));
+    if (!meant.empty()) return meant.front();
     if (unsigned index = 0; YAML::convert<unsigned>::decode(node, index)) {
       if (index < parts_.size()) return index;
       file_.fail(node, fmt::format("mesh {} does not exist: there are {}, counted from 0", index, parts_.size()));

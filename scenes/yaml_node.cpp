@@ -16,7 +16,11 @@ namespace arboretum {
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
   const FileBytes bytes(path_);
   try {
-    root_ = YAML::Load(std::string(bytes.text()));
+    const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(bytes.text()));
+    if (documents.size() > 1)
+      throw UserError(fmt::format("{}: {} YAML documents; a scene is one: put the others into files of their own",
+                                  path_.string(), documents.size()));
+    root_ = documents.empty() ? YAML::Node() : documents.front();
   } catch (const YAML::Exception& error) {
     throw UserError(fmt::format("{}:{}: {}", path_.string(), error.mark.line + 1, one_line(error.msg)));
   }

@@ -1,5 +1,6 @@
 #include "structures/accel.h"
 
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -87,8 +88,9 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
 
   std::unique_ptr<Accel> accel = entry->create();
   report = {};
-  const unsigned threads = settings.threads < 1 ? 1 : settings.threads;
-  tbb::task_arena arena(int(threads), 1);
+  // More than TBB may use would be a line of its own on stderr, in whatever program, and far more a crash.
+  const auto most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  tbb::task_arena arena(int(std::clamp<std::size_t>(settings.threads, 1, most)), 1);
   MemoryMeter::reset_peak();
   const std::size_t before = MemoryMeter::current();
   const double wall = wall_seconds(), cpu = process_cpu_seconds();

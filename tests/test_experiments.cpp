@@ -22,6 +22,7 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"", "", "empty"},
       {"scenes:\n\t- bunny\n", ":2", "a tab"},
       {"scenes: [bunny\n", "", "not valid YAML"},
+      {"scenes: [bunny]\n---\nscenes: [bunny]\n", "", "2 YAML documents"},
       {"scenes: [bunny]\naxis: {}\n", ":2", "did you mean 'axes'"},
       {"axes: {structure: [tree]}\n", ":1", "no scenes"},
       {"scenes: []\n", ":1", "scenes is empty"},

@@ -173,6 +173,14 @@ TEST_CASE("make_mesh takes flat arrays and vectors of points alike") {
   CHECK_THROWS_AS(make_mesh(std::span(xyz), std::span(abc).first(2)), UserError);
 }
 
+TEST_CASE("more threads than there are do no harm") {
+  TracerSettings settings;
+  settings.threads = 100000;
+  const Tracer many(sphere(100), settings), one(sphere(100), with(&TracerSettings::isa, "scalar"));
+  const Ray ray{{0, 0, -5}, 0, {0, 0, 1}, kInfinity};
+  CHECK(many.closest_hit(ray).primitive == one.closest_hit(ray).primitive);
+}
+
 TEST_CASE("misuse is told in one line that names the mend") {
   struct Case {
     TracerSettings settings;

@@ -18,8 +18,8 @@ def draw(results):
         return found and (1e3 * found.median, 1e3 * found.low, 1e3 * found.high)
 
     def note(cell):
-        rate = cell.value("triangles_per_second")
-        return f"{digits(value(cell)[0])} ms" + (f", {rate / 1e6:.2f} Mtri/s" if rate else "")
+        milliseconds, triangles = value(cell)[0], cell.value("triangles")
+        return f"{digits(milliseconds)} ms" + (f", {1e-3 * triangles / milliseconds:.2f} Mtri/s" if triangles and milliseconds > 0 else "")
 
     return bar_panels(results, value, "build time, ms", note, ("builder", "threads", "isa", "leaf"), phases)
 

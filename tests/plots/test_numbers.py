@@ -166,6 +166,16 @@ class Loading(unittest.TestCase):
         self.assertEqual(folder.plot().returncode, 0)
         self.assertIn("--resume", (folder.path / "report.html").read_text())
 
+    def test_what_a_cut_off_run_had_planned(self):
+        cell = {"name": "build/bunny/bvh8", "scene": "bunny", "structure": "bvh8", "builder": "binned_sah", "leaf": "triangle4", "isa": "sse", "threads": 1}
+        cell["repetitions"] = [{"build_seconds": 0.5, "iterations": 4, "phase_seconds": {"splits": 1.2, "leaves": 0.8}}]
+        plan = {"context": {"git_revision": "abc123"}, "skipped": [{"name": "trace/bunny/list", "reason": "no such ray"}]}
+        folder = Folder(files={"cells.jsonl": json.dumps(cell) + "\n", "plan.json": json.dumps(plan)})
+        results = load(folder.path)
+        self.assertEqual(results.structures[0].rows[0]["phase_seconds"], {"splits": 0.3, "leaves": 0.2})  # those of one build
+        self.assertEqual(results.skipped, [("trace/bunny/list", "no such ray")])
+        self.assertEqual(results.context, {"git_revision": "abc123"})
+
 
 if __name__ == "__main__":
     unittest.main()
