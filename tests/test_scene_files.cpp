@@ -116,6 +116,8 @@ TEST_CASE("bad scene files: file, line, and the nearest key") {
       {"meshes: [a.obj]\nenvironment: {image: a.obj}\n", "a.obj: no image that can be read"},
       {"meshes: [a.obj]\nshutter: [1, 0]\n", ":2: the shutter closes before it opens"},
       {"meshes: [a.obj]\ninstances: [{mesh: b, transforms: [{scale: 1}]}]\n", ":2: unknown mesh 'b' (valid: a)"},
+      {"meshes: [a.obj, {file: a.obj, name: a}]\ninstances: [{mesh: a, transforms: [{scale: 1}]}]\n",
+       ":2: 2 meshes are called 'a'"},
       {"meshes: [a.obj]\ninstances: [{mesh: 1, transforms: [{scale: 1}]}]\n", ":2: mesh 1 does not exist"},
       {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [{scale: 0}]}]\n", ":2: a transform flattens its mesh"},
       {"meshes: [a.obj]\ninstances: [{mesh: a, transforms: [[1, 2, 3]]}]\n", ":2: a transform has 16 numbers"},
