@@ -92,7 +92,8 @@ std::vector<std::string> read_lines(const std::filesystem::path& path) {
 
 void flush_output() {
   errno = 0;
-  if (std::fflush(stdout) != 0) throw std::system_error(errno, std::generic_category());
+  if (std::fflush(stdout) != 0 || std::ferror(stdout))
+    throw std::system_error(errno != 0 ? errno : EIO, std::generic_category());
 }
 
 void write_whole(const std::filesystem::path& path, std::string_view text) {

@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "core/names.h"
+#include "experiments/append_file.h"
 #include "experiments/build_info.h"
 #include "experiments/commands.h"
 
@@ -273,9 +274,7 @@ int command_line(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   try {
     const int status = static_cast<int>(dispatch({argv + 1, argv + argc}));
-    errno = 0;
-    if (std::fflush(stdout) != 0 && errno == EPIPE) return kReaderLeft;
-    if (std::ferror(stdout)) return fail("output cannot be written: stdout is full or closed");
+    flush_output();
     return status;
   } catch (const UserError& e) {
     std::fflush(stdout);

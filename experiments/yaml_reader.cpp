@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "scenes/yaml_node.h"
 
 namespace arboretum {
 namespace {
@@ -69,12 +70,7 @@ YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
     throw UserError(fmt::format("{}: holds zero bytes, so it is no YAML text", file_.string()));
   }
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1)
-      throw UserError(
-          fmt::format("{}: {} YAML documents; a configuration is one: put the others into files of their own",
-                      file_.string(), documents.size()));
-    root_ = documents.empty() ? YAML::Node() : documents.front();
+    root_ = read_document(text, file_, "a configuration");
   } catch (const YAML::Exception& e) {
     throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it", file_.string(),
                                 e.mark.line + 1, e.msg));

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <set>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -13,14 +14,18 @@
 
 namespace arboretum {
 
+YAML::Node read_document(const std::string& text, const std::filesystem::path& path, std::string_view what) {
+  const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+  if (documents.size() > 1)
+    throw UserError(fmt::format("{}: {} YAML documents; {} is one: put the others into files of their own",
+                                path.string(), documents.size(), what));
+  return documents.empty() ? YAML::Node() : documents.front();
+}
+
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
   const FileBytes bytes(path_);
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(bytes.text()));
-    if (documents.size() > 1)
-      throw UserError(fmt::format("{}: {} YAML documents; a scene is one: put the others into files of their own",
-                                  path_.string(), documents.size()));
-    root_ = documents.empty() ? YAML::Node() : documents.front();
+    root_ = read_document(std::string(bytes.text()), path_, "a scene");
   } catch (const YAML::Exception& error) {
     throw UserError(fmt::format("{}:{}: {}", path_.string(), error.mark.line + 1, one_line(error.msg)));
   }

@@ -14,6 +14,11 @@
 
 namespace arboretum {
 
+/// The YAML document that `text` is; null where it is empty. `what`: the kind of file, "a scene", for messages. Throws
+/// UserError where there are several, and YAML::Exception.
+[[nodiscard]] YAML::Node read_document(const std::string& text, const std::filesystem::path& path,
+                                       std::string_view what);
+
 class YamlFile {
  public:
   /// Reads the file; its root must be a map. Throws UserError.

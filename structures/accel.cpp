@@ -90,11 +90,13 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   report = {};
   // More than TBB may use would be a line of its own on stderr, in whatever program, and far more a crash.
   const auto most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-  tbb::task_arena arena(int(std::clamp<std::size_t>(settings.threads, 1, most)), 1);
+  BuildSettings allowed = settings;
+  allowed.threads = unsigned(std::clamp<std::size_t>(settings.threads, 1, most));
+  tbb::task_arena arena(int(allowed.threads), 1);
   MemoryMeter::reset_peak();
   const std::size_t before = MemoryMeter::current();
   const double wall = wall_seconds(), cpu = process_cpu_seconds();
-  arena.execute([&] { accel->build(mesh, settings, report); });
+  arena.execute([&] { accel->build(mesh, allowed, report); });
   report.seconds = wall_seconds() - wall;
   report.cpu_seconds = process_cpu_seconds() - cpu;
   report.peak_bytes = MemoryMeter::peak() - before;
