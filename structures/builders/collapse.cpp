@@ -1,7 +1,6 @@
 #include "structures/builders/collapse.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -11,6 +10,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
+
+#include "structures/builders/number_runs.h"
 
 namespace arboretum {
 namespace {
@@ -191,12 +192,6 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
 /// Places in the array depend on scheduling, the tree does not.
 class Collapse::Writer {
  public:
-  /// The nodes [next, end) of a run, which the tasks of one place in the arena take next: by runs tasks seldom meet at
-  /// the counter or in a line of memory.
-  struct alignas(64) Share {
-    std::uint32_t next = 0, end = 0;
-  };
-
   Writer(const Collapse& collapse, ReservedArray<WideNode>& out)
       : collapse_(collapse), tree_(collapse.tree_), out_(out),
         shares_(std::size_t(tbb::this_task_arena::max_concurrency())) {
@@ -210,20 +205,17 @@ class Collapse::Writer {
     Share share;
     (void)write(0, 0, share);
     shares_.push_back(share);
-    for (const Share& unfinished : shares_)
-      out_.hand_out(unfinished.end > 0 ? kRun - (unfinished.end - unfinished.next) : 0);
+    for (const Share& last : shares_)
+      if (!last.is_new()) out_.hand_out(kRun - last.left());
   }
 
  private:
+  using Share = NumberRuns::Share;
   static constexpr std::uint32_t kRun = 512;
 
-  /// The first of `n` neighbouring nodes.
+  /// The first of `n` neighbouring nodes. A run counts when it is done.
   std::uint32_t take(unsigned n, Share& share) {
-    if (share.next + n > share.end) {
-      if (share.end > 0) out_.hand_out(kRun);
-      share.next = next_.fetch_add(kRun, std::memory_order_relaxed), share.end = share.next + kRun;
-    }
-    return std::exchange(share.next, share.next + n);
+    return numbers_.take(n, share, [&] { out_.hand_out(share.is_new() ? 0 : kRun); });
   }
 
   /// Returns the SAH cost of the subtree for a ray that enters it.
@@ -286,7 +278,7 @@ class Collapse::Writer {
   const BinaryTree& tree_;
   ReservedArray<WideNode>& out_;
   std::vector<Share> shares_;
-  std::atomic<std::uint32_t> next_{1};
+  NumberRuns numbers_{1, kRun};
 };
 
 void Collapse::write(ReservedArray<WideNode>& out) const {

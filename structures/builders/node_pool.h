@@ -1,13 +1,13 @@
 // NodePool: nodes of a BinaryTree for builders whose tasks make them at the same time.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 
 #include <tbb/task_arena.h>
 
 #include "structures/builders/binary_tree.h"
+#include "structures/builders/number_runs.h"
 
 namespace arboretum {
 
@@ -16,9 +16,7 @@ namespace arboretum {
 /// the tree need not.
 class NodePool {
  public:
-  struct Share {
-    std::uint32_t next = 0, end = 0;
-  };
+  using Share = NumberRuns::Share;
 
   /// For a tree of n references, when shares are those of tasks for subtrees of more than `grain` of them, and one for
   /// each place in the arena.
@@ -34,24 +32,18 @@ class NodePool {
 
   /// The first of two.
   [[nodiscard]] std::uint32_t take_pair(Share& share) noexcept {
-    if (share.next + 2 > share.end) {
-      share.next = next_.fetch_add(kBlock, std::memory_order_relaxed);
-      share.end = share.next + kBlock;
-      count(kBlock);
-    }
-    share.next += 2;
-    return share.next - 2;
+    return numbers_.take(2, share, [this] { count(kBlock); });
   }
 
   /// To be called when the tree is done.
-  void finish() noexcept { tree_.node_count = next_.load(std::memory_order_relaxed); }
+  void finish() noexcept { tree_.node_count = numbers_.end(); }
 
  private:
   static constexpr std::uint32_t kBlock = 64;
   void count(std::size_t n) noexcept { tree_.nodes.hand_out(n), tree_.first.hand_out(n); }
 
   BinaryTree& tree_;
-  std::atomic<std::uint32_t> next_{1};
+  NumberRuns numbers_{1, kBlock};
 };
 
 }  // namespace arboretum
