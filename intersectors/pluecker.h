@@ -44,9 +44,18 @@ struct Pluecker {
     vm<W> inside = ((smallest >= F(0.0f)) | (largest <= F(0.0f))) & (sum != F(0.0f));
     if (any(inside)) {
       const vf3<W> n = cross(terms.edge_u, terms.edge_v);  // (v1 - v0) x (v2 - v0)
-      const F det = dot(n, d);
+      F det = dot(n, d), numerator = dot(n, p0);
+      // Of a tiny triangle, or close to one, they underflow. With n times a power of two they are the same, but for
+      // that.
+      const vm<W> tiny =
+          (min_x86(abs(det), abs(numerator)) < F(0x1p-100f)) & (abs(n.x) + abs(n.y) + abs(n.z) < F(0x1p-20f));
+      if (__builtin_expect(any(inside & tiny), 0)) {
+        const F up(0x1p64f);
+        const vf3<W> larger{n.x * up, n.y * up, n.z * up};
+        det = select(tiny, dot(larger, d), det), numerator = select(tiny, dot(larger, p0), numerator);
+      }
       inside = inside & (det != F(0.0f));
-      hits.t = dot(n, p0) / det;
+      hits.t = numerator / det;
       hits.u_numerator = u, hits.v_numerator = v, hits.denominator = sum;
     }
     return inside;

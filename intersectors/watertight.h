@@ -15,11 +15,12 @@
 // |c|), and by 2 u |b||c| in its own roundings. Where the ray meets the triangle, t moves by the sum of these times
 // |depth - t| over |det|: s times those of two edges at most, 15.6 u R s + 1.5 u R s. Its other roundings are under 9 u
 // max |depth| <= 9 u (s + |t|), and |det| <= R. So |error of t| < 27 u R s / |det| + 9 u |t|: all but the last, which
-// is t's own rounding, within 2^-19 R s / |det|. Where that could turn t across tnear, and where t is closer to tnear
-// than 2^-10 of s and so inaccurate itself, t is computed again from the triangle's plane, in double, and kept between
-// the nearest and the farthest corner: a triangle that is met only because its corners are rounded, edge on, has its
-// plane anywhere along the ray, and must close the surface all the same. What lies clearly before tnear, as the
-// triangle that a ray has just left, is not.
+// is t's own rounding, within 2^-19 R s / |det|. The products that t is a sum of may underflow besides: by less than
+// 2^-147 / |det| in all. Where these could turn t across tnear, where |det| (t - tnear) is below 2^-124, so that the
+// last is more than t's rounding, and where t is closer to tnear than 2^-10 of s and so inaccurate itself, t is
+// computed again from the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle
+// that is met only because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the
+// surface all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not.
 #pragma once
 
 #include "intersectors/sheared_ray.h"
@@ -135,13 +136,16 @@ struct Watertight {
       out.u_numerator = v, out.v_numerator = w, out.denominator = det;
       return (sides != F(0.0f)) & clear(tnear, za, zb, zc, det, out.t);
     }
+    /// What the products that t is a sum of may lose, less than 2^-147, is no more than 2^-23 of this.
+    static constexpr float kUnderflow = 0x1p-124f;
     /// Lanes whose t need not be computed again in double; none where it has overflowed.
     ARBORETUM_INLINE vm<W> clear(F tnear, F za, F zb, F zc, F det, F t) const {
       const F spread = max_x86(max_x86(za, zb), zc) - min_x86(min_x86(za, zb), zc), area = abs(det);
       const auto squares = [](const vf3<W>& q) { return madd(q.x, q.x, madd(q.y, q.y, q.z * q.z)); };
       const F size = squares(p.a) + squares(p.b) + squares(p.c);
       const F beyond = (t - madd(t, F(0.0f), tnear)) * area, error = F(0x1p-19f) * size;  // NaN of an infinite t
-      return min_x86(madd(spread, error, beyond), msub(spread, max_x86(error, F(0x1p-10f) * area), beyond)) < F(0.0f);
+      return min_x86(madd(spread, error, beyond + F(kUnderflow)),
+                     msub(spread, max_x86(error, F(0x1p-10f) * area), beyond - F(kUnderflow))) < F(0.0f);
     }
   };
 

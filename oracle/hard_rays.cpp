@@ -181,6 +181,28 @@ class HardRayMaker::Draw {
   }
 
   Ray ray(HardKind kind, std::uint32_t& source) {
+    const Ray made = of_kind(kind, source);
+    return kind != HardKind::invalid && below(8) == 0 ? at_another_speed(made) : made;
+  }
+
+ private:
+  /// The same ray where a power of two makes its direction longer or shorter by up to 2^40, and its distances the other
+  /// way round; `ray` itself where numbers do not reach so far.
+  Ray at_another_speed(Ray ray) {
+    const int k = static_cast<int>(below(81)) - 40;
+    const Ray before = ray;
+    bool exact = true;
+    const auto scale = [&exact](float& x, int by) {
+      const float scaled = std::ldexp(x, by);
+      exact &= std::ldexp(scaled, -by) == x;
+      x = scaled;
+    };
+    for (std::size_t a = 0; a < 3; ++a) scale(ray.direction[a], k);
+    scale(ray.tnear, -k), scale(ray.tfar, -k);
+    return exact ? ray : before;
+  }
+
+  Ray of_kind(HardKind kind, std::uint32_t& source) {
     switch (kind) {
       case HardKind::vertex: {
         const Vec3f p = vertex();
@@ -201,7 +223,6 @@ class HardRayMaker::Draw {
     return {};
   }
 
- private:
   const HardRayMaker& maker_;
   std::uint64_t seed_, index_, next_ = 0;
   FrameTime at_;

@@ -2,6 +2,8 @@
 // groups of tests/hard_cases.json: edges, vertices, grazing, axis-parallel, in box faces, far away, interval ends, no
 // rays at all.
 //
+// One ray in eight has a direction up to 2^40 times as long or as short.
+//
 // Ray number i of a seed is the same whatever the batch that it is made in, and on every machine.
 #pragma once
 

@@ -76,7 +76,6 @@ constexpr KnownLimit kKnownLimits[] = {
     {"H04", "moller_trumbore", "missed", any, kBeyondRange},
     {"H04", "pluecker", "missed", any, kBeyondRange},
     {"H05", "moller_trumbore", "wrong_surface", any, kTooSmall},
-    {"H05", "pluecker", "wrong_surface", any, kTooSmall},
     {"H06", "moller_trumbore", "wrong_surface", any, kTooSmall},
     {"H06", "pluecker", "wrong_surface", any, kTooSmall},
     {"H10", "moller_trumbore", "missed", any, kBeyondRange},

@@ -22,17 +22,17 @@
 // 2^-20) (FMA), or 0, and the interval's ends are scaled by 1 -+ 2^-20 instead, once a ray and once a hit. No touched
 // box is lost either. Proof (FMA): let the exact ray be in the box at T within the interval. The rounded o * r and f
 // are off by (2 u + u^2)|o r| together, which e, however it is rounded, makes good, so near_z <= T (1 + 2 u) and far_z
-// >= T (1 - 2 u), up to u^2. The pads of x and y are then e = 12 u (M + |o|)|r|, of which 4 u make good their own
-// roundings; and (M + |o|)|r| >= T, since the ray is in the box at T: near_x <= T (1 - 8 u), far_x >= T (1 + 8 u). So
-// an entry in z is before an exit in x, and the other way round, also where r is subnormal and z off by 6 u; in z
-// itself the two are the same rounded, so monotone, function of planes that are in order; and the interval's own ends
-// are scaled by 16 u. Without FMA z has three relative roundings, 3 u, and the rest is the same. Boxes that a ray
-// starts on then do not count, where wide pads reach back over any step that it may have taken off its surface. Who may
-// ask for it: intersectors that find nothing but what the exact ray meets (`exact`), or which a ray that is moved
-// across z alone would meet, for what the pads of x and y stand, and at a distance between those of the nearest and the
-// farthest corner along z (`watertight`: kDepthBetweenCorners; its sheared x is off by 3 u (M + |o|) where shears are
-// fused and 4 u where not, the corners' errors being averaged as their depths are: with x's own 4 u and z's 2 or 3 u
-// that is 9 or 11 u of the 12).
+// >= T (1 - 2 u), up to u^2. The pads of x and y are then e = 20 u (M + |o|)|r|, of which 4 u make good their own
+// roundings; and (M + |o|)|r| >= T, since the ray is in the box at T: near_x <= T (1 - 16 u), far_x >= T (1 + 16 u). So
+// an entry in z is before an exit in x, and the other way round, also where r is subnormal, so off by 4 u, x by 7 u and
+// z by 5 or 6 u; in z itself the two are the same rounded, so monotone, function of planes that are in order; and the
+// interval's own ends are scaled by 16 u. Without FMA z has three relative roundings, 3 u, and the rest is the same.
+// Boxes that a ray starts on then do not count, where wide pads reach back over any step that it may have taken off its
+// surface. Who may ask for it: intersectors that find nothing but what the exact ray meets (`exact`), or which a ray
+// that is moved across z alone would meet, for what the pads of x and y stand, and at a distance between those of the
+// nearest and the farthest corner along z (`watertight`: kDepthBetweenCorners; its sheared x is off by 3.5 u (M + |o|)
+// where shears are fused and 4.5 u where not, the corners' errors being averaged as their depths are: with x's own 4 u
+// and z's 2 or 3 u that is 9.5 or 11.5 u of the 20, where r is subnormal 15.5 or 17.5).
 //
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once
@@ -60,7 +60,7 @@ template <class F, class Mask>
 /// alone loses by finding its largest axis what it gains (docs/performance.md).
 struct BoxPad {
   /// shares: of M + |o|, along other axes than a tight one, and of |o| along that
-  static constexpr float kWide = 0x1p-21f, kBeside = 0x1.8p-21f, kAlong = kHasFma ? 0x1.00001p-23f : 0.0f;
+  static constexpr float kWide = 0x1p-21f, kBeside = 0x1.4p-20f, kAlong = kHasFma ? 0x1.00001p-23f : 0.0f;
 
   float max_coordinate;  ///< the scene's largest
   bool tight = false;    ///< along the axis where the direction is largest

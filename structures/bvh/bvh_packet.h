@@ -84,18 +84,19 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     for (int a = 0; a < 3; ++a) {
       range(lanes_.r[a], mask, r[a].low, r[a].high), range(lanes_.rays.origin[a], mask, o[a].low, o[a].high);
     }
-    float scale[3];
-    for (int a = 0; a < 3; ++a) scale[a] = 0x1p-20f * (max_coordinate_ + o[a].largest());
+    float size[3];  // 2^-20 of it, times r, is the pad
+    for (int a = 0; a < 3; ++a) size[a] = max_coordinate_ + o[a].largest();
     spread_.reach = 0.0f;
     v.from_end = false;
     if constexpr (AnyHit) {
-      if (v.usable) take_common_end(mask, v, o, scale);
+      if (v.usable) take_common_end(mask, v, o, size);
     }
     for (int a = 0; a < 3; ++a) {
       const bool negative = __builtin_signbit(r[a].low) != 0;
       v.r_low[a] = r[a].low, v.r_high[a] = r[a].high;
       v.near_origin[a] = negative ? o[a].low : o[a].high, v.far_origin[a] = negative ? o[a].high : o[a].low;
-      v.pad[a] = scale[a] * (negative ? -r[a].low : r[a].high) + 0x1p-99f;
+      // In this order: 2^-20 of a tiny scene may be nothing.
+      v.pad[a] = 0x1p-20f * (size[a] * (negative ? -r[a].low : r[a].high)) + 0x1p-99f;
       v.near[a] = unsigned(2 * a + negative);
       v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
       Base::set_axis(a, o[a].low, o[a].high, mask);
@@ -103,13 +104,16 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     return v;
   }
 
-  /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together.
-  static float rounding(const Bounds& o, const Bounds& end) { return 0x1p-21f * (o.largest() + end.largest()); }
+  /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together, or by a subnormal number's
+  /// last place.
+  static float rounding(const Bounds& o, const Bounds& end) {
+    return 0x1p-21f * (o.largest() + end.largest()) + 0x1p-148f;
+  }
 
   /// Rays towards a light have no common origin, but their ends o + tfar d lie close together. Then the bounds of the
   /// ends take the place of the origins', and distances count from a ray's end, s = t - tfar: it meets a plane b at s =
   /// (b - end) r.
-  void take_common_end(Mask mask, Interval& v, Bounds (&o)[3], float (&scale)[3]) {
+  void take_common_end(Mask mask, Interval& v, Bounds (&o)[3], float (&size)[3]) {
     Bounds t, end[3];
     range(lanes_.t, mask, t.low, t.high);
     if (!(t.high < std::numeric_limits<float>::infinity())) return;
@@ -134,7 +138,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       const float up = end[a].high - o[a].low, down = o[a].high - end[a].low;
       spread_.reach += up > down ? up : down;
       o[a] = {end[a].low - wide, end[a].high + wide};
-      scale[a] = 0x1p-19f * (max_coordinate_ + largest);
+      size[a] = 2.0f * (max_coordinate_ + largest);
     }
     v.tnear = v.tnear - t.high * (1.0f + 0x1p-20f);
   }

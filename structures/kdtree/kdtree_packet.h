@@ -122,7 +122,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
       const bool down = __builtin_signbit(v.r0[a]) != 0;
       const float r = down ? -v.r0[a] : v.r1[a], o = -o0 > o1 ? -o0 : o1;
       v.low_origin[a] = down ? o0 : o1, v.high_origin[a] = down ? o1 : o0;
-      v.pad[a] = 0x1p-19f * (max_coordinate_ + o) * r + 0x1p-98f;
+      v.pad[a] = 0x1p-19f * ((max_coordinate_ + o) * r) + 0x1p-98f;  // in this order, as in BVHs
       v.usable &= v.pad[a] < 0x1p100f;
       Base::set_axis(a, o0, o1, group);
     }
