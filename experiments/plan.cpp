@@ -271,8 +271,9 @@ class Planner {
     }
     for (std::size_t i = 0; i < experiment_.exclude.size(); ++i) {
       if (!used_excludes_.contains(i)) {
-        throw UserError(experiment_.exclude[i].where +
-                        ": this exclude takes no cell away: nothing of it is in the sweep; take it out");
+        throw UserError(
+            experiment_.exclude[i].where +
+            ": this exclude takes no cell away: nothing of it is in the sweep, or others take it; take it out");
       }
     }
     for (const auto& [name, where] : experiment_.parameter_places) {

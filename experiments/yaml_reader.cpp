@@ -61,6 +61,13 @@ std::string shown(const YAML::Node& node) {
   return node.IsSequence() ? "a list" : node.IsMap() ? "a map" : "nothing";
 }
 
+/// The same text for the same number: 1, 1.0 and 1e0 are one value.
+std::string one_spelling(const std::string& word) {
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  return error == std::errc{} && end == word.data() + word.size() ? fmt::format("{}", number) : word;
+}
+
 }  // namespace
 
 YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
@@ -144,7 +151,7 @@ std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, std::string_vie
   for (const YAML::Node& value : values) {
     if (!value.IsScalar() || value.Scalar().empty())
       fail(value, fmt::format("{}: a value must be a word, not {}", what, shown(value)));
-    if (!seen.insert(value.Scalar()).second)
+    if (!seen.insert(one_spelling(value.Scalar())).second)
       fail(value, fmt::format("{}: '{}' is given twice; keep one", what, value.Scalar()));
   }
   return values;

@@ -28,6 +28,7 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: []\n", ":1", "scenes is empty"},
       {"scenes: [buny]\n", ":1", "did you mean 'bunny'"},
       {"scenes: [bunny, bunny]\n", ":1", "given twice"},
+      {"scenes: [bunny]\naxes: {threads: [1, 1.0]}\n", ":2", "'1.0' is given twice"},
       {"scenes: [{file: nowhere.obj}]\n", ":1", "is no file"},
       {"scenes: [{file: nowhere.obj, optional: maybe}]\n", ":1", "true or false"},
       {"scenes: [{generate: sphere, optional: true}]\n", ":1", "no effect with generate"},

@@ -2,7 +2,7 @@
 answers, one for the error of t, a column an instruction set. Otherwise that of each workload's own rays, a panel a scene, workload and
 instruction set."""
 
-from matplotlib.ticker import FixedLocator, NullLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from results import HARD_PREFIX, NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_with_zero, marker_legend, marker_map, panel_grid, panels, short
@@ -120,10 +120,14 @@ def measure_of(cells):
 def log_time(axis, times):
     low, high = min(times, default=1.0), max(times, default=1.0)
     axis.set_xscale("log")
-    axis.set_xlim(0.85 * low, 1.18 * high)
+    left, right = 0.85 * low, 1.18 * high
+    axis.set_xlim(left, right)
     dense = high / low < 30
     digits = (1, 1.5, 2, 3, 4, 5, 7) if high / low < 5 else (1, 2, 5) if dense else (1,)
-    axis.xaxis.set_major_locator(FixedLocator([d * 10.0**k for k in range(-1, 8) for d in digits]))
+    ticks = [d * 10.0**k for k in range(-1, 8) for d in digits if left <= d * 10.0**k <= right]
+    if len(ticks) < 3:  # times that hardly differ
+        ticks = [t for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(left, right) if left <= t <= right]
+    axis.xaxis.set_major_locator(FixedLocator(ticks))
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_locator(NullLocator())
 

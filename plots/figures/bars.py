@@ -5,6 +5,10 @@ from results import NoData, axis_sort_key, ordered, undetermined_axes
 from style import colour, hatch, legends_right, panels, part_colour, part_legend, short
 
 
+# Inches: of a panel at least; of its bars; of a character beside them.
+LEAST_WIDTH, BAR_WIDTH, CHARACTER = 5.6, 2.6, 0.068
+
+
 def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None):
     """`value_of(cell)` gives (median, low, high) or None; `note_of(cell)` the text at a bar's end; `parts_of(cell)`, where
     given, (name, value) of what the bar consists of: it is then stacked, and what the parts leave is drawn as the rest. Lower is better.
@@ -23,7 +27,8 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
     tallest = max(len(b) for b in bars.values())
-    figure, axes = panels(rows, columns, 5.6, 0.9 + 0.26 * tallest)
+    texts = max(len(bar_label(c, varied)) + len(note_of(c)) for c in cells)
+    figure, axes = panels(rows, columns, max(LEAST_WIDTH, BAR_WIDTH + CHARACTER * texts), 0.9 + 0.26 * tallest)
     figure.get_layout_engine().set(w_pad=0.15)
     for index, axis in enumerate(axes.flat):
         if index >= len(scenes):
@@ -65,7 +70,7 @@ def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
             axis.barh(place, value, 0.74, left=left, color=part_colour(name), edgecolor="white", linewidth=0.5)
             left += value
         axis.annotate(note_of(cell), (high, place), (5, 0), textcoords="offset points", va="center", fontsize=8.5)
-    axis.set_yticks(range(len(cells)), [" ".join([c["structure"]] + [label(a, c[a]) for a in varied if c[a]]) for c in cells])
+    axis.set_yticks(range(len(cells)), [bar_label(c, varied) for c in cells])
     axis.set_ylim(len(cells) - 0.4, -0.6)
     axis.set_xlim(0, 1.02 * max(value_of(c)[2] for c in cells) or 1.0)
     axis.grid(axis="y", visible=False)
@@ -74,6 +79,10 @@ def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
 def digits(value):
     """Three digits or all before the point, without an exponent for what a build takes."""
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:#.3g}"
+
+
+def bar_label(cell, varied):
+    return " ".join([cell["structure"]] + [label(a, cell[a]) for a in varied if cell[a]])
 
 
 def label(axis, key):

@@ -105,7 +105,8 @@ def panel(axis, table, rows, columns):
         spine.set_visible(False)
     starts = [k for k in range(len(columns)) if k == 0 or columns[k][0] != columns[k - 1][0]]
     for first, after in zip(starts, [*starts[1:], len(columns)]):
-        axis.text((first + after - 1) / 2, -0.75, columns[first][0].replace("_", "\n" if after - first == 1 else " "), ha="center", va="bottom", fontsize=9.5)
+        alone = after - first == 1
+        axis.text((first + after - 1) / 2, -0.75, columns[first][0].replace("_", "\n" if alone else " "), ha="center", va="bottom", fontsize=7.5 if alone else 9.5)
         if first:
             axis.axvline(first - 0.5, color="white", linewidth=4)
     for y in range(1, len(rows)):
