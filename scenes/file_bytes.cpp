@@ -17,7 +17,8 @@ namespace {
 /// Opens the file, checks that it is one and holds something; returns its descriptor and size.
 std::pair<int, std::size_t> open_file(const std::filesystem::path& path) {
   const std::string name = path.string();
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  // Without O_NONBLOCK the opening of a pipe waits for who writes into it.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
     if (errno == ENOENT) throw UserError(name + ": no such file; check the path");
     throw UserError(name + ": cannot be read: " + std::strerror(errno));
@@ -29,7 +30,7 @@ std::pair<int, std::size_t> open_file(const std::filesystem::path& path) {
   } else if (S_ISDIR(status.st_mode)) {
     fault = ": is a directory; name a model or scene file in it";
   } else if (!S_ISREG(status.st_mode)) {
-    fault = ": is no regular file";
+    fault = ": is a pipe or a device; name a regular file";
   } else if (status.st_size == 0) {
     fault = ": the file is empty";
   }
@@ -54,6 +55,11 @@ FileBytes::FileBytes(const std::filesystem::path& path) {
 
 FileBytes::~FileBytes() {
   if (data_) ::munmap(data_, size_);
+}
+
+std::string_view without_mark(std::string_view text) noexcept {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  return text.starts_with(kMark) ? text.substr(kMark.size()) : text;
 }
 
 void check_readable_file(const std::filesystem::path& path) { ::close(open_file(path).first); }

@@ -9,7 +9,7 @@ namespace arboretum {
 
 class FileBytes {
  public:
-  /// Throws UserError where `path` is missing, a directory, unreadable or empty.
+  /// Throws UserError where `path` is missing, a directory, a pipe or device, unreadable or empty.
   explicit FileBytes(const std::filesystem::path& path);
   FileBytes(const FileBytes&) = delete;
   FileBytes& operator=(const FileBytes&) = delete;
@@ -21,6 +21,8 @@ class FileBytes {
   std::size_t size_ = 0;
 };
 
+/// The text without the byte-order mark that some editors put before UTF-8.
+[[nodiscard]] std::string_view without_mark(std::string_view text) noexcept;
 /// The checks of FileBytes alone, for files that a library opens.
 void check_readable_file(const std::filesystem::path& path);
 

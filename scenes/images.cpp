@@ -43,6 +43,7 @@ Vec3f mean_radiance(const RadianceImage& image) {
 }
 
 std::optional<Image> read_image(const std::filesystem::path& image) {
+  if (std::error_code error; !std::filesystem::is_regular_file(image, error)) return std::nullopt;  // a pipe would wait
   int width = 0, height = 0, channels = 0;
   const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(stbi_load(image.c_str(), &width, &height, &channels, 0),
                                                          stbi_image_free);

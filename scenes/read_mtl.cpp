@@ -1,6 +1,7 @@
 // MTL through tinyobjloader.
 #include <tiny_obj_loader.h>
 
+#include <algorithm>
 #include <map>
 #include <sstream>
 
@@ -17,7 +18,7 @@ Vec3f color(const tinyobj::real_t (&c)[3]) { return {float(c[0]), float(c[1]), f
 
 std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<std::string>& warnings) {
   const FileBytes bytes(path);
-  std::istringstream stream{std::string(bytes.text())};
+  std::istringstream stream{std::string(without_mark(bytes.text()))};
   std::map<std::string, int> ids;
   std::vector<tinyobj::material_t> read;
   std::string warning, error;
@@ -44,26 +45,16 @@ std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<st
       if (!is_finite(*c))
         throw UserError(path.string() + ": material '" + m.name + "' has a colour that is no finite number");
     }
-    if (!m.diffuse_texname.empty()) material.diffuse_map = (path.parent_path() / m.diffuse_texname).string();
-    if (!m.alpha_texname.empty()) material.opacity_map = (path.parent_path() / m.alpha_texname).string();
+    if (!m.diffuse_texname.empty()) material.diffuse_map = beside(path, m.diffuse_texname).string();
+    if (!m.alpha_texname.empty()) material.opacity_map = beside(path, m.alpha_texname).string();
     materials.push_back(std::move(material));
   }
   return materials;
 }
 
-std::string one_line(std::string_view text) {
-  std::string line;
-  for (const char c : text) {
-    // Bytes of broken files are not UTF-8, and what is printed may end up in JSON.
-    const auto byte = static_cast<unsigned char>(c);
-    const bool blank = byte <= ' ' || byte == 127;
-    if (blank && (line.empty() || line.back() == ' ')) continue;
-    line += blank ? ' ' : byte < 128 ? c : '?';
-  }
-  while (!line.empty() && line.back() == ' ') line.pop_back();
-  constexpr std::size_t kLongest = 300;
-  if (line.size() > kLongest) line = line.substr(0, kLongest) + "...";
-  return line;
+std::filesystem::path beside(const std::filesystem::path& file, std::string name) {
+  std::ranges::replace(name, '\\', '/');
+  return file.parent_path() / name;
 }
 
 }  // namespace arboretum

@@ -8,6 +8,8 @@
 #include <istream>
 #include <map>
 #include <optional>
+#include <set>
+#include <sstream>
 #include <streambuf>
 
 #include <fmt/format.h>
@@ -48,7 +50,8 @@ struct ObjReader {
   MappedBuffer buffer;
   Scene scene;
   std::map<std::string, int> material_ids;
-  bool material_library_seen = false;
+  std::set<std::string> libraries, unknown_materials;  // those told of
+  bool library_missing = false;
   std::optional<std::uint16_t> material, default_material;
   std::vector<std::uint32_t> corners;
   std::vector<std::array<float, 2>> texture_vertices, texture_corners;
@@ -58,6 +61,10 @@ struct ObjReader {
 
   [[noreturn]] void fail(const std::string& what) const {
     throw UserError(fmt::format("{}:{}: {}", path.string(), buffer.line_number(), what));
+  }
+
+  void warn(const std::string& what) {
+    scene.report.warnings.push_back(fmt::format("{}:{}: {}", path.string(), buffer.line_number(), what));
   }
 
   void add_vertex() {
@@ -148,20 +155,28 @@ struct ObjReader {
       material = std::uint16_t(found->second);
       return;
     }
-    if (material_library_seen) {
-      scene.report.warnings.push_back(fmt::format("{}:{}: no material '{}' in the material library; grey stands in",
-                                                  path.string(), buffer.line_number(), one_line(name)));
+    // Where a library is missing, its own warning stands for all of its materials.
+    if (!library_missing && unknown_materials.insert(name).second) {
+      warn(fmt::format("no material '{}' in {}; grey stands in", one_line(name),
+                       libraries.empty() ? "any 'mtllib' before it" : "the material library"));
     }
     use_default_material();
   }
 
+  /// One line may name several, or one whose name holds blanks.
+  void add_libraries(const std::string& names) {
+    std::error_code error;
+    if (std::filesystem::exists(beside(path, names), error)) return add_library(names);
+    std::istringstream words(names);
+    for (std::string name; words >> name;) add_library(name);
+  }
+
   void add_library(const std::string& name) {
-    material_library_seen = true;
-    const std::filesystem::path file = path.parent_path() / name;
+    if (!libraries.insert(name).second) return;
+    const std::filesystem::path file = beside(path, name);
     if (std::error_code error; !std::filesystem::exists(file, error)) {
-      scene.report.warnings.push_back(fmt::format("{}:{}: no material library '{}'; grey stands in for its materials",
-                                                  path.string(), buffer.line_number(), one_line(file.string())));
-      material_library_seen = false;
+      warn(fmt::format("no material library '{}'; grey stands in for its materials", one_line(file.string())));
+      library_missing = true;
       return;
     }
     std::vector<Material> read = read_mtl(file, scene.report.warnings);
@@ -186,25 +201,30 @@ std::string argument(std::string_view line, std::size_t keyword) {
 }
 
 /// Stands in for tinyobjloader's own lookup of `mtllib`, whose failures are no more than a line in a warning
-/// string.
+/// string, and which cuts names at blanks and reads the first alone.
 class LibraryReader : public tinyobj::MaterialReader {
  public:
   explicit LibraryReader(ObjReader& reader) : reader_(reader) {}
-  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*, std::map<std::string, int>*, std::string*,
+  /// Called for each word of the line; the line is read at the first. True would end the line and let tinyobjloader
+  /// pass over later ones that begin with the same word.
+  bool operator()(const std::string&, std::vector<tinyobj::material_t>*, std::map<std::string, int>*, std::string*,
                   std::string*) override {
-    reader_.add_library(name);
-    return true;
+    const std::string_view line = reader_.buffer.line();
+    if (line.data() != line_) reader_.add_libraries(argument(line, 6));
+    line_ = line.data();
+    return false;
   }
 
  private:
   ObjReader& reader_;
+  const char* line_ = nullptr;
 };
 
 }  // namespace
 
 Scene read_obj(const std::filesystem::path& path) {
   const FileBytes bytes(path);
-  ObjReader reader(path, bytes.text());
+  ObjReader reader(path, without_mark(bytes.text()));
   tinyobj::callback_t callback;
   callback.vertex_cb = [](void* self, auto...) { static_cast<ObjReader*>(self)->add_vertex(); };
   callback.texcoord_cb = [](void* self, tinyobj::real_t u, tinyobj::real_t v, tinyobj::real_t) {

@@ -31,8 +31,11 @@ namespace arboretum {
 /// Any model by its extension, not sanitised.
 [[nodiscard]] Scene read_model(const std::filesystem::path& path);
 
-/// A library's message, or a word of a file, fit for one line: control characters made spaces, what is not
-/// ASCII made '?'.
+/// A file that a model names, relative to the model's folder; a backslash parts folders as '/' does.
+[[nodiscard]] std::filesystem::path beside(const std::filesystem::path& file, std::string name);
+
+/// A library's message, or a word of a file, fit for one line: control characters made spaces, each byte that is no
+/// part of UTF-8 made '?'.
 [[nodiscard]] std::string one_line(std::string_view text);
 
 }  // namespace arboretum

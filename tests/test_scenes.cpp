@@ -1,4 +1,5 @@
 // Readers of every format, bad files, sanitising, polygons. Every file is written by the test.
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <clocale>
@@ -11,6 +12,7 @@
 #include "core/random.h"
 #include "scenes/number_text.h"
 #include "scenes/polygon.h"
+#include "scenes/readers.h"
 #include "scenes/rescale.h"
 #include "scenes/sanitise.h"
 #include "tests/scene_files.h"
@@ -144,6 +146,74 @@ TEST_CASE("OBJ: polygons, negative indices, materials, line ends, exact decimals
   CHECK_THAT(scene.report.warnings[0], Catch::Contains("a.obj:12: no material 'missing'"));
 }
 
+TEST_CASE("OBJ and MTL: a byte-order mark costs no line") {
+  const Folder folder;
+  const std::string mark = "\xef\xbb\xbf";
+  folder.write("m.mtl", mark + "newmtl red\nKd 1 0 0\n");
+  const Scene scene =
+      load_file(folder.write("a.obj", mark + "v 5 0 0\nv 1 0 0\nv 0 1 0\nmtllib m.mtl\nusemtl red\nf 1 2 -1\n"));
+  REQUIRE(scene.mesh.size() == 1);
+  CHECK(scene.mesh.corners(0)[0] == Vec3f{5, 0, 0});
+  CHECK(scene.materials.at(scene.mesh.materials.at(0)).diffuse == Vec3f{1, 0, 0});
+  CHECK(scene.report.warnings.empty());
+  CHECK_THAT(error_of([&] { (void)load_file(folder.write("b.obj", mark + "v 0 0 zero\n")); }),
+             Catch::Contains("b.obj:1: vertex 1 has no number for z"));
+}
+
+TEST_CASE("OBJ: names of material libraries and images as other systems write them") {
+  const Folder folder;
+  fs::create_directory(folder.path() / "tex");
+  folder.write("ma t.mtl", "newmtl one\nmap_Kd tex\\a.png\nmap_d .\\tex\\my b.png\n");
+  folder.write("tex/two.mtl", "newmtl two\n");
+  folder.write("three.mtl", "newmtl three\n");
+  folder.write("ma u.mtl", "newmtl four\n");
+  const std::string faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl one\nf 1 2 3\nusemtl four\nf 1 3 2\n";
+  const Scene scene =
+      load_file(folder.write("a.obj", "mtllib ma t.mtl \nmtllib tex\\two.mtl three.mtl\nmtllib ma u.mtl\n" + faces));
+  CHECK(scene.report.warnings.empty());
+  REQUIRE(scene.materials.size() == 4);
+  CHECK(scene.materials[0].diffuse_map == (folder.path() / "tex/a.png").string());
+  CHECK(scene.materials[0].opacity_map == (folder.path() / "./tex/my b.png").string());
+  CHECK(scene.materials[1].name == "two");
+  CHECK(scene.materials[2].name == "three");
+  CHECK(scene.mesh.materials == std::vector<std::uint16_t>{0, 3});
+}
+
+TEST_CASE("OBJ: what is missing of materials is told once a name, the name as it is written") {
+  const Folder folder;
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n",
+                    uses = "usemtl nosuch\nf 1 2 3\nusemtl nöch\nf 1 2 3\nusemtl nosuch\nf 1 2 3\n";
+  const auto warnings = [&](const std::string& first) {
+    return load_file(folder.write("a.obj", first + vertices + uses)).report.warnings;
+  };
+  folder.write("m.mtl", "newmtl red\n");
+  const std::vector<std::string> none = warnings(""), known = warnings("mtllib m.mtl\n"),
+                                 missing = warnings("mtllib matü.mtl\n");
+  REQUIRE(none.size() == 2);
+  CHECK_THAT(none[0], Catch::EndsWith("a.obj:4: no material 'nosuch' in any 'mtllib' before it; grey stands in"));
+  CHECK_THAT(none[1], Catch::Contains("a.obj:6: no material 'nöch'"));
+  REQUIRE(known.size() == 2);
+  CHECK_THAT(known[0], Catch::EndsWith("a.obj:5: no material 'nosuch' in the material library; grey stands in"));
+  REQUIRE(missing.size() == 1);
+  CHECK_THAT(missing[0], Catch::Contains("a.obj:1: no material library") && Catch::Contains("/matü.mtl'"));
+}
+
+TEST_CASE("words for one line: UTF-8 stays, all else that does not print becomes a blank or '?'") {
+  const std::pair<std::string, std::string> cases[] = {
+      {"  a\t\n b \x7f", "a b"},
+      {"ä€\xf0\x9f\x98\x80", "ä€\xf0\x9f\x98\x80"},
+      {"\xff\xe4x", "??x"},                           // Latin-1
+      {"\xc3", "?"},                                  // cut off
+      {"\xc0\xaf \xe0\x80\xaf", "?? ???"},            // longer than need be
+      {"\xed\xa0\x80 \xf4\x90\x80\x80", "??? ????"},  // a surrogate; beyond the last
+      {"a\xc2\x9b"
+       "2Jb",
+       "a 2Jb"},  // a terminal's command
+      {std::string(298, 'a') + "€", std::string(298, 'a') + "..."},
+  };
+  for (const auto& [text, line] : cases) CHECK(one_line(text) == line);
+}
+
 TEST_CASE("PLY: material ids, other properties, other element order of types") {
   const Folder folder;
   const Scene plain = load_file(folder.write("a.ply", ply_binary(false, true)));
@@ -264,6 +334,10 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
     fs::create_directory(folder.path() / (std::string("folder") + extension));
     CHECK_THAT(error_of([&] { (void)load_file(folder.path() / (std::string("folder") + extension)); }),
                Catch::Contains("is a directory"));
+  }
+  for (const char* name : {"pipe.obj", "pipe.ply", "pipe.stl", "pipe.yaml"}) {
+    REQUIRE(::mkfifo((folder.path() / name).c_str(), 0600) == 0);
+    CHECK_THAT(error_of([&] { (void)load_file(folder.path() / name); }), Catch::Contains("is a pipe or a device"));
   }
   if (::geteuid() != 0) {  // root reads everything
     const fs::path locked = folder.write("locked.obj", obj_text());
