@@ -85,7 +85,13 @@ class SceneFile {
   void read_shutter(const YAML::Node& node) {
     if (!node.IsSequence() || node.size() != 2) file_.fail(node, "shutter must be [open, close]");
     scene_.shutter = {float(file_.number(node[0], "shutter open")), float(file_.number(node[1], "shutter close"))};
-    if (scene_.shutter.close < scene_.shutter.open) file_.fail(node, "the shutter closes before it opens");
+    const auto [open, close] = scene_.shutter;
+    if (close < open) file_.fail(node, "the shutter closes before it opens");
+    if (!(open >= 0.0f && close <= 1.0f))
+      file_.fail(
+          node,
+          fmt::format("the shutter [{:g}, {:g}] must lie within [0, 1], the time from the first key frame to the last",
+                      open, close));
   }
 
   void read_environment(const YAML::Node& node) {
@@ -144,15 +150,10 @@ class SceneFile {
     scene_.key_frames = std::max(scene_.key_frames, unsigned(frames.size()));
   }
 
-  /// Rays need times within the key frames'. A shutter that never opens shows one moment: the scene stands still.
+  /// A shutter that never opens shows one moment: the scene stands still.
   void settle_motion(const YAML::Node& shutter) {
     if (!scene_.mesh.moves()) return;
     const auto [open, close] = scene_.shutter;
-    if (!(open >= 0.0f && close <= 1.0f))
-      file_.fail(
-          shutter,
-          fmt::format("the shutter [{:g}, {:g}] must lie within [0, 1], the time from the first key frame to the last",
-                      open, close));
     if (open < close) return;
     scene_.mesh = pose(scene_.mesh, open);
     scene_.report.warnings.push_back(
