@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <fstream>
+#include <sstream>
 
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC
@@ -97,7 +98,15 @@ void write_png(const std::filesystem::path& path, unsigned width, unsigned heigh
   write_bytes(path, bytes);
 }
 
+void check_exposure(double stops) {
+  if (std::fabs(stops) <= kMaxStops) return;
+  std::ostringstream shortest;
+  shortest << stops;
+  throw UserError("an exposure of " + shortest.str() + " stops is not possible; -300 to 300 are");
+}
+
 void write_picture(const std::filesystem::path& path, const Picture& picture, double stops) {
+  check_exposure(stops);
   check_picture_path(path);
   if (path.extension() == ".pfm")
     write_bytes(path, pfm(picture));

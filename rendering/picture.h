@@ -24,8 +24,13 @@ struct Picture {
 /// No other tone mapping: equal radiance has equal colours in every picture of the same exposure.
 [[nodiscard]] std::vector<std::uint8_t> develop(const Picture& picture, double stops);
 
+/// Stops at most, either way: 2^300 and its inverse span all that float32 holds.
+inline constexpr double kMaxStops = 300.0;
+/// Throws UserError for stops that are no number within kMaxStops.
+void check_exposure(double stops);
+
 /// Writes .png (developed) or .pfm (the radiance itself, float32, exposure not applied). Throws UserError for another
-/// extension or where it cannot be written.
+/// extension, where it cannot be written, and as check_exposure() does.
 void write_picture(const std::filesystem::path& path, const Picture& picture, double stops);
 /// As a .png, of bytes that are colours already, rows downwards. Throws UserError.
 void write_png(const std::filesystem::path& path, unsigned width, unsigned height,

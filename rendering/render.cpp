@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <sstream>
 #include <thread>
 
 #include "core/error.h"
@@ -70,12 +71,15 @@ void check(const RenderSettings& s) {
   check_resolution(s.width, s.height);
   if (s.samples < 1 || s.samples > 65536)
     throw UserError(std::to_string(s.samples) + " samples a pixel are not possible; 1 to 65536 are");
-  if (s.integrator == Integrator::whitted && s.depth > kMostBranching)
+  if (s.integrator == Integrator::whitted && s.depth > kMaxWhittedDepth)
     throw UserError("depth " + std::to_string(s.depth) +
-                    " is not possible for whitted, which follows every branch; 0 to " + std::to_string(kMostBranching) +
-                    " are");
-  if (!(s.clamp > 0.0f))
-    throw UserError("a clamp of " + std::to_string(s.clamp) + " is not possible; it must be above 0");
+                    " is not possible for whitted, which follows every branch; 0 to " +
+                    std::to_string(kMaxWhittedDepth) + " are");
+  if (!(s.clamp > 0.0f)) {
+    std::ostringstream shortest;
+    shortest << s.clamp;
+    throw UserError("a clamp of " + shortest.str() + " is not possible; one above 0 is, or none");
+  }
 }
 
 Integrator parse_integrator(const std::string& word) {

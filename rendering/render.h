@@ -28,7 +28,7 @@ inline constexpr std::array<std::string_view, 4> kIntegratorNames{"path", "whitt
 [[nodiscard]] Integrator parse_integrator(const std::string& word);
 
 /// Scatterings of a path of `whitted` at most: the number of a node doubles with each hit.
-inline constexpr unsigned kMostBranching = 32;
+inline constexpr unsigned kMaxWhittedDepth = 32;
 
 struct RenderSettings {
   Integrator integrator = Integrator::path;

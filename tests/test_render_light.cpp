@@ -28,12 +28,13 @@ Camera aimed(Vec3f from, Vec3f at) {
 /// are three standard deviations and more.
 Vec3f seen(const Scene& scene, unsigned samples, EffectSet effects, Integrator integrator = Integrator::path,
            unsigned depth = 64) {
-  const Picture p = picture_of(scene, effects,
-                               {.integrator = integrator,
-                                .width = 2,
-                                .height = 2,
-                                .samples = (samples + 3) / 4,
-                                .depth = integrator == Integrator::whitted ? std::min(depth, kMostBranching) : depth});
+  const Picture p =
+      picture_of(scene, effects,
+                 {.integrator = integrator,
+                  .width = 2,
+                  .height = 2,
+                  .samples = (samples + 3) / 4,
+                  .depth = integrator == Integrator::whitted ? std::min(depth, kMaxWhittedDepth) : depth});
   return {float(mean(p, 0)), float(mean(p, 1)), float(mean(p, 2))};
 }
 Vec3f seen(const Scene& scene, unsigned samples = 1, Integrator integrator = Integrator::path, unsigned depth = 64) {

@@ -469,7 +469,11 @@ TEST_CASE("settings that cannot be") {
   CHECK(error({.integrator = Integrator::whitted, .depth = 33}).find("0 to 32") != std::string::npos);
   for (const float clamp : {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN()})
     CHECK(error({.clamp = clamp}).find("clamp") != std::string::npos);
+  CHECK(error({.clamp = 0.0f}) == "a clamp of 0 is not possible; one above 0 is, or none");
   check({.integrator = Integrator::whitted, .depth = 32}), check({.depth = 4096});
+  for (const double stops : {1e9, -301.0, std::numeric_limits<double>::quiet_NaN()})
+    CHECK(error_of([&] { check_exposure(stops); }).find("stops is not possible; -300 to 300 are") != std::string::npos);
+  check_exposure(-300), check_exposure(300);
 }
 
 TEST_CASE("automatic exposure brings three quarters of what is not black below half of white") {
