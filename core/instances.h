@@ -21,7 +21,9 @@ struct AffineMap {
 [[nodiscard]] Vec3f transform_point(const AffineMap& map, Vec3f p) noexcept;
 /// The same for a direction: no translation.
 [[nodiscard]] Vec3f transform_direction(const AffineMap& map, Vec3f d) noexcept;
-/// The determinant of the linear part must not be 0.
+/// Of the linear part.
+[[nodiscard]] double determinant(const AffineMap& map) noexcept;
+/// The determinant must not be 0.
 [[nodiscard]] AffineMap inverse(const AffineMap& map) noexcept;
 /// || |L| |L^-1| ||, largest row sum: how much the map and its inverse can magnify rounding (Skeel). 1 for a scaled
 /// permutation of the axes, at most 3 for a rotation; infinite where the inverse overflows.

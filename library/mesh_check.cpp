@@ -40,12 +40,6 @@ void check_frames(const TriangleMesh& mesh) {
   }
 }
 
-double determinant(const AffineMap& map) {
-  const auto& m = map.m;
-  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-}
-
 void check_instances(const TriangleMesh& mesh) {
   if (!mesh.instancing) return;
   const Instancing& instancing = *mesh.instancing;
