@@ -16,6 +16,8 @@
 namespace arboretum {
 namespace {
 
+constexpr std::size_t kRaysATask = 4096;
+
 struct Tally {
   AnswerCheck check;
   std::vector<float> t_errors;  // ulp
@@ -65,6 +67,12 @@ double quantile(std::vector<float>& values, double p) {
 
 }  // namespace
 
+AnswerCheck& AnswerCheck::operator+=(const AnswerCheck& other) noexcept {
+  rays += other.rays, hits += other.hits, missed_hits += other.missed_hits, false_hits += other.false_hits;
+  wrong_surface += other.wrong_surface, wrong_primitive += other.wrong_primitive, cracks += other.cracks;
+  return *this;
+}
+
 Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth,
                             const Hit& answer, const std::function<const SurfaceAdjacency&()>& adjacency) {
   Judgement j;
@@ -95,7 +103,7 @@ AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays, std::spa
                                const std::function<const SurfaceAdjacency&()>& adjacency) {
   expect_one_size(rays.size(), truth.size(), answers.size());
   tbb::enumerable_thread_specific<Tally> tallies;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), 4096), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), kRaysATask), [&](const auto& range) {
     Tally& tally = tallies.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Judgement j = judge_closest_hit(mesh, rays[i], rays.time(i), truth[i], answers[i], adjacency);
@@ -108,12 +116,7 @@ AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays, std::spa
   AnswerCheck sum;
   std::vector<float> errors;
   for (const Tally& tally : tallies) {
-    sum.hits += tally.check.hits;
-    sum.missed_hits += tally.check.missed_hits;
-    sum.false_hits += tally.check.false_hits;
-    sum.wrong_surface += tally.check.wrong_surface;
-    sum.wrong_primitive += tally.check.wrong_primitive;
-    sum.cracks += tally.check.cracks;
+    sum += tally.check;
     errors.insert(errors.end(), tally.t_errors.begin(), tally.t_errors.end());
   }
   sum.rays = rays.size();

@@ -46,6 +46,8 @@ struct AnswerCheck {
   /// or primitive.
   double t_error_ulp_median = 0, t_error_ulp_p99 = 0, t_error_ulp_max = 0;
   [[nodiscard]] std::uint64_t wrong_answers() const noexcept { return missed_hits + false_hits + wrong_surface; }
+  /// Adds the counts of other rays. Errors of t do not add up: they stay.
+  AnswerCheck& operator+=(const AnswerCheck& other) noexcept;
 };
 
 /// What is wrong with the answer to one closest-hit ray, in AnswerCheck's words.
