@@ -59,12 +59,13 @@ class SearchTree {
 };
 
 /// Box test of one ray. For an axis with d != 0 the exact ray is between the planes l and h for t in
-/// [(l - o) / d, (h - o) / d] (or the other way round). Computed in doubles, (l - o) * (1 / d) has three
-/// roundings and no under- or overflow (operands on the grid of float32), so it is the exact number times 1 + e with
-/// |e| < 4
-/// * 2^-53; scaling keeps the order, so the largest entry of the axes is also within that of the exact one,
-/// and widening entry and exit by kWiden = 2^-50 of their size covers both and the rounding of the widening
-/// itself. An axis with d == 0 (either sign) is a plain comparison of exact numbers.
+///   [(l - o) / d, (h - o) / d]   (or the other way round).
+/// Computed in doubles, (l - o) * (1 / d) has three roundings and no under- or overflow (operands on the grid of
+/// float32), so it is the exact number times 1 + e with
+///   |e| < 4 * 2^-53.
+/// Scaling keeps the order, so the largest entry of the axes is also within that of the exact one, and widening entry
+/// and exit by kWiden = 2^-50 of their size covers both and the rounding of the widening itself. An axis with d == 0
+/// (either sign) is a plain comparison of exact numbers.
 class ConservativeSlabs {
  public:
   ConservativeSlabs(const Ray& ray, const std::array<double, 3>& origin) noexcept : origin_(origin), tnear_(ray.tnear) {

@@ -11,8 +11,8 @@ namespace arboretum {
 struct SceneInfo {
   std::size_t triangles = 0, vertices = 0;
   Bounds3f bounds;  ///< of all triangles
-  LoadReport
-      report;  ///< what loading dropped, zero-area triangles among it; and images of used materials that cannot be read
+  /// What loading dropped, zero-area triangles among it; and images of used materials that cannot be read.
+  LoadReport report;
   std::size_t duplicates = 0;  ///< triangles with the same three corner positions as an earlier one, in any order
   std::size_t slivers = 0;     ///< longest edge^2 / (2 area) > 100
   // Edges join vertices by exact position, so a mesh whose triangles share no vertices may be closed all the
@@ -28,7 +28,7 @@ struct SceneInfo {
   std::size_t moving_triangles = 0;  ///< with a corner that moves
   Shutter shutter;
   std::size_t instances = 0, prototypes = 0, prototype_triangles = 0;  ///< kept beside the mesh; 0 where none are
-  /// in the scene file; all are laid out in the mesh, and kept beside it unless it moves
+  /// In the scene file; all are laid out in the mesh, and kept beside it unless it moves.
   std::size_t named_instances = 0;
   std::vector<Effect> effects;
 };

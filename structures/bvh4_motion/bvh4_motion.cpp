@@ -1,16 +1,15 @@
 // Why a box holds its triangles at every time. Let K be the number of key frames, u = 2^-24, m the largest |coordinate|
 // of a triangle in any frame, and c(t) one coordinate of a corner, exactly linear between key frames.
 // - linear_bounds() fits a line L through the first and last frame's smallest coordinate and lowers it by the most that
-// any key
-//   frame lies below it. So L(t_k) <= c(t_k) at every key time t_k = k / (K - 1), and as both are linear in between, L
-//   <= c on [0, 1].
+//   any key frame lies below it. So L(t_k) <= c(t_k) at every key time t_k = k / (K - 1), and as both are linear in
+//   between, L <= c on [0, 1].
 // - A corner is computed as a (1 - w) + b w, where w is off by u (K - 1) at most (the rounding of time * (K - 1)): that
-// moves it by
-//   (K - 1) u |b - a| <= 2 (K - 1) u m; the roundings of 1 - w, of two products and a sum add less than 4.1 u m. The
-//   line is lowered by (2 K + 8) u m, which also covers the double arithmetic of the fit and a time that rounds across
-//   a key frame (c is continuous).
-// - Lines are rounded down to float at both ends. A node stores p = L(0) and q <= L(1) - p, rounded down: p + q t <=
-// L(t) on [0, 1].
+//   moves it by
+//     (K - 1) u |b - a| <= 2 (K - 1) u m;
+//   the roundings of 1 - w, of two products and a sum add less than 4.1 u m. The line is lowered by (2 K + 8) u m,
+//   which also covers the double arithmetic of the fit and a time that rounds across a key frame (c is continuous).
+// - Lines are rounded down to float at both ends. A node stores p = L(0) and q <= L(1) - p, rounded down:
+//     p + q t <= L(t) on [0, 1].
 // - Union: the minimum of the ends of two lines is a line that is below both.
 // Upper planes are the mirror image. What the kernel's evaluation of p + q t adds is part of the box test's pad
 // (bvh4_motion_kernels.h).

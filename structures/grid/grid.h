@@ -5,23 +5,24 @@
 // A cell is 32 bits (structures/leaves/leaf_lists.h): empty, leaf blocks, or kNoLeaf with the number of the
 // grid inside.
 //
-// Why no ray loses a triangle. Write u for 2^-24, M for the largest |coordinate| of the scene, L for its
-// largest extent (at least M / 64). A triangle is put into every cell that it touches when the cell is
-// widened by
+// Why no ray loses a triangle. Write u for 2^-24, M for the largest |coordinate| of the scene, L for its largest extent
+// (at least M / 64). A triangle is put into every cell that it touches when the cell is widened by
 //   pad = 16 u M + 256 u L
-// on each side, and the grid's box is wider than the scene by as much. A ray's kernel answers t within 4 u (M
-// + |o|) of the triangle (as box_test.h has it for padded boxes), |o| its origin's largest |coordinate|. The
-// walk computes every plane's distance from the cell's index, nothing accumulates: (face - o) * r - n * (cell
-// * r), whose five roundings move the point where the walk changes cells by less than 8 u (|o - lower| + L)
-// from the plane, the first cell's included, plus 2 u M for the float corners of inner grids. Where |o -
-// lower| <= 16 L on each axis, |o| <= M + 16 L and the sum is below
+// on each side, and the grid's box is wider than the scene by as much. A ray's kernel answers t within 4 u (M + |o|) of
+// the triangle (as box_test.h has it for padded boxes), |o| its origin's largest |coordinate|. The walk computes every
+// plane's distance from the cell's index, nothing accumulates:
+//   (face - o) * r - n * (cell * r),
+// whose five roundings move the point where the walk changes cells by less than
+//   8 u (|o - lower| + L)
+// from the plane, the first cell's included, plus 2 u M for the float corners of inner grids. Where
+// |o - lower| <= 16 L on each axis, |o| <= M + 16 L and the sum is below
 //   4 u (2 M + 16 L) + 8 u * 17 L + 2 u M = 10 u M + 200 u L < pad.
-// So the cell in which the walk is at t, whichever of two neighbours it takes, holds the triangle that is hit
-// at t. The walk's intervals of t follow each other without a gap, and it ends where best.t lies before the
-// end of the cell's interval: all that could answer with t <= best.t has been tested by then, ties included.
-// `fast` relies on this for any ray. `padded` sends the rays outside these bounds (origins beyond 16 L,
-// directions out of the range in which the constants stay normal) through the same cells as if they were the
-// leaves of a tree with padded boxes (grid_far_single.h).
+// So the cell in which the walk is at t, whichever of two neighbours it takes, holds the triangle that is hit at t. The
+// walk's intervals of t follow each other without a gap, and it ends where best.t lies before the end of the cell's
+// interval: all that could answer with t <= best.t has been tested by then, ties included. `fast` relies on this for
+// any ray. `padded` sends the rays outside these bounds (origins beyond 16 L, directions out of the range in which the
+// constants stay normal) through the same cells as if they were the leaves of a tree with padded boxes
+// (grid_far_single.h).
 #pragma once
 
 #include <cstdint>

@@ -4,18 +4,17 @@
 //
 // Object space rounds: the mapped ray is off by 2^-24 of its own numbers. Three things come of it.
 // - The top's boxes are padded for it. A hit's point p lies on the object-space triangle; in world space it is off the
-// exact
-//   ray by |L| |eta + t zeta|, where eta and zeta are the roundings of origin and direction: at most u (2|o'| + |p'|)
-//   for u = 2^-24, and so u k (2|o| + |p| + 3|T|) with k = || |L||L^-1| || and T the translation. The pad of box_test.h
-//   for a largest coordinate of reach + k (|o| + reach), reach = M + 2|T|, is more than its own need and this together
-//   (8 u of it against 4 u of M + |o|, and 3 u at most of k (...)).
+//   exact ray by |L| |eta + t zeta|, where eta and zeta are the roundings of origin and direction: at most
+//     u (2|o'| + |p'|) for u = 2^-24, and so
+//     u k (2|o| + |p| + 3|T|) with k = || |L||L^-1| || and T the translation.
+//   The pad of box_test.h for a largest coordinate of
+//     reach + k (|o| + reach), reach = M + 2|T|,
+//   is more than its own need and this together (8 u of it against 4 u of M + |o|, and 3 u at most of k (...)).
 // - t, u and v of the winner are computed again from the flat mesh's vertices with the same test, so that they are
-// those of a
-//   structure over the flat mesh, bit for bit, wherever both find the same triangle. Where the test misses the flat
-//   triangle (the ray meets its edge) t is that of its plane, in double.
+//   those of a structure over the flat mesh, bit for bit, wherever both find the same triangle. Where the test misses
+//   the flat triangle (the ray meets its edge) t is that of its plane, in double.
 // - A t close to an end of the interval may lie on the other side of it in world space, as on the surface that a
-// secondary ray starts
-//   from. There the t in world space decides, and the search goes on behind a hit that is refused.
+//   secondary ray starts from. There the t in world space decides, and the search goes on behind a hit that is refused.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
