@@ -5,6 +5,7 @@
 #include "core/arena.h"
 #include "core/bounds.h"
 #include "core/coordinates.h"
+#include "core/instances.h"
 #include "core/isa.h"
 #include "core/memory_meter.h"
 #include "core/names.h"
@@ -28,11 +29,25 @@ TEST_CASE("an empty box has no area and contains nothing") {
   Bounds3f box;
   CHECK(box.empty());
   CHECK(box.area() == 0.0);
+  constexpr float inf = Bounds3f::kInfinity;
+  for (const Vec3f p : {Vec3f{0, 0, 0}, Vec3f{1, 2, 3}, Vec3f{inf, inf, inf}, Vec3f{-inf, -inf, -inf}})
+    CHECK_FALSE(box.contains({p, p}));
+  CHECK_FALSE(box.contains({{-inf, -inf, -inf}, {inf, inf, inf}}));
   box.extend(Vec3f{1, 2, 3});
   CHECK_FALSE(box.empty());
   CHECK(box.area() == 0.0);
   box.extend(Vec3f{2, 4, 6});
   CHECK(box.area() == 2.0 * (1 * 2 + 2 * 3 + 3 * 1));
+}
+
+TEST_CASE("affine maps: the determinant is the linear part's, and goes with the inverse") {
+  const AffineMap map{{{2, 1, 0, 7}, {0, 3, 1, 8}, {1, 0, 4, 9}}};
+  CHECK(determinant(AffineMap{}) == 1);
+  CHECK(determinant(map) == 25);
+  CHECK(determinant(inverse(map)) == Approx(1.0 / 25));
+  CHECK(transform_point(inverse(map), transform_point(map, {1, 2, 3})) == Vec3f{1, 2, 3});
+  CHECK(determinant({{{1, 2, 3, 0}, {4, 5, 6, 0}, {7, 8, 9, 0}}}) == 0);
+  CHECK(determinant({{{0, 1, 0, 0}, {1, 0, 0, 0}, {0, 0, 1, 0}}}) == -1);
 }
 
 TEST_CASE("directed rounding gives the neighbouring floats, of either sign, at zero and at the ends of the range") {
