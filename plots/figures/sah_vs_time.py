@@ -1,15 +1,20 @@
-"""How well the SAH cost foretells the measured time: one panel a workload and instruction set."""
+"""How well the SAH cost foretells the measured time: one panel a workload and instruction set; and a scene, where scenes are so far apart
+that one of them would decide every fit."""
 
 import numpy as np
 
 from results import NoData, ordered
-from style import WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panels, structure_legend, wrong_legend, wrong_marker
+from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panel_grid, panels, structure_legend,
+                   wrong_legend, wrong_marker)
 from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
 CAPTION = ("A point is a structure on a scene, traced in its fastest mode. The line is the least-squares fit through a panel's "
            "points, R² its share of the variance explained. A red edge: the mode has wrong answers. "
            + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
+
+# Scenes whose costs differ by more get panels of their own.
+FAR_APART = 4.0
 
 
 def draw(results):
@@ -23,16 +28,10 @@ def draw(results):
     structures = ordered((c["structure"] for c, _, _ in points), "structure")
     markers = marker_map(scenes)
 
-    figure, axes = panels(len(workloads), len(isas), 3.3, 3.05, sharex=True, sharey="row")
-    for row, workload in enumerate(workloads):
-        for column, isa in enumerate(isas):
-            here = [p for p in points if p[0]["workload"] == workload and p[0]["isa"] == isa]
-            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}")
-        axes[row][0].set_ylabel("time, ns a ray")
-        axes[row][0].set_ylim(0, 1.08 * max(p[2] for p in points if p[0]["workload"] == workload))
-    axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))
-    for axis in axes[-1]:
-        axis.set_xlabel("SAH cost")
+    if far_apart(points):
+        figure = panels_by_scene(points, scenes, [(w, i) for w in workloads for i in isas], markers)
+    else:
+        figure = panels_of_all(points, workloads, isas, markers)
     answers = wrong_legend([c for c, _, _ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, _, _ in points])} per million"))
     legends_right(figure, [("structure", structure_legend(structures)), ("scene", marker_legend(markers)), *answers])
     return figure
@@ -49,6 +48,43 @@ def fastest_points(results, metric):
         if key not in best or 1e9 / rate < best[key][2]:
             best[key] = (cell, cost, 1e9 / rate)
     return list(best.values())
+
+
+def far_apart(points):
+    """Whether the largest SAH cost of one scene is a multiple of another's."""
+    largest = {}
+    for cell, cost, _ in points:
+        largest[cell["scene"]] = max(cost, largest.get(cell["scene"], 0.0))
+    return max(largest.values()) > FAR_APART * min(largest.values())
+
+
+def panels_by_scene(points, scenes, kinds, markers):
+    figure, axes = panel_grid(scenes, [f"{workload}, {isa}" for workload, isa in kinds], 3.3, 3.05, 4)
+    for scene in scenes:
+        for workload, isa in kinds:
+            axis = axes[scene, f"{workload}, {isa}"]
+            here = [p for p in points if (p[0]["scene"], p[0]["workload"], p[0]["isa"]) == (scene, workload, isa)]
+            panel(axis, here, markers, axis.get_title())
+            if here:
+                axis.set_xlim(0, 1.08 * max(p[1] for p in here))
+                axis.set_ylim(0, 1.08 * max(p[2] for p in here))
+            axis.set_xlabel("SAH cost")
+        axes[scene, "%s, %s" % kinds[0]].set_ylabel("time, ns a ray")
+    return figure
+
+
+def panels_of_all(points, workloads, isas, markers):
+    figure, axes = panels(len(workloads), len(isas), 3.3, 3.05, sharex=True, sharey="row")
+    for row, workload in enumerate(workloads):
+        for column, isa in enumerate(isas):
+            here = [p for p in points if p[0]["workload"] == workload and p[0]["isa"] == isa]
+            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}")
+        axes[row][0].set_ylabel("time, ns a ray")
+        axes[row][0].set_ylim(0, 1.08 * max(p[2] for p in points if p[0]["workload"] == workload))
+    axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))
+    for axis in axes[-1]:
+        axis.set_xlabel("SAH cost")
+    return figure
 
 
 def panel(axis, points, markers, title):
