@@ -13,6 +13,7 @@
 #include <tbb/task_arena.h>
 
 #include "core/random.h"
+#include "structures/builders/builder_parameters.h"
 #include "structures/builders/builders.h"
 #include "structures/statistics.h"
 #include "tests/catch.h"
@@ -24,7 +25,8 @@ inline constexpr std::string_view kReinsertion = "_reinsertion";
 
 /// Builders that may refer to a triangle more than once, from boxes that hold parts of it.
 inline bool splits_triangles(std::string_view builder) {
-  return builder.starts_with("spatial") || builder.starts_with("embree_high");
+  const std::vector<std::string_view> reads = binary_builder_parameters(builder);
+  return std::ranges::find(reads, "duplication_budget") != reads.end();
 }
 
 inline BinaryTree build(std::string_view builder, const TriangleMesh& mesh, unsigned leaf_width, unsigned threads = 1,

@@ -44,7 +44,7 @@ class BinnedSah {
     tbb::parallel_for(std::size_t{0}, set_aside_.size(), [&](std::size_t i) {
       const auto& [range, node] = set_aside_[i];
       Workspace& mine = workspaces[std::size_t(tbb::this_task_arena::current_thread_index())];
-      if (mine.references.empty()) mine.references.resize(std::min(n, sah::kParallel));
+      if (mine.references.empty()) mine.references.resize(std::min(n, std::size_t{kOneTask}));
       const std::size_t begin = begin_of(set_aside_[i]), id_bytes = range.size * sizeof(std::uint32_t);
       recurse(range, mine.references.data(), {begin, reinterpret_cast<std::byte*>(range.references)}, node, mine.share);
       references_.give_back(begin + (id_bytes + sizeof(sah::Reference) - 1) / sizeof(sah::Reference),
@@ -110,7 +110,7 @@ class BinnedSah {
 
   /// Splits down to ranges that one task builds, and sets those aside.
   void upper_levels(const Range& range, std::uint32_t index, sah::TreeWriter::Share& share) {
-    if (range.size <= sah::kParallel) {
+    if (range.size <= kOneTask) {
       const std::lock_guard lock(mutex_);
       set_aside_.push_back({range, index});
       return;
@@ -119,7 +119,7 @@ class BinnedSah {
     split(range, nullptr, left, right);
     const std::uint32_t first = writer_->take_pair(share);
     writer_->node(index, range.bounds.boxes, range.size, first);
-    if (left.size > sah::kParallel && right.size > sah::kParallel) {
+    if (left.size > kOneTask && right.size > kOneTask) {
       tbb::parallel_invoke(
           [&] {
             sah::TreeWriter::Share own;

@@ -21,6 +21,7 @@
 #include "structures/builders/builders.h"
 #include "structures/builders/clip.h"
 #include "structures/builders/node_pool.h"
+#include "structures/builders/one_task.h"
 #include "structures/builders/phase_clock.h"
 
 #include "simd/target.h"

@@ -1,12 +1,14 @@
 #include "structures/builders/builders.h"
 
+#include <algorithm>
 #include <array>
+#include <iterator>
 
 #include "core/error.h"
 #include "core/names.h"
 #include "structures/builders/builder_parameters.h"
 #include "structures/builders/embree_builders.h"
-#include "structures/builders/fast_builders.h"
+#include "structures/builders/portable_builders.h"
 #include "structures/builders/reinsertion.h"
 #include "structures/builders/top_reinsertion.h"
 
@@ -54,6 +56,7 @@ struct Entry {
 
 /// Nodes that top-down builders reinsert: hardly more is gained by all (docs/performance.md).
 constexpr unsigned kTop = 512, kMostTop = 65536;
+constexpr unsigned kMostRounds = 64;
 
 constexpr Entry kBuilders[] = {
     {"binned_sah",
@@ -77,11 +80,27 @@ constexpr Entry kBuilders[] = {
 /// Every builder has a second key, this behind its own: its tree improved by reinsertion.
 constexpr std::string_view kReinsertion = "_reinsertion";
 
+struct Found {
+  const Entry* entry = nullptr;  ///< null: no builder has the key
+  bool reinserts = false;
+  [[nodiscard]] bool reads(std::string_view parameter) const {
+    return std::ranges::find(entry->reads, parameter) != entry->reads.end();
+  }
+};
+
+Found find_builder(std::string_view key) {
+  Found found;
+  found.reinserts = key.ends_with(kReinsertion);
+  if (found.reinserts) key.remove_suffix(kReinsertion.size());
+  const Entry* const entry = std::ranges::find(kBuilders, key, &Entry::name);
+  if (entry != std::end(kBuilders)) found.entry = entry;
+  return found;
+}
+
 }  // namespace
 
 void require_budget(std::string_view builder, std::size_t triangles, float budget) {
-  if (!(budget >= 0.0f && budget <= 4.0f))
-    throw UserError("duplication_budget: " + std::to_string(budget) + " is not within 0 .. 4");
+  require_within("duplication_budget", budget, 0.0f, 4.0f);
   if (double(triangles) * (1.0 + double(budget)) > double(kMaxReferences)) {
     throw UserError(std::string(builder) + ": " + std::to_string(triangles) +
                     " triangles and a duplication_budget of " + std::to_string(budget) +
@@ -90,16 +109,12 @@ void require_budget(std::string_view builder, std::size_t triangles, float budge
 }
 
 std::vector<std::string_view> binary_builder_parameters(std::string_view builder) {
-  const bool reinserts = builder.ends_with(kReinsertion);
-  if (reinserts) builder.remove_suffix(kReinsertion.size());
-  for (const Entry& e : kBuilders) {
-    if (e.name != builder) continue;
-    std::vector<std::string_view> names{reinserts ? "reinsertion_rounds" : "reinsertion_top"};
-    for (std::string_view name : e.reads)
-      if (!name.empty()) names.push_back(name);
-    return names;
-  }
-  return {};
+  const Found found = find_builder(builder);
+  if (!found.entry) return {};
+  std::vector<std::string_view> names{found.reinserts ? "reinsertion_rounds" : "reinsertion_top"};
+  for (std::string_view name : found.entry->reads)
+    if (!name.empty()) names.push_back(name);
+  return names;
 }
 
 const std::vector<std::string_view>& binary_builder_names() {
@@ -119,29 +134,23 @@ const std::vector<std::string_view>& binary_builder_names() {
 
 void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, unsigned leaf_width, BinaryTree& tree,
                        BuildReport& report) {
-  std::string_view builder = settings.builder;
-  const bool reinserts = builder.ends_with(kReinsertion);
-  if (reinserts) builder.remove_suffix(kReinsertion.size());
-  const unsigned rounds = settings.parameters.reinsertion_rounds;
-  if (reinserts && (rounds < 1 || rounds > 64))
-    throw UserError("reinsertion_rounds: " + std::to_string(rounds) + " is not within 1 .. 64");
-  const unsigned top = settings.parameters.reinsertion_top;
-  if (top != BuilderParameters::kOwn && top > kMostTop)
-    throw UserError("reinsertion_top: " + std::to_string(top) + " is not within 0 .. " + std::to_string(kMostTop));
-  for (const Entry& e : kBuilders) {
-    if (e.name != builder) continue;
-    const bool splits = builder == "spatial_sah" || builder == "embree_high";
-    require_budget(builder, mesh.size(), splits ? settings.parameters.duplication_budget : 0.0f);
-    e.on(settings.isa)(mesh, settings.parameters, leaf_width, tree, report);
-    if (reinserts) {
-      reinsert(tree, rounds, leaf_width, report);
-    } else {
-      reinsert_top(tree, top == BuilderParameters::kOwn ? e.reinserted_top : top, report);
-    }
-    return;
+  const BuilderParameters& p = settings.parameters;
+  const Found found = find_builder(settings.builder);
+  if (!found.entry) {
+    const std::vector<std::string> names(binary_builder_names().begin(), binary_builder_names().end());
+    throw UserError(unknown_name_message("builder", settings.builder, names));
   }
-  const std::vector<std::string> names(binary_builder_names().begin(), binary_builder_names().end());
-  throw UserError(unknown_name_message("builder", settings.builder, names));
+  if (found.reinserts) require_within("reinsertion_rounds", p.reinsertion_rounds, 1, kMostRounds);
+  const bool own_top = p.reinsertion_top == BuilderParameters::kOwn;
+  if (!own_top) require_within("reinsertion_top", p.reinsertion_top, 0, kMostTop);
+  const bool splits = found.reads("duplication_budget");
+  require_budget(found.entry->name, mesh.size(), splits ? p.duplication_budget : 0.0f);
+
+  found.entry->on(settings.isa)(mesh, p, leaf_width, tree, report);
+  if (found.reinserts)
+    reinsert(tree, p.reinsertion_rounds, leaf_width, report);
+  else
+    reinsert_top(tree, own_top ? found.entry->reinserted_top : p.reinsertion_top, report);
 }
 
 }  // namespace arboretum

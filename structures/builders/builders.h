@@ -7,6 +7,7 @@
 #include "core/mesh.h"
 #include "structures/accel.h"
 #include "structures/builders/binary_tree.h"
+#include "structures/parameter_checks.h"
 
 namespace arboretum {
 
@@ -23,9 +24,6 @@ using BinaryBuilder = void (*)(const TriangleMesh& mesh, const BuilderParameters
 /// for parameters out of range.
 void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, unsigned leaf_width, BinaryTree& tree,
                        BuildReport& report);
-
-/// References that a tree of two nodes each can have, numbered in 31 bits.
-inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 30) - 1;
 
 /// Throws UserError where so many triangles and, of those, a share `budget` of references more are above
 /// kMaxReferences, or the budget is not within 0 .. 4.

@@ -12,10 +12,10 @@
 #include <tbb/task_arena.h>
 
 #include "structures/builders/number_runs.h"
+#include "structures/builders/one_task.h"
 
 namespace arboretum {
 namespace {
-constexpr std::uint32_t kParallel = 1u << 12;
 constexpr std::uint32_t kTooMany = 1000;  // references, more than a leaf holds
 /// What a leaf costs beside its blocks, in blocks. SAH knows none of it; where boxes overlap (`generate: needles`) rays
 /// lose by trees that open every leaf.
@@ -108,7 +108,7 @@ void Collapse::optimise(std::uint32_t index, Costs& out) {
     return;
   }
   Costs left, right;
-  if (node.count > kParallel) {
+  if (node.count > kOneTask) {
     tbb::parallel_invoke([&] { optimise(node.left, left); }, [&] { optimise(node.left + 1, right); });
   } else {
     optimise(node.left, left);
@@ -142,7 +142,7 @@ void Collapse::choose_leaves(std::uint32_t index) {
   const bool leaf = node.is_leaf() || blocks_for(references) <= 1;
   plan_[index] = {std::uint16_t(references), std::uint16_t(settings_.branching), leaf};
   if (leaf) return;
-  if (node.count > kParallel) {
+  if (node.count > kOneTask) {
     tbb::parallel_invoke([&] { choose_leaves(node.left); }, [&] { choose_leaves(node.left + 1); });
   } else {
     choose_leaves(node.left);
@@ -236,7 +236,7 @@ class Collapse::Writer {
     out.children = slots.size, out.blocks = 0, out.repeats = false;
     float costs[kMaxBranching];
     const auto child = [&](unsigned i, Share& its) { costs[i] = write(slots.node[i], first + i, its); };
-    if (node.count > kParallel) {
+    if (node.count > kOneTask) {
       // A thread that waits here takes up other tasks, but none at the same time: its place's share is its own.
       tbb::parallel_for(0u, slots.size, [&](unsigned i) {
         child(i, shares_[std::size_t(tbb::this_task_arena::current_thread_index())]);

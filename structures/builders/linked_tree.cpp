@@ -8,11 +8,11 @@
 #include <tbb/parallel_invoke.h>
 
 #include "core/error.h"
+#include "structures/builders/one_task.h"
 
 namespace arboretum {
 namespace {
 
-constexpr std::uint32_t kParallel = 1u << 12;
 constexpr unsigned kForkLevels = 8;  ///< where sizes are not known yet, the first levels are counted by tasks
 
 class Layout {
@@ -61,7 +61,7 @@ class Layout {
     const Size left = sizes_[node.left];
     const auto place_left = [&] { place(node.left, next, next + 2, first); };
     const auto place_right = [&] { place(node.right, next + 1, next + 1 + left.nodes, first + left.references); };
-    if (left.references > kParallel && sizes_[node.right].references > kParallel) {
+    if (left.references > kOneTask && sizes_[node.right].references > kOneTask) {
       tbb::parallel_invoke(place_left, place_right);
     } else {
       place_left(), place_right();
@@ -91,7 +91,7 @@ LinkedTree to_linked(BinaryTree&& tree) {
   LinkedTree out;
   out.nodes.resize(tree.node_count);
   // Unused slots of the binary tree hold anything; nothing names them.
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.node_count, kParallel), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.node_count, kOneTask), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const BinaryNode& node = tree.nodes[i];
       const Bounds3f box{node.lower, node.upper};

@@ -9,15 +9,15 @@
 #include <tbb/parallel_invoke.h>
 
 #include "structures/builders/box4.h"
-#include "structures/builders/fast_builders.h"
+#include "structures/builders/portable_builders.h"
 #include "structures/builders/morton_order.h"
 #include "structures/builders/node_pool.h"
+#include "structures/builders/one_task.h"
 #include "structures/builders/phase_clock.h"
 
 namespace arboretum {
 namespace {
 
-constexpr std::size_t kParallel = 1u << 12;
 constexpr std::size_t kFewBlocks = 3;     ///< ranges of so many leaf blocks are cut where they fill no more
 constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 21 bits of their codes at first, in two
                                           ///< passes; more by 30 bits, in three
@@ -25,7 +25,7 @@ constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 2
 class Lbvh {
  public:
   Lbvh(const TriangleMesh& mesh, MortonOrder& order, unsigned leaf_width, BinaryTree& tree)
-      : boxes_(mesh), order_(order), leaf_width_(leaf_width), tree_(tree), pool_(tree, order.size(), kParallel) {}
+      : boxes_(mesh), order_(order), leaf_width_(leaf_width), tree_(tree), pool_(tree, order.size(), kOneTask) {}
 
   void build() {
     const std::size_t n = order_.size();
@@ -61,7 +61,7 @@ class Lbvh {
       const std::size_t middle = split(begin, end);
       left = pool_.take_pair(share);
       Box4 other;
-      if (middle - begin > kParallel && end - middle > kParallel) {
+      if (middle - begin > kOneTask && end - middle > kOneTask) {
         tbb::parallel_invoke(
             [&] {
               NodePool::Share own;

@@ -13,7 +13,7 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
-#include "structures/builders/fast_builders.h"
+#include "structures/builders/portable_builders.h"
 #include "structures/builders/linked_tree.h"
 #include "structures/builders/morton_order.h"
 #include "structures/builders/phase_clock.h"
@@ -185,10 +185,7 @@ class Ploc {
 void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
                 BuildReport& report) {
   check_morton_bits(parameters.morton_bits);
-  if (parameters.ploc_radius < 1 || parameters.ploc_radius > kMaxRadius) {
-    throw UserError("ploc_radius: " + std::to_string(parameters.ploc_radius) + " is not within 1 .. " +
-                    std::to_string(kMaxRadius));
-  }
+  require_within("ploc_radius", parameters.ploc_radius, 1, kMaxRadius);
   if (mesh.size() == 0) return;
   PhaseClock phase(report);
   LinkedTree clusters;

@@ -2,10 +2,10 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include "structures/builders/one_task.h"
+
 namespace arboretum {
 namespace {
-
-constexpr std::uint32_t kParallel = 1u << 12;
 
 Bounds3f refit_subtree(BinaryTree& tree, const TriangleMesh& mesh, std::uint32_t index) {
   BinaryNode& node = tree.nodes[index];
@@ -13,7 +13,7 @@ Bounds3f refit_subtree(BinaryTree& tree, const TriangleMesh& mesh, std::uint32_t
   if (node.is_leaf()) {
     for (std::uint32_t i = tree.first[index]; i < tree.first[index] + node.count; ++i)
       box.extend(mesh.bounds(tree.primitives[i]));
-  } else if (node.count > kParallel) {
+  } else if (node.count > kOneTask) {
     tbb::parallel_invoke([&] { box = refit_subtree(tree, mesh, node.left); },
                          [&] { other = refit_subtree(tree, mesh, node.left + 1); });
   } else {

@@ -22,11 +22,10 @@ struct alignas(32) Reference {
 static_assert(sizeof(Reference) == 32);
 
 inline constexpr unsigned kMaxBins = 64;
-inline constexpr unsigned kManyBins = 256;          ///< 8 times as many bins, at most these, above kLarge references
-inline constexpr float kFlat = 1e-36f;              ///< no splits across less: kManyBins / kFlat is finite
-inline constexpr std::size_t kChunk = 1u << 14;     ///< references a task takes at a time
-inline constexpr std::size_t kLarge = 4 * kChunk;   ///< more references than this are split by several tasks
-inline constexpr std::size_t kParallel = 1u << 12;  ///< smaller subtrees are built by one task
+inline constexpr unsigned kManyBins = 256;         ///< 8 times as many bins, at most these, above kLarge references
+inline constexpr float kFlat = 1e-36f;             ///< no splits across less: kManyBins / kFlat is finite
+inline constexpr std::size_t kChunk = 1u << 14;    ///< references a task takes at a time
+inline constexpr std::size_t kLarge = 4 * kChunk;  ///< more references than this are split by several tasks
 
 /// What falls into the bins of one number, on each of the three axes.
 struct alignas(32) Bin {

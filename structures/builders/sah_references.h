@@ -55,7 +55,7 @@ class TreeWriter {
   using Share = NodePool::Share;
 
   /// For at most `references` references.
-  TreeWriter(BinaryTree& tree, std::size_t references) : tree_(tree), pool_(tree, references, kParallel) {}
+  TreeWriter(BinaryTree& tree, std::size_t references) : tree_(tree), pool_(tree, references, kOneTask) {}
 
   /// Two neighbouring nodes.
   [[nodiscard]] std::uint32_t take_pair(Share& share) noexcept { return pool_.take_pair(share); }

@@ -152,7 +152,7 @@ class SpatialSah {
     split(range, left, right);
     const std::uint32_t first = writer_->take_pair(share);
     std::size_t left_count = 0, right_count = 0;
-    if (left.size() > sah::kParallel && right.size() > sah::kParallel) {
+    if (left.size() > kOneTask && right.size() > kOneTask) {
       tbb::parallel_invoke(
           [&] {
             sah::TreeWriter::Share own;
@@ -179,7 +179,7 @@ class SpatialSah {
       return;
     }
     const std::uint32_t right = begin + tree_.nodes[node.left].count;
-    if (node.count > sah::kParallel) {
+    if (node.count > kOneTask) {
       tbb::parallel_invoke([&] { line_up(node.left, begin); }, [&] { line_up(node.left + 1, right); });
     } else {
       line_up(node.left, begin), line_up(node.left + 1, right);

@@ -14,13 +14,14 @@
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_sort.h>
 
-#include "structures/builders/fast_builders.h"
+#include "structures/builders/portable_builders.h"
+#include "structures/builders/one_task.h"
 #include "structures/builders/phase_clock.h"
 
 namespace arboretum {
 namespace {
 
-constexpr std::size_t kParallel = 1u << 12;
+constexpr std::size_t kChunk = 1u << 12;  ///< references that a task takes at a time
 
 class SweepSah {
  public:
@@ -31,9 +32,8 @@ class SweepSah {
     const std::size_t n = mesh_.size();
     PhaseClock phase(report);
     boxes_.resize(n), is_left_.resize(n), scratch_.resize(2 * n), right_cost_.resize(3 * n);
-    tbb::parallel_for(std::size_t{0}, (n + kParallel - 1) / kParallel, [&](std::size_t chunk) {
-      for (std::size_t i = chunk * kParallel; i < std::min(n, (chunk + 1) * kParallel); ++i)
-        boxes_[i] = mesh_.bounds(i);
+    tbb::parallel_for(std::size_t{0}, (n + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+      for (std::size_t i = chunk * kChunk; i < std::min(n, (chunk + 1) * kChunk); ++i) boxes_[i] = mesh_.bounds(i);
     });
     phase.ends("references");
     sort();
@@ -126,7 +126,7 @@ class SweepSah {
       tree_.first[index] = std::uint32_t(begin);
       return;  // all three orders hold the same references there
     }
-    const bool parallel = n > kParallel;
+    const bool parallel = n > kOneTask;
     std::array<Split, 3> found;
     if (parallel) {
       tbb::parallel_for(0, 3, [&](int axis) { found[std::size_t(axis)] = sweep(axis, begin, end); });

@@ -18,6 +18,7 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include "structures/builders/one_task.h"
 #include "structures/kdtree/split.h"
 
 namespace arboretum::kdtree {
@@ -57,8 +58,6 @@ class TopDown {
   }
 
  private:
-  static constexpr std::size_t kOneTask = 1u << 12;  ///< smaller subtrees are built by one task
-
   /// What a cell inherits.
   struct Place {
     Bounds3f cell;

@@ -8,6 +8,7 @@
 
 #include "core/coordinates.h"
 #include "core/error.h"
+#include "structures/builders/one_task.h"
 #include "structures/builders/phase_clock.h"
 #include "structures/leaves/triangle_overlap.h"
 
@@ -54,7 +55,7 @@ class Grower {
       grow(children[c], level + 1, {2 * at[0] + (c & 1), 2 * at[1] + (c >> 1 & 1), 2 * at[2] + (c >> 2)}, share, into);
       Ids().swap(children[c]);
     };
-    if (ids.size() > kParallel) {
+    if (ids.size() > kOneTask) {
       Subtree parts[8];
       tbb::parallel_for(0u, 8u, [&](unsigned c) {
         if (mask >> c & 1) child(c, parts[c]);
@@ -77,8 +78,6 @@ class Grower {
   }
 
  private:
-  static constexpr std::size_t kParallel = 4096;
-
   static void leaf(const Ids& ids, double cost, Subtree& out) {
     out.shape.push_back(Subtree::kLeaf + ids.size());
     out.ids.insert(out.ids.end(), ids.begin(), ids.end());
