@@ -342,4 +342,6 @@ TEST_CASE("parameters out of range are named") {
                     Catch::Contains("max_leaf_blocks") && Catch::Contains("1 .. 8"));
   p.max_leaf_blocks = 8;
   CHECK_NOTHROW(build({"bih", "binned_sah"}, mesh, "triangle4", 1, p));
+  p = {}, p.grid_density = std::numeric_limits<float>::quiet_NaN();
+  CHECK_THROWS_WITH(build({"grid", "uniform"}, mesh, "triangle4", 1, p), "grid_density: nan is not within 0.01 .. 64");
 }

@@ -1,6 +1,8 @@
 // What builders read of BuilderParameters is what they say that they read (structures/parameters_read.h).
 #include <bit>
 
+#include "core/error.h"
+#include "structures/parameter_checks.h"
 #include "structures/parameters_read.h"
 #include "tests/builder_checks.h"
 
@@ -143,4 +145,47 @@ TEST_CASE("what is above another structure reads what that one reads; none is re
   CHECK_FALSE(reads("max_leaf_blocks", "uniform", "grid"));
   CHECK(parameters_read("no such structure", "binned_sah")->empty());
   CHECK(parameters_read("brute_force", "in_order")->empty());
+}
+
+TEST_CASE("what is out of range is refused, with the limits") {
+  require_bins(4), require_bins(64);
+  CHECK_THROWS_WITH(require_bins(3), "bins: 3 is not within 4 .. 64");
+  CHECK_THROWS_WITH(require_bins(65), "bins: 65 is not within 4 .. 64");
+  CHECK_THROWS_WITH(require_within("x", 0.96f, 0.0f, 0.95f), "x: 0.96 is not within 0 .. 0.95");
+  CHECK_THROWS_WITH(require_within("x", std::numeric_limits<float>::quiet_NaN(), 0, 1), "x: nan is not within 0 .. 1");
+  require_triangles("bih", kMaxReferences);
+  CHECK_THROWS_WITH(require_triangles("bih", kMaxReferences + 1), "bih takes at most 2^30 - 1 triangles");
+  CHECK_THROWS_WITH(require_triangles("kdtree", 1u << 28, (1u << 28) - 1), "kdtree takes at most 2^28 - 1 triangles");
+}
+
+TEST_CASE("every structure refuses a leaf that it does not have, before it builds") {
+  for (const TriangleMesh& mesh : {TriangleMesh{}, random_triangles(20, 0.5f, 1)}) {
+    for (const StructureEntry& entry : all_structures()) {
+      BuildSettings settings;
+      settings.builder = entry.info.builders.front(), settings.leaf = "triangle5";
+      BuildReport report;
+      INFO(entry.info.name);
+      CHECK_THROWS_WITH(entry.create()->build(mesh, settings, report),
+                        Catch::Contains("leaf") && Catch::Contains("triangle5"));
+      CHECK(report.phases.empty());
+    }
+  }
+}
+
+TEST_CASE("a builder that reads duplication_budget, and no other, is held to it") {
+  const TriangleMesh mesh = random_triangles(10, 0.1f, 1);
+  BuilderParameters parameters;
+  parameters.duplication_budget = 4.1f;
+  std::size_t splitting = 0;
+  for (const std::string_view builder : binary_builder_names()) {
+    INFO(builder);
+    const bool splits = splits_triangles(builder);
+    splitting += splits;
+    if (splits)
+      CHECK_THROWS_AS(build(builder, mesh, 4, 1, best_isa(), parameters), UserError);
+    else
+      CHECK_NOTHROW(build(builder, mesh, 4, 1, best_isa(), parameters));
+  }
+  CHECK(splits_triangles("spatial_sah_reinsertion"));
+  CHECK(splitting >= 2);
 }

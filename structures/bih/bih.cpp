@@ -10,6 +10,9 @@
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
+#include "structures/interval_rays.h"
+#include "structures/leaves/leaf_names.h"
+#include "structures/parameter_checks.h"
 
 namespace arboretum::bih {
 namespace {
@@ -129,10 +132,8 @@ const StructureInfo& Bih::static_info() {
     i.name = kName;
     i.summary = "bounding interval hierarchy: two planes a node, between kd-tree and BVH";
     i.builders = binary_builder_names();
-    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
-    i.no_streams =
-        "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its "
-        "own in every node, which the stack would have to hold for each of them";
+    i.leaves = all_leaf_names();
+    i.no_streams = kNoStreamsOfIntervals;
     return i;
   }();
   return info;
@@ -140,12 +141,10 @@ const StructureInfo& Bih::static_info() {
 
 void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  if (p.max_leaf_blocks < 1 || p.max_leaf_blocks > bvh::kMaxLeafBlocks) {
-    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. " +
-                    std::to_string(bvh::kMaxLeafBlocks));
-  }
-  if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
-  if (mesh.size() >= (1u << 30)) throw UserError("bih takes at most 2^30 - 1 triangles");
+  require_within("max_leaf_blocks", p.max_leaf_blocks, 1, bvh::kMaxLeafBlocks);
+  require_bins(p.bins);
+  require_triangles(kName, mesh.size());
+  static_cast<void>(require_leaf_form(kName, settings.leaf));
   LeafLists lists;
   nodes_.clear(), bounds_ = mesh.bounds(), stack_entries_ = 1, max_coordinate_ = largest_coordinate(bounds_);
   if (mesh.size() == 0) {  // an empty leaf, behind an empty box

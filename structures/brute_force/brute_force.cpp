@@ -6,7 +6,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "structures/archive.h"
-#include "structures/leaves/leaf_form.h"
+#include "structures/leaves/leaf_names.h"
 
 namespace arboretum::brute_force {
 
@@ -18,7 +18,7 @@ const StructureInfo& BruteForce::static_info() {
     i.only_single_rays = "every ray tests every triangle: there is no node to share";
     i.builders = {"in_order"};
     i.uses_parameters = false;
-    for (const LeafForm& form : leaf_forms()) i.leaves.push_back(form.name);
+    i.leaves = all_leaf_names();
     return i;
   }();
   return info;
@@ -31,18 +31,14 @@ void BruteForce::build(const TriangleMesh& mesh, const BuildSettings& settings, 
   }
   constexpr std::size_t kMostTriangles = 0x7ffffffe;  // ids are compared as int32, and INT_MAX stands for none
   if (mesh.size() > kMostTriangles) throw UserError("brute_force: the mesh has more than 2^31 - 2 triangles; split it");
-  const LeafForm* form = find_leaf_form(settings.leaf);
-  if (!form) {
-    throw UserError(unknown_name_message("leaf of brute_force", settings.leaf,
-                                         std::vector<std::string>(info().leaves.begin(), info().leaves.end())));
-  }
-  block_width_ = form->width;
-  block_count_ = unsigned((mesh.size() + form->width - 1) / form->width);
+  const LeafForm& form = require_leaf_form(kName, settings.leaf);
+  block_width_ = form.width;
+  block_count_ = unsigned((mesh.size() + form.width - 1) / form.width);
   arena_ = Arena();
-  arena_ = Arena(block_count_ * form->bytes);
+  arena_ = Arena(block_count_ * form.bytes);
   std::vector<std::uint32_t> ids(mesh.size());
   std::iota(ids.begin(), ids.end(), 0u);
-  form->fill(arena_.data(), mesh, ids);
+  form.fill(arena_.data(), mesh, ids);
   triangles_ = mesh.size();
   bounds_ = mesh.bounds();
   vertices_ = mesh.vertices.data();

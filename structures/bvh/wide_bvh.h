@@ -14,13 +14,13 @@
 #include "structures/builders/box4.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
+#include "structures/builders/one_task.h"
 #include "structures/bvh/bvh.h"
 #include "structures/bvh/wide_refit.h"
-#include "structures/leaves/leaf_form.h"
+#include "structures/leaves/leaf_names.h"
+#include "structures/parameter_checks.h"
 
 namespace arboretum::bvh {
-
-inline constexpr std::uint32_t kParallel = 1u << 12;
 
 /// Bytes that a node or leaf takes in the arena.
 template <class Format>
@@ -67,7 +67,7 @@ class Emitter {
         depth[i] = subtree(children[i], child_offset[i]);
       }
     };
-    if (from.count > kParallel) {
+    if (from.count > kOneTask) {
       tbb::parallel_for(0u, count, descend);
     } else {
       for (unsigned i = 0; i < count; ++i) descend(i);
@@ -101,7 +101,7 @@ const StructureInfo& WideBvh<Format>::static_info() {
     i.name = kName;
     i.summary = Format::kSummary;
     i.builders = binary_builder_names();
-    for (const LeafForm& form : leaf_forms()) i.leaves.push_back(form.name);
+    i.leaves = all_leaf_names();
     if constexpr (requires { Format::kNoStreams; }) i.no_streams = Format::kNoStreams;
     return i;
   }();
@@ -111,25 +111,20 @@ const StructureInfo& WideBvh<Format>::static_info() {
 template <class Format>
 void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  if (p.max_leaf_blocks < 1 || p.max_leaf_blocks > kMaxLeafBlocks) {
-    throw UserError("max_leaf_blocks: " + std::to_string(p.max_leaf_blocks) + " is not within 1 .. " +
-                    std::to_string(kMaxLeafBlocks));
-  }
-  if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
+  require_within("max_leaf_blocks", p.max_leaf_blocks, 1, kMaxLeafBlocks);
+  require_bins(p.bins);
   if (p.collapse != "optimal" && p.collapse != "greedy")
     throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
-  if (mesh.size() >= (1u << 30)) throw UserError(std::string(kName) + " takes at most 2^30 - 1 triangles");
-
-  const LeafForm* form = find_leaf_form(settings.leaf);
-  if (!form) throw UserError(std::string(kName) + " has no leaf '" + settings.leaf + "'");
+  require_triangles(kName, mesh.size());
+  const LeafForm& form = require_leaf_form(kName, settings.leaf);
 
   BinaryTree tree;
-  build_binary_tree(mesh, settings, form->width, tree, report);
+  build_binary_tree(mesh, settings, form.width, tree, report);
 
   double start = wall_seconds();
   const WideTree wide = collapse(
-      std::move(tree), {unsigned(kBranching), form->width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
-                        p.collapse == "optimal", sizeof(typename Format::Node), form->bytes, Format::kGranule});
+      std::move(tree), {unsigned(kBranching), form.width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
+                        p.collapse == "optimal", sizeof(typename Format::Node), form.bytes, Format::kGranule});
   report.phases.emplace_back("collapse", wall_seconds() - start);
 
   start = wall_seconds();
@@ -148,7 +143,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
                     " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
   }
   arena_ = Arena(bytes);
-  const Emitter<Format> emitter(mesh, *form, wide, arena_.data());
+  const Emitter<Format> emitter(mesh, form, wide, arena_.data());
   root_ = emitter.reference(root, 0);
   unsigned depth = 0;
   if (is_leaf(root_)) {

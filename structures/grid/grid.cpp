@@ -7,6 +7,8 @@
 #include "structures/archive.h"
 #include "structures/grid/cell_counts.h"
 #include "structures/grid/grid_builder.h"
+#include "structures/leaves/leaf_names.h"
+#include "structures/parameter_checks.h"
 
 namespace arboretum::grid {
 namespace {
@@ -39,7 +41,7 @@ const StructureInfo& Grid::static_info() {
         "its rays step from cell to cell each at its own distances: those of a packet are in different cells at any "
         "step, and nothing of a step can be shared";
     i.builders = {"two_level", "uniform"};
-    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.leaves = all_leaf_names();
     return i;
   }();
   return info;
@@ -47,10 +49,9 @@ const StructureInfo& Grid::static_info() {
 
 void Grid::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  if (!(p.grid_density >= 0.01f && p.grid_density <= 64.0f)) {
-    throw UserError("grid_density: " + std::to_string(p.grid_density) + " is not within 0.01 .. 64");
-  }
-  if (mesh.size() >= (1u << 30)) throw UserError("grid takes at most 2^30 - 1 triangles");
+  require_within("grid_density", p.grid_density, 0.01f, 64.0f);
+  require_triangles(kName, mesh.size());
+  const LeafForm& form = require_leaf_form(kName, settings.leaf);
   if (settings.builder != "two_level" && settings.builder != "uniform") {
     throw UserError("grid: builder '" + settings.builder + "' is neither two_level nor uniform");
   }
@@ -63,9 +64,7 @@ void Grid::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildR
     cells.codes.assign(1, kEmptyLeaf);
     cells.lists.begin.assign(2, 0);
   } else {
-    unsigned width = 4;
-    with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) { width = Block::kWidth; });
-    build_cells(mesh, p, settings.builder == "two_level", width, cells, report);
+    build_cells(mesh, p, settings.builder == "two_level", form.width, cells, report);
   }
   const double start = wall_seconds();
   leaves_.fill(mesh, cells.lists, settings.leaf, kName, true, cells.codes.data());

@@ -10,27 +10,29 @@
 #include "core/timer.h"
 #include "intersectors/blocks.h"
 #include "structures/archive.h"
+#include "structures/interval_rays.h"
 #include "structures/kdtree/builders.h"
 #include "structures/kdtree/emit.h"
+#include "structures/leaves/leaf_names.h"
+#include "structures/parameter_checks.h"
 
 namespace arboretum::kdtree {
 namespace {
 
 constexpr unsigned kDeepest = 63;       ///< the largest max_depth
 constexpr std::size_t kReferences = 8;  ///< references at most, times the triangles
+constexpr std::size_t kMostTriangles = (std::size_t{1} << 28) - 1;
 
 [[nodiscard]] unsigned depth_limit(const BuilderParameters& p, std::size_t n) {
   return p.max_depth != 0 ? p.max_depth : std::min(kDeepest, unsigned(8.0 + 1.3 * std::log2(double(n) + 1.0)));
 }
 
 void check(const BuilderParameters& p, const TriangleMesh& mesh) {
-  if (p.bins < 4 || p.bins > 64) throw UserError("bins: " + std::to_string(p.bins) + " is not within 4 .. 64");
-  if (p.max_depth > kDeepest)
-    throw UserError("max_depth: " + std::to_string(p.max_depth) + " is not within 0 .. " + std::to_string(kDeepest));
-  if (!(p.empty_bonus >= 0.0f && p.empty_bonus <= 0.95f))
-    throw UserError("empty_bonus: " + std::to_string(p.empty_bonus) + " is not within 0 .. 0.95");
+  require_bins(p.bins);
+  require_within("max_depth", p.max_depth, 0, kDeepest);
+  require_within("empty_bonus", p.empty_bonus, 0.0f, 0.95f);
   if (p.max_leaf_blocks < 1) throw UserError("max_leaf_blocks: 0 is not at least 1");
-  if (mesh.size() >= (1u << 28)) throw UserError("kdtree takes at most 2^28 - 1 triangles");
+  require_triangles("kdtree", mesh.size(), kMostTriangles);
 }
 
 }  // namespace
@@ -41,10 +43,8 @@ const StructureInfo& KdTree::static_info() {
     i.name = kName;
     i.summary = "kd-tree: axis-aligned planes, triangles clipped to their cells, 8-byte nodes";
     i.builders = {"binned_sah", "sweep_sah"};
-    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
-    i.no_streams =
-        "not built: a stream's stack holds a node and a mask of its rays; here each ray has an interval of t of its "
-        "own in every node, which the stack would have to hold for each of them";
+    i.leaves = all_leaf_names();
+    i.no_streams = kNoStreamsOfIntervals;
     return i;
   }();
   return info;
@@ -56,7 +56,8 @@ void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, Buil
                           : settings.builder == "sweep_sah" ? &build_sweep
                                                             : nullptr;
   if (!builder) throw UserError("kdtree has no builder '" + settings.builder + "'");
-  const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
+  static_cast<void>(require_leaf_form(kName, settings.leaf));
+  with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
     leaf_ = settings.leaf, vertices_ = mesh.vertices.data();
     bounds_ = mesh.size() == 0 ? Bounds3f{{0, 0, 0}, {0, 0, 0}} : mesh.bounds();
     max_coordinate_ = largest_coordinate(bounds_);
@@ -78,7 +79,6 @@ void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, Buil
     });
     report.phases.emplace_back("leaves", wall_seconds() - start);
   });
-  if (!known) throw UserError("kdtree has no leaf '" + settings.leaf + "'");
 }
 
 bool KdTree::visit(StructureVisitor& visitor) const {

@@ -1,6 +1,11 @@
 #include "structures/leaves/leaf_form.h"
 
+#include <string>
+
+#include "core/error.h"
+#include "core/names.h"
 #include "structures/leaves/fill_leaves.h"
+#include "structures/leaves/leaf_names.h"
 
 namespace arboretum {
 
@@ -23,10 +28,23 @@ std::span<const LeafForm> leaf_forms() {
   return forms;
 }
 
+std::vector<std::string_view> all_leaf_names() {
+  std::vector<std::string_view> names;
+  for (const LeafForm& form : leaf_forms()) names.push_back(form.name);
+  return names;
+}
+
 const LeafForm* find_leaf_form(std::string_view name) {
   for (const LeafForm& form : leaf_forms())
     if (form.name == name) return &form;
   return nullptr;
+}
+
+const LeafForm& require_leaf_form(std::string_view structure, std::string_view name) {
+  if (const LeafForm* form = find_leaf_form(name)) return *form;
+  const std::vector<std::string_view> all = all_leaf_names();
+  throw UserError(unknown_name_message("leaf of " + std::string(structure), std::string(name),
+                                       std::vector<std::string>(all.begin(), all.end())));
 }
 
 }  // namespace arboretum

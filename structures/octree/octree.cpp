@@ -8,7 +8,9 @@
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
+#include "structures/leaves/leaf_names.h"
 #include "structures/octree/octree_builder.h"
+#include "structures/parameter_checks.h"
 
 namespace arboretum::octree {
 
@@ -18,7 +20,7 @@ const StructureInfo& Octree::static_info() {
     i.name = kName;
     i.summary = "sparse octree, children in the order of the ray's octant";
     i.builders = {"octants"};
-    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.leaves = all_leaf_names();
     i.no_streams =
         "not built: a stream reads the children's boxes from the node; here they come from the node's place in the "
         "cube, which a stream's stack (a node and a mask of its rays) does not hold";
@@ -29,19 +31,15 @@ const StructureInfo& Octree::static_info() {
 
 void Octree::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  if (p.max_depth > kMostLevels) {
-    throw UserError("max_depth: " + std::to_string(p.max_depth) + " is not within 0 .. " + std::to_string(kMostLevels) +
-                    " for octree");
-  }
-  if (mesh.size() >= (1u << 30)) throw UserError("octree takes at most 2^30 - 1 triangles");
+  require_within("octree: max_depth", p.max_depth, 0, kMostLevels);
+  require_triangles(kName, mesh.size());
+  const LeafForm& form = require_leaf_form(kName, settings.leaf);
   Tree tree;
   if (mesh.size() == 0) {  // an empty leaf
     tree.nodes.push_back({0, 0});
     tree.lists.begin.assign(2, 0);
   } else {
-    unsigned width = 4;
-    with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) { width = Block::kWidth; });
-    build_tree(mesh, p, width, tree, report);
+    build_tree(mesh, p, form.width, tree, report);
   }
   const double start = wall_seconds();
   MeteredVector<LeafCode> codes(tree.lists.size());

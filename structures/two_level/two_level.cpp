@@ -10,6 +10,7 @@
 #include "intersectors/blocks.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
+#include "structures/leaves/leaf_names.h"
 
 namespace arboretum::two_level {
 namespace {
@@ -99,7 +100,7 @@ const StructureInfo& TwoLevel::static_info() {
         "every instance";
     i.builders = binary_builder_names();
     i.takes_below = true;
-    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.leaves = all_leaf_names();
     return i;
   }();
   return info;

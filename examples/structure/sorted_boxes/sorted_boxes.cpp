@@ -11,6 +11,8 @@
 #include "intersectors/blocks.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
+#include "structures/leaves/leaf_names.h"
+#include "structures/parameter_checks.h"
 
 namespace arboretum::sorted_boxes {
 namespace {
@@ -64,14 +66,14 @@ const StructureInfo& SortedBoxes::static_info() {
     i.name = kName;
     i.summary = "a flat list of leaf blocks, each with a box: all boxes tested, hit ones visited from near to far";
     i.builders = binary_builder_names();
-    for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) { i.leaves.push_back(Block::kName); });
+    i.leaves = all_leaf_names();
     return i;
   }();
   return info;
 }
 
 void SortedBoxes::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
-  if (mesh.size() >= (1u << 30)) throw UserError("sorted_boxes takes at most 2^30 - 1 triangles");
+  require_triangles(kName, mesh.size());
   const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
     BinaryTree tree;
     if (mesh.size() > 0) build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
