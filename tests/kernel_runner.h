@@ -75,20 +75,38 @@ class Structures {
   std::map<std::tuple<std::string_view, std::string_view, Isa>, std::unique_ptr<Accel>> built_;
 };
 
+/// The number in the name of the row's traversal: `packet8`, `queued16`.
+[[nodiscard]] inline unsigned rays_of(const KernelRow& row) {
+  return unsigned(std::stoul(std::string(row.traversal.substr(row.traversal.find_first_of("0123456789")))));
+}
+
 /// With `counters`, the counting kernel. Answers that the kernel leaves unwritten are marked: t is NaN, an id
 /// 0xdeadbeef.
 [[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays,
-                                                  Counters* counters = nullptr) {
+                                                  TraversalSettings settings, Counters* counters = nullptr) {
   std::vector<Hit> hits(rays.size(), Hit{std::numeric_limits<float>::quiet_NaN(), 0, 0, 0xdeadbeefu});
-  row.closest_hit(accel, rays, hits, counters);
+  RayBatch batch(rays);
+  batch.settings = settings;
+  row.closest_hit(accel, batch, hits, counters);
   return hits;
+}
+[[nodiscard]] inline std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays,
+                                                  Counters* counters = nullptr) {
+  return closest_hit(row, accel, rays, TraversalSettings{}, counters);
 }
 
 [[nodiscard]] inline std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel,
-                                                       std::span<const Ray> rays, Counters* counters = nullptr) {
+                                                       std::span<const Ray> rays, TraversalSettings settings,
+                                                       Counters* counters = nullptr) {
   std::vector<std::uint8_t> occluded(rays.size(), 0xee);
-  row.any_hit(accel, rays, occluded, counters);
+  RayBatch batch(rays);
+  batch.settings = settings;
+  row.any_hit(accel, batch, occluded, counters);
   return occluded;
+}
+[[nodiscard]] inline std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel,
+                                                       std::span<const Ray> rays, Counters* counters = nullptr) {
+  return any_hit(row, accel, rays, TraversalSettings{}, counters);
 }
 
 /// What rows of the table answer to the same rays, each asked once however many others are held against it.

@@ -116,9 +116,8 @@ struct KnownLimit {
 inline constexpr KnownLimit kKnownLimits[] = {
     {"B14", "kdtree",
      "watertight takes a neighbour that the exact ray passes by: among vertices a thousand times farther apart than "
-     "that neighbour is "
-     "large, its sheared vertices are off by more than the kd-tree's pad, and the cells of a clipped triangle are no "
-     "larger than it"},
+     "that neighbour is large, its sheared vertices are off by more than the kd-tree's pad, and the cells of a clipped "
+     "triangle are no larger than it"},
 };
 [[nodiscard]] inline bool has_known_limit(std::string_view structure) {
   const std::string test = Catch::getResultCapture().getCurrentTestName();
@@ -153,7 +152,7 @@ class Reference {
 
   /// With padded boxes: brute_force's hits, bit for bit, and any hit as closest hit. With `watertight` that holds for
   /// every ray; other intersectors may take a triangle that the exact ray passes by, which a structure need not find,
-  /// so they are compared where brute_force has the exact primitive. other boxes may lose hits, but give no other ids.
+  /// so they are compared where brute_force has the exact primitive. Other boxes may lose hits, but give no other ids.
   void check(const Combination& combination, const Accel& accel) {
     const bool limited = has_known_limit(combination.entry->info.name);
     for (const KernelRow* row : combination.rows) {

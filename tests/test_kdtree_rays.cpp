@@ -203,7 +203,7 @@ TEST_CASE("a packet's rays visit just what they visit alone, and get the same bi
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
       const Accel& accel = structures.get(row);
-      const std::size_t width = std::stoul(std::string(row.traversal.substr(6)));
+      const std::size_t width = test::rays_of(row);
       for (std::size_t size : {std::size_t(1), width - 1, width, 2 * width + 3, rays.size()}) {
         INFO(scene.name << ": " << name_of(row) << ", batch of " << size);
         const std::span<const Ray> batch = std::span(rays).first(std::min(size, rays.size()));
@@ -251,7 +251,7 @@ TEST_CASE("packets of a fan pass most nodes together") {
   }
 }
 
-TEST_CASE("axis-parallel rays and rays that are none visit a path at most") {
+TEST_CASE("axis-parallel rays and invalid rays visit a path at most") {
   const TriangleMesh mesh = flat_grid(128);  // 32 768 triangles
   test::Structures structures(mesh);
   const std::vector<Ray> rays{{{0, 0, 3}, 0, {0, 0, -1}, kInfinity}, {{0.5f, 0.25f, 3}, 0, {0, -0.0f, -1}, kInfinity}};

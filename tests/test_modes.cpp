@@ -21,25 +21,6 @@ using namespace arboretum::test;
 
 namespace {
 
-unsigned rays_of(const KernelRow& row) { return unsigned(std::stoul(std::string(row.traversal.substr(6)))); }
-
-std::vector<Hit> closest_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays,
-                             TraversalSettings settings, Counters* counters = nullptr) {
-  std::vector<Hit> hits(rays.size(), Hit{-1.0f, 0, 0, 0});
-  RayBatch batch(rays);
-  batch.settings = settings;
-  row.closest_hit(accel, batch, hits, counters);
-  return hits;
-}
-std::vector<std::uint8_t> any_hit(const KernelRow& row, const Accel& accel, std::span<const Ray> rays,
-                                  TraversalSettings settings, Counters* counters = nullptr) {
-  std::vector<std::uint8_t> occluded(rays.size(), 0xee);
-  RayBatch batch(rays);
-  batch.settings = settings;
-  row.any_hit(accel, batch, occluded, counters);
-  return occluded;
-}
-
 /// Rows of `traversals` with padded boxes and the two usual intersectors, on each ISA of this machine, once a kernel.
 std::vector<KernelRow> rows_of(std::string_view prefix) {
   std::vector<KernelRow> rows;
@@ -48,7 +29,7 @@ std::vector<KernelRow> rows_of(std::string_view prefix) {
   return rows;
 }
 
-/// Coherent rays, incoherent ones and some that are none.
+/// Coherent rays, incoherent ones and some invalid ones.
 std::vector<Ray> mixed_rays(const TriangleMesh& mesh) {
   const Vec3f centre = mesh.bounds().center();
   std::vector<Ray> rays = aimed_rays(mesh, centre + mesh.bounds().extent() * 2.0f, 40, 61);
@@ -128,8 +109,8 @@ TEST_CASE("no threshold of a hybrid and no number of rays in flight changes a bi
         continue;
       const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
       REQUIRE(single);
-      const std::vector<Hit> alone = test::closest_hit(*single, structures.get(row), rays);
-      const std::vector<std::uint8_t> occluded = test::any_hit(*single, structures.get(row), rays);
+      const std::vector<Hit> alone = closest_hit(*single, structures.get(row), rays);
+      const std::vector<std::uint8_t> occluded = any_hit(*single, structures.get(row), rays);
       if (way == "hybrid") {
         const unsigned width = rays_of(row);
         for (unsigned threshold = 0; threshold <= width; ++threshold)
@@ -188,7 +169,7 @@ TEST_CASE("a hybrid's threshold and the rays in flight do what they say") {
       Counters c;
       (void)closest_hit(row, structures.get(row), rays, {.rays_in_flight = flight}, &c);
       const bool set = row.traversal == "queued";
-      const double most = set ? flight : std::stoul(std::string(row.traversal.substr(6)));
+      const double most = set ? flight : rays_of(row);
       CHECK(c.nodes == alone.nodes);
       // An empty cell of the kd-tree is no leaf to the counters, but the queue passes none either. In the bounding
       // interval hierarchy a turn goes on to the ray's next leaf: one at first, and one after each leaf while something
