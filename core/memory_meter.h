@@ -26,7 +26,7 @@ class MemoryMeter {
 [[nodiscard]] void* allocate_metered(std::size_t bytes);
 /// Gives back what allocate_metered(bytes) gave.
 void release_metered(void* data, std::size_t bytes) noexcept;
-/// The same without counting: for who counts what he uses of it (core/reserved_array.h).
+/// The same without counting: the caller counts what it uses of it (core/reserved_array.h).
 [[nodiscard]] void* allocate_uncounted(std::size_t bytes);
 /// Gives back what allocate_uncounted(bytes) gave.
 void release_uncounted(void* data, std::size_t bytes) noexcept;

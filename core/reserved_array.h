@@ -17,7 +17,7 @@
 namespace arboretum {
 
 /// Uninitialised elements of a trivial type. resize() is a vector's: all elements count. reserve() then hand_out() is
-/// for who does not know how many he will need.
+/// for callers that do not know how many they will need.
 template <class T>
 class ReservedArray {
   static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T> && alignof(T) <= 64);

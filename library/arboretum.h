@@ -52,7 +52,7 @@ struct TracerSettings {
 class Tracer {
  public:
   /// Builds. Throws UserError for a key that does not exist (naming the nearest), for keys that do not go together, for
-  /// an instruction set that the machine lacks, and for a mesh that is none: an index beyond the vertices, a vertex of
+  /// an instruction set that the machine lacks, and for an invalid mesh: an index beyond the vertices, a vertex of
   /// a triangle that in some key frame is not finite or beyond kMaxCoordinate (2^40), key frames of different lengths,
   /// instances that do not lay out their prototypes one after the other. An empty mesh is none of these: every ray
   /// misses it.
@@ -60,7 +60,7 @@ class Tracer {
 
   /// The nearest hit within the closed interval [tnear, tfar], t in units of the direction's length. A miss has t =
   /// infinity. The caller sees to 0 <= tnear, which nothing checks: behind a ray's origin some structures look and
-  /// others do not. What else is no ray misses (core/ray.h).
+  /// others do not. Any other invalid ray misses (core/ray.h).
   [[nodiscard]] Hit closest_hit(const Ray& ray) const {
     Hit hit;
     one_->closest_hit(*accel_, RayBatch({&ray, 1}), {&hit, 1}, nullptr);

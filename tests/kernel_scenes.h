@@ -162,7 +162,7 @@ struct KernelScene {
   return rays;
 }
 
-/// Rays that are none: each must miss, whatever stands beside it.
+/// Invalid rays: each must miss, whatever stands beside it.
 [[nodiscard]] inline std::vector<Ray> invalid_rays() {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   return {

@@ -206,7 +206,7 @@ TEST_CASE("u weighs the second vertex and v the third") {
   }
 }
 
-TEST_CASE("rays that are none hit nothing in embree") {
+TEST_CASE("invalid rays hit nothing in embree") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<Ray> rays{
       {{nan, 0, 0}, 0, {0, 0, 1}, kInfinity},        {{0, 0, -3}, 0, {0, nan, 1}, kInfinity},

@@ -1,4 +1,4 @@
-// Structure-level cases B17 and B19 to B27: rays that are none, rays in company, and rays that meshes leak to.
+// Structure-level cases B17 and B19 to B27: invalid rays, rays in company, and rays that meshes leak to.
 #include <cmath>
 
 #include "tests/structure_cases.h"
