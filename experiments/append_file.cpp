@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -43,6 +44,48 @@ int write_all(int descriptor, std::string_view text) {
     text.remove_prefix(static_cast<std::size_t>(written));
   }
   return 0;
+}
+
+constexpr int kMostLinks = 40;  // the kernel's own bound
+
+/// Where a file's text goes: into what is there, or over it.
+struct Target {
+  std::filesystem::path path;  ///< behind all symbolic links
+  int descriptor = -1;         ///< of this process, where `path` names one, as /dev/stdout does
+  bool in_place = false;
+};
+
+/// The descriptor that an entry of /proc/self/fd stands for. Such an entry is a link that leads nowhere by its text,
+/// and opening it anew would begin at the start of the file.
+int own_descriptor(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const std::string name = path.filename().string();
+  int number = -1;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+  const bool is_number = error == std::errc{} && end == name.data() + name.size();
+  return is_number && std::filesystem::equivalent(path.parent_path(), "/proc/self/fd", ignored) ? number : -1;
+}
+
+Target target_of(std::filesystem::path path) {
+  std::error_code error;
+  for (int links = 0; links < kMostLinks; ++links) {
+    if (const int descriptor = own_descriptor(path); descriptor >= 0) return {path, descriptor, true};
+    const std::filesystem::path next = std::filesystem::read_symlink(path, error);
+    if (error) break;
+    path = path.parent_path() / next;  // an absolute one takes the place of all
+  }
+  const auto status = std::filesystem::status(path, error);
+  return {path, -1, std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)};
+}
+
+void write_in_place(const Target& target, std::string_view text, const std::filesystem::path& path) {
+  std::fflush(stdout);  // what was printed before comes first where both go to the same place
+  const bool ours = target.descriptor >= 0;
+  const int descriptor = ours ? target.descriptor : ::open(target.path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
+  if (descriptor < 0) cannot_write(path, errno);
+  int error = write_all(descriptor, text);
+  if (!ours && ::close(descriptor) != 0 && error == 0) error = errno;
+  if (error != 0) cannot_write(path, error);
 }
 
 }  // namespace
@@ -97,13 +140,15 @@ void flush_output() {
 }
 
 void write_whole(const std::filesystem::path& path, std::string_view text) {
-  std::filesystem::path beside = path;
+  const Target target = target_of(path);
+  if (target.in_place) return write_in_place(target, text, path);
+  std::filesystem::path beside = target.path;
   beside += ".part";
   const int descriptor = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor < 0) cannot_write(path, errno);
   int error = write_all(descriptor, text);
   if (::close(descriptor) != 0 && error == 0) error = errno;
-  if (error == 0 && ::rename(beside.c_str(), path.c_str()) != 0) error = errno;
+  if (error == 0 && ::rename(beside.c_str(), target.path.c_str()) != 0) error = errno;
   if (error != 0) {
     ::unlink(beside.c_str());
     cannot_write(path, error);
@@ -113,7 +158,12 @@ void write_whole(const std::filesystem::path& path, std::string_view text) {
 void require_writable(const std::filesystem::path& path) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) cannot_write(path, EISDIR);
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  const Target target = target_of(path);
+  if (target.descriptor >= 0 && ::fcntl(target.descriptor, F_GETFL) < 0) cannot_write(path, errno);
+  if (target.in_place && target.descriptor < 0 && ::access(target.path.c_str(), W_OK) != 0) cannot_write(path, errno);
+  if (target.in_place) return;
+  const std::filesystem::path folder =
+      target.path.has_parent_path() ? target.path.parent_path() : std::filesystem::path(".");
   if (::access(folder.c_str(), W_OK | X_OK) != 0) cannot_write(path, errno);
   if (!std::filesystem::is_directory(folder, ignored)) cannot_write(path, ENOTDIR);
 }

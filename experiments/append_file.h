@@ -31,7 +31,9 @@ class AppendFile {
 
 /// Whole lines of a file; a last line without its newline is left out. Empty when there is no such file.
 [[nodiscard]] std::vector<std::string> read_lines(const std::filesystem::path& path);
-/// Writes beside `path` and renames over it, so that a failure leaves the old file. Throws UserError.
+/// Writes beside `path` and renames over it, so that a failure leaves the old file; a symbolic link stays and what it
+/// leads to is written. What is there and is no regular file (a device, a FIFO, /dev/stdout, /dev/fd/63) is written to
+/// as it stands. Throws UserError.
 void write_whole(const std::filesystem::path& path, std::string_view text);
 /// Hands what was printed to the operating system. Throws std::system_error where it does not go there: the reader has
 /// left (EPIPE), the disk is full.

@@ -9,6 +9,7 @@
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
 #include "experiments/conclusion.h"
+#include "experiments/folder_lock.h"
 #include "experiments/plotting.h"
 #include "experiments/results_writer.h"
 
@@ -92,6 +93,8 @@ ExitStatus command_merge(const MergeCommand& command) {
   }
   if (!command.no_plots) require_chosen_python();
   make_output_folder(command.out);
+  const FolderLock lock(command.out, "give another OUT");
+  refuse_results_there(command.out);
   write_beside(command.out, parts, merged);
   std::string cells;
   for (const Json& line : merged.lines) cells += line.dump() + "\n";

@@ -14,6 +14,7 @@
 #include "experiments/config_plots.h"
 #include "experiments/effective.h"
 #include "experiments/estimate.h"
+#include "experiments/folder_lock.h"
 #include "experiments/interleave.h"
 #include "experiments/machine_info.h"
 #include "experiments/name_filter.h"
@@ -54,8 +55,9 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
 
 /// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each
 /// that is read or placed is loaded for this, one at a time. Where it is the only scene it stays; of several each is
-/// loaded again when its turn comes: a long sweep does not hold all of them.
-LoadedScene require_scenes(const Experiment& experiment, const Plan& plan) {
+/// loaded again when its turn comes: a long sweep does not hold all of them. `geometry`: as PlanRecord's.
+LoadedScene require_scenes(const Experiment& experiment, const Plan& plan,
+                           std::map<std::string, std::string>& geometry) {
   LoadedScene loaded;
   std::size_t wanted = 0;
   for (std::size_t i = 0; i < experiment.scenes.size(); ++i) {
@@ -66,6 +68,7 @@ LoadedScene require_scenes(const Experiment& experiment, const Plan& plan) {
     if (!scene.spec.generator.empty() && scene.placing.label.empty()) continue;
     try {
       loaded = {i, std::make_unique<SceneData>(scene, experiment.measure)};
+      geometry[scene.name] = loaded.data->geometry();
     } catch (const UserError& e) {
       throw UserError(fmt::format("{}: {}", scene.where, e.what()));
     }
@@ -94,6 +97,24 @@ void refuse_other_shard(const std::filesystem::path& folder, const Shard& shard)
   throw UserError(fmt::format(
       "{}: holds {}, this is shard {}; choose another folder with --out, then `merge` them", folder.string(),
       before->shard.is_whole() ? "results of the whole plan" : "shard " + before->shard.text(), shard.text()));
+}
+
+/// What was measured of a scene stays beside what will be: both must be of the same triangles. Takes up what the folder
+/// says of scenes that are not measured now. Folders of older revisions say nothing.
+void refuse_other_geometry(const std::filesystem::path& folder, const Experiment& experiment,
+                           std::map<std::string, std::string>& geometry) {
+  const std::optional<PlanRecord> before = read_plan_record(folder);
+  if (!before) return;
+  for (const SceneChoice& scene : experiment.scenes) {
+    const auto then = before->geometry.find(scene.name);
+    const auto now = geometry.find(scene.name);
+    if (then == before->geometry.end() || now == geometry.end() || then->second == now->second) continue;
+    throw UserError(fmt::format(
+        "{}: scene {} has other geometry than {} was measured with (hash {}, then {}); put its files back as they "
+        "were, or choose another folder with --out",
+        scene.where, scene.name, folder.string(), now->second, then->second));
+  }
+  geometry.insert(before->geometry.begin(), before->geometry.end());
 }
 
 /// How two runs differ that should be one; empty where their results compare with each other.
@@ -212,10 +233,14 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   Json context = machine_context(experiment, hash, command.command_line);
   add_custom_context(context, command.benchmark);
   if (!command.no_plots && command.benchmark.format == "console") require_chosen_python();
-  LoadedScene loaded = require_scenes(experiment, plan);
+  LoadedScene loaded = require_scenes(experiment, plan, record.geometry);
   make_output_folder(folder);
-  if (command.resume) refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
-  if (!command.benchmark.out.empty()) AppendFile(command.benchmark.out, true);  // cannot be written: say so now
+  const FolderLock lock(folder, "give another --out");
+  if (command.resume) {
+    refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
+    refuse_other_geometry(folder, experiment, record.geometry);
+  }
+  if (!command.benchmark.out.empty()) require_writable(command.benchmark.out);
   if (!command.resume) set_aside(folder);
   Journal journal(folder, hash, whole, command.resume);
   const double seconds = total_seconds(experiment, plan);
@@ -236,8 +261,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
              shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
              format_duration(seconds));
 
-  RunOutcome outcome =
-      run_plan(experiment, plan, registry, journal, {.fail_fast = command.fail_fast}, std::move(loaded));
+  RunOutcome outcome = run_plan(experiment, plan, registry, journal,
+                                {.fail_fast = command.fail_fast, .geometry = record.geometry}, std::move(loaded));
   outcome.warnings = changed;
   std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
                     std::back_inserter(outcome.warnings));

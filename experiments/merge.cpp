@@ -72,6 +72,21 @@ void check_machine(const ResultFolder& first, const ResultFolder& part, const Me
   }
 }
 
+/// One name, one geometry: a file may have been edited between two parts.
+void refuse_different_geometry(const std::vector<ResultFolder>& parts) {
+  std::map<std::string, std::pair<const ResultFolder*, std::string>> known;
+  for (const ResultFolder& part : parts) {
+    if (!part.plan) continue;
+    for (const auto& [scene, hash] : part.plan->geometry) {
+      const auto& [first, of_first] = known.try_emplace(scene, &part, hash).first->second;
+      if (hash == of_first) continue;
+      throw UserError(fmt::format(
+          "{} and {} were measured with different geometry of scene {} (hashes {} and {}); measure one of them anew",
+          first->path.string(), part.path.string(), scene, of_first, hash));
+    }
+  }
+}
+
 void refuse_doubled_cells(const std::vector<ResultFolder>& parts) {
   std::map<std::string, const ResultFolder*> owners;
   std::size_t doubled = 0;
@@ -172,6 +187,7 @@ class WholePlan {
     PlanRecord& record = merged_.record;
     whole_ = std::max(whole_, plan.cells.size() + plan.filtered);
     record.excluded = plan.excluded;
+    record.geometry.insert(plan.geometry.begin(), plan.geometry.end());
     if (record.cells.empty()) record.filter = plan.filter, record.skip = plan.skip;
     merged_.shards = std::max(merged_.shards, plan.shard.of);
     for (const PlanRecord::Entry& entry : plan.cells)
@@ -217,6 +233,7 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
     check_machine(parts.front(), part, options, merged.outcome.warnings);
     one_machine = one_machine && merged.outcome.warnings.empty();
   }
+  refuse_different_geometry(parts);
   refuse_doubled_cells(parts);
   WholePlan whole(parts, merged);
   whole.place_cells(), whole.place_skipped(), whole.count();

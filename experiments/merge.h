@@ -24,8 +24,9 @@ struct Merged {
   std::vector<PlanRecord::Entry> missing;  ///< cells of the plan that no part has, nor skips
 };
 
-/// Throws UserError when the parts are not of one configuration; hold a cell twice; or, without the option that allows
-/// it, are of different machines or revisions. `command` is the command line as typed.
+/// Throws UserError when the parts are not of one configuration; have other geometry under one name; hold a cell twice;
+/// or, without the option that allows it, are of different machines or revisions. `command` is the command line as
+/// typed.
 [[nodiscard]] Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions& options,
                                    const std::string& command);
 

@@ -70,6 +70,7 @@ std::string to_text(const PlanRecord& record) {
   if (!record.earlier.empty()) json["earlier_contexts"] = record.earlier;
   json["shard"] = record.shard.text();
   json["filter"] = record.filter, json["skip"] = record.skip;
+  if (!record.geometry.empty()) json["geometry"] = record.geometry;
   json["excluded"] = record.excluded, json["filtered"] = record.filtered;
   json["cells"] = entries_json(record.cells), json["skipped"] = entries_json(record.skipped);
   return json.dump(1) + "\n";
@@ -86,6 +87,7 @@ std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) 
     record.shard = parse_shard(json.at("shard").get<std::string>());
     record.filter = json.value("filter", ""), record.skip = json.value("skip", "");
     record.excluded = json.value("excluded", std::size_t{0}), record.filtered = json.value("filtered", std::size_t{0});
+    record.geometry = json.value("geometry", record.geometry);
     record.cells = entries_of(json.at("cells")), record.skipped = entries_of(json.at("skipped"));
     return record;
   } catch (const nlohmann::json::exception& e) {

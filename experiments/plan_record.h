@@ -26,6 +26,9 @@ struct PlanRecord {
   std::size_t excluded = 0, filtered = 0;
   std::vector<Entry> cells, skipped;  ///< of all shards, in the plan's order
   Json context = Json::object();
+  /// Hashes of the scenes that were read from files or placed, by name: SceneData::geometry(). Of others the
+  /// configuration says all. Empty: of an older revision.
+  std::map<std::string, std::string> geometry = {};
   std::vector<Json> earlier = {};  ///< contexts of the runs that this one goes on with, the oldest first
 };
 

@@ -88,10 +88,20 @@ class Runner {
       scene = std::make_unique<SceneData>(experiment_.scenes[index], experiment_.measure);
     }
     SceneData& data = *scene;
+    refuse_changed(data);
     data.note_to([this](const std::string& line) { progress_.note(line); });
     StructurePool pool(data.mesh(), registry_, experiment_.metrics.quality, cache_);
     if (!builds.empty()) run_builds(builds, data, pool);
     run_traces(traces, data, pool);
+  }
+
+  /// Between the plan and its turn a scene's files may have been edited.
+  void refuse_changed(const SceneData& data) const {
+    const auto begun = options_.geometry.find(data.name());
+    if (begun == options_.geometry.end() || begun->second == data.geometry()) return;
+    throw UserError(fmt::format(
+        "scene {}: its geometry has changed since the run began; put its files back and go on with --resume",
+        data.name()));
   }
 
   /// Cells that share a structure stay together; as many structures are held at once as fit the memory.

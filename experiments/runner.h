@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@
 namespace arboretum {
 
 struct RunOptions {
-  bool fail_fast = false;  ///< stop after the first cell with a wrong answer
+  bool fail_fast = false;                            ///< stop after the first cell with a wrong answer
+  std::map<std::string, std::string> geometry = {};  ///< of scenes as the run began: PlanRecord::geometry
 };
 
 struct RunOutcome {

@@ -11,6 +11,7 @@
 #include "rendering/hard_workload.h"
 #include "scenes/sanitise.h"
 #include "scenes/vec3d.h"
+#include "structures/structure_file.h"
 
 namespace arboretum {
 namespace {
@@ -44,6 +45,8 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
   }
   for (const std::string& warning : report.warnings) note_(fmt::format("{}: {}", name_, warning));
 }
+
+std::string SceneData::geometry() const { return fmt::format("{:016x}", hash_of(mesh())); }
 
 void SceneData::note_to(NoteFunction note) {
   note_ = std::move(note);

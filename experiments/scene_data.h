@@ -35,6 +35,8 @@ class SceneData {
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return scene_.mesh; }
+  /// Hash of the mesh, as loaded and placed: what a scene's name alone does not tell.
+  [[nodiscard]] std::string geometry() const;
   /// Of a scene that is placed: `offset`, `radius` (half the diagonal), `triangle_aspect_median`.
   [[nodiscard]] const Json& facts() const noexcept { return facts_; }
   /// `start`: of workloads whose rays start on surfaces. The reference stays.

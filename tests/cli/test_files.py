@@ -1,0 +1,131 @@
+#!/usr/bin/env python3
+"""What a run reads and writes, from outside: test_files.py ARBORETUM. Scenes that change, two runs at once, pipes."""
+
+import json
+import os
+import subprocess
+import threading
+import time
+import unittest
+
+from command_line_case import ARBORETUM, CommandLineCase, read_jsonl
+
+CUBE = """\
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 1 2 3\nf 1 3 4\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 3 4 8\nf 3 8 7\n"""
+
+MODEL = """\
+scenes: [{file: model.obj}]
+axes: {structure: [bvh2, bvh4], isa: scalar}
+metrics: [trace]
+measure: {repetitions: 3, min_time: 0.001, resolution: [16, 16]}
+"""
+FEW = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build")
+
+
+class Files(CommandLineCase):
+    def model(self, *words):
+        return self.call("run", self.write("model.yaml", MODEL), "--no-plots", *words)
+
+    def contents(self, folder):
+        return {p.name: p.read_bytes() for p in (self.folder / folder).iterdir()}
+
+    def test_a_run_is_not_gone_on_with_where_its_scene_has_changed(self):
+        self.write("model.obj", CUBE)
+        self.assertEqual(self.model("--out", "out", "--filter", "bvh2").returncode, 0)
+        before = self.contents("out")
+        self.write("model.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
+        self.assert_error(self.model("--out", "out", "--resume"), "model.yaml:1: scene model has other geometry than out")
+        self.assertEqual(self.contents("out"), before)
+        self.write("model.obj", CUBE + "# a comment changes no triangle\n")
+        self.assertEqual(self.model("--out", "out", "--resume").returncode, 0)
+        self.assertEqual(len(read_jsonl(self.folder / "out/cells.jsonl")), 2)
+        # A folder of an older revision says nothing of geometry: it may be gone on with.
+        plan = json.loads((self.folder / "out/plan.json").read_text())
+        self.assertEqual(list(plan.pop("geometry")), ["model"])
+        (self.folder / "out/plan.json").write_text(json.dumps(plan))
+        self.write("model.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
+        self.assertEqual(self.model("--out", "out", "--resume").returncode, 0)
+
+    def test_parts_of_different_geometry_do_not_merge(self):
+        self.write("model.obj", CUBE)
+        self.assertEqual(self.model("--shard", "1/2", "--out", "a").returncode, 0)
+        self.write("model.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
+        self.assertEqual(self.model("--shard", "2/2", "--out", "b").returncode, 0)
+        self.assert_error(self.call("merge", "both", "a", "b", "--no-plots"), "a and b were measured with different geometry of scene model")
+        self.assertFalse((self.folder / "both").exists())
+        self.write("model.obj", CUBE)
+        self.assertEqual(self.model("--shard", "2/2", "--out", "b").returncode, 0)
+        self.assertEqual(self.call("merge", "both", "a", "b", "--no-plots").returncode, 0)
+        self.assertEqual(list(json.loads((self.folder / "both/plan.json").read_text())["geometry"]), ["model"])
+
+    def test_one_run_at_a_time_writes_into_a_folder(self):
+        first = subprocess.Popen([ARBORETUM, "run", self.config, "--no-plots", "--out", "out", "--benchmark_min_time=2"],
+                                 cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            for _ in range(3000):
+                if (self.folder / "out/plan.json").exists():
+                    break
+                time.sleep(0.01)
+            for words in ((), ("--resume", "--benchmark_min_time=2")):
+                self.assert_error(self.run_small("--out", "out", *words), f"out: another run writes here (process {first.pid}); give another --out")
+            self.assertEqual(self.run_small("--out", "other", *FEW).returncode, 0)
+            self.assert_error(self.call("merge", "out", "other", "--no-plots"), "out: ")
+        finally:
+            first.kill()
+            first.wait()
+        self.assertEqual(self.run_small("--out", "out", *FEW).returncode, 0)  # freed by the kernel
+
+    def compared(self, *words, **options):
+        result = self.call("compare", "out", "out", *words, **options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def test_what_is_no_regular_file_is_written_to_as_it_stands(self):
+        self.assertEqual(self.run_small("--out", "out", *FEW).returncode, 0)
+        pipe = self.folder / "pipe"
+        os.mkfifo(pipe)
+        (self.folder / "link").symlink_to("pipe")
+        for name in ("pipe", "link"):
+            with self.subTest(name=name):
+                read = []
+                reader = threading.Thread(target=lambda: read.append(pipe.read_text()), daemon=True)
+                reader.start()
+                self.compared("--json", name)
+                reader.join(60)
+                self.assertEqual(json.loads(read[0])["exit_status"], 0)
+                self.assertTrue(pipe.is_fifo())
+        read = []
+        reader = threading.Thread(target=lambda: read.append(pipe.read_text()), daemon=True)
+        reader.start()
+        self.assertEqual(self.run_small("--out", "out", *FEW, "--benchmark_out=pipe").returncode, 0)
+        reader.join(60)
+        self.assertTrue(json.loads(read[0])["benchmarks"])
+        self.assertEqual(list(self.folder.glob("*.part")), [])
+
+    def test_a_link_stays_and_what_it_leads_to_is_written(self):
+        self.assertEqual(self.run_small("--out", "out", *FEW).returncode, 0)
+        (self.folder / "kept").mkdir()
+        for target in ("kept/there.csv", "kept/not_yet.csv"):
+            (self.folder / "link").unlink(missing_ok=True)
+            (self.folder / "link").symlink_to(target)
+            self.write("kept/there.csv", "old")
+            self.compared("--csv", "link")
+            self.assertTrue((self.folder / "link").is_symlink())
+            self.assertTrue((self.folder / target).read_text().startswith("name,"))
+
+    def test_descriptors_of_the_shell_are_written_to(self):
+        self.assertEqual(self.run_small("--out", "out", *FEW).returncode, 0)
+        ends = os.pipe()
+        self.compared("--json", f"/proc/self/fd/{ends[1]}", pass_fds=[ends[1]])
+        os.close(ends[1])
+        with os.fdopen(ends[0]) as pipe:
+            self.assertEqual(json.load(pipe)["exit_status"], 0)
+        with open(self.folder / "all.txt", "w") as out:  # stdout is a file: what is printed comes first, and stays
+            subprocess.run([ARBORETUM, "compare", "out", "out", "--csv", "/proc/self/fd/1"], cwd=self.folder, stdout=out, check=True)
+        text = (self.folder / "all.txt").read_text()
+        self.assertLess(text.index("no regression"), text.index("\nname,"))
+
+
+if __name__ == "__main__":
+    unittest.main()
