@@ -36,7 +36,7 @@
 #include "core/exact/hit_arithmetic.h"
 #include "intersectors/leaf_block.h"
 #include "intersectors/round_later.h"
-#include "intersectors/sheared_ray.h"
+#include "intersectors/sheared_packet.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -58,13 +58,37 @@ struct Exact {
         : ShearedRay(ray), origin(ray.origin), towards(ray.direction), best_low(ray.tfar) {
       // Where -1 / d_z is not within u of itself: NaN leaves every lane to exact arithmetic.
       const float largest = __builtin_fabsf(direction[2]);
-      if (__builtin_expect(!(largest >= 0x1p-120f && largest <= 0x1p120f), 0))
+      if (__builtin_expect(!(largest >= kLeastDirection && largest <= kMostDirection), 0))
         shear[0] = shear[2] = std::numeric_limits<float>::quiet_NaN();
+    }
+    /// With shear constants known.
+    ARBORETUM_INLINE RayData(const Ray& ray, unsigned axis, float shear_x, float shear_y, float shear_z)
+        : ShearedRay(ray, axis, shear_x, shear_y, shear_z), origin(ray.origin), towards(ray.direction),
+          best_low(ray.tfar) {}
+  };
+
+  struct PacketData : ShearedPacket {
+    static constexpr int kCost = 2;  ///< intervals are found for all lanes where one may be hit
+    template <int W>
+    ARBORETUM_INLINE void prepare(const PacketRays& rays, int k) {
+      ShearedPacket::prepare<W>(rays, k);
+      // As in RayData: 1 / |d_z| for |d_z|, the bounds being each other's reciprocals.
+      using F = vf<W>;
+      const F inverse = abs(F::load(sz + k));
+      const vm<W> usable = (inverse >= F(kLeastDirection)) & (inverse <= F(kMostDirection));
+      if (__builtin_expect(!all(usable), 0)) {
+        const F nan(std::numeric_limits<float>::quiet_NaN());
+        select(usable, F::load(sx + k), nan).store(sx + k), select(usable, F::load(sz + k), nan).store(sz + k);
+      }
+    }
+    [[nodiscard]] ARBORETUM_INLINE RayData alone(const Ray& ray, int i) const {
+      return RayData(ray, axis(i), sx[i], sy[i], sz[i]);
     }
   };
 
 #if ARBORETUM_TARGET != ARBORETUM_TARGET_SCALAR
-  using Unfinished = UnroundedHits;
+  template <class H>
+  using Unfinished = UnroundedHits<H>;
 #endif
 
   /// True when `best` has changed.
@@ -75,16 +99,7 @@ struct Exact {
     Distances<Block::kWidth> d;
     find_distances(ray, edges, tnear, best.t, d);
     if (d.candidates == 0) return false;
-    const unsigned lane = foremost(d, tnear);
-    if (__builtin_expect(lane != 0, 1)) {
-      const int i = __builtin_ctz(lane);
-      const float high = d.high[i];
-      if (__builtin_expect(high < ray.best_low && high <= best.t, 1)) {
-        ray.has_best = true, ray.best = CornersInFours(block, i), ray.best_low = d.low[i];
-        best.t = high, best.primitive = std::int32_t(block.id[i]);
-        return true;
-      }
-    }
+    if (__builtin_expect(take_foremost(ray, block, d, tnear, best), 1)) return true;
     return nearest(ray, block, d, tnear, best);
   }
 
@@ -95,6 +110,39 @@ struct Exact {
     Distances<Block::kWidth> d;
     find_distances(ray, edges, tnear, tfar, d);
     return d.candidates != 0 && any_within(ray, block, d, tnear, tfar);
+  }
+
+  /// What W rays of a packet make of one triangle: it is within what counts for the `hit` ones, at a t within their
+  /// [low, high]; the filter cannot say for those of `again`, which have to be tested alone.
+  template <int W>
+  struct FilteredRays {
+    unsigned hit, again;
+    alignas(64) float low[W], high[W];
+  };
+  /// Lanes are the W rays from k on, of group kz, all against triangle `i` of the block.
+  template <bool AnyHit, int W, class Block>
+  static ARBORETUM_INLINE void filter_rays(const PacketRays& rays, const PacketData& packet, int kz, int k,
+                                           const Block& block, int i, vf<W> tfar, FilteredRays<W>& out) {
+    using F = vf<W>;
+    const Edges<W> edges(packet.template sheared<W>(rays, kz, k, block, i));
+    out.hit = out.again = 0;
+    if (edges.candidates() == 0) return;
+    const Intervals<W> t(edges, F::load(packet.sz + k));
+    const F tnear = F::load(rays.tnear + k);
+    const unsigned candidates = edges.candidates() & ~((t.low > tfar) | (t.high < tnear)).bits();
+    vm<W> hit = t.certain & (t.low >= tnear) & (t.high <= tfar);
+    if constexpr (!AnyHit) hit = hit & t.narrow();
+    out.hit = candidates & hit.bits(), out.again = candidates & ~hit.bits();
+    t.low.store(out.low), t.high.store(out.high);
+  }
+  /// Such a hit becomes a ray's best where it is; false where the filter cannot tell.
+  template <class Block>
+  static ARBORETUM_INLINE bool take(RayData& ray, const Block& block, int i, float low, float high, NearestHit& best) {
+    if (low > best.t) return true;
+    if (!(high < ray.best_low && high <= best.t)) return false;
+    ray.has_best = true, ray.best = CornersInFours(block, i), ray.best_low = low;
+    best.t = high, best.primitive = std::int32_t(block.id[i]);
+    return true;
   }
 
   /// Rounds t, u and v of the nearest hit.
@@ -109,11 +157,28 @@ struct Exact {
  private:
   static constexpr float kBound = (kHasFma ? 12.5f : 14.5f) * 0x1p-24f;
   static constexpr float kLeast = 0x1p-140f;
+  /// Width of an interval, relative to t, above which doubles narrow it: a wide one lets boxes through that lie behind
+  /// the hit.
+  static constexpr float kWide = 0x1p-14f;
+  /// Beyond these 1 / d_z is not within u of itself.
+  static constexpr float kLeastDirection = 0x1p-120f, kMostDirection = 0x1p120f;
 
   /// A block after the filter: sheared depths, edge functions, the least and the greatest of these, their bound.
   template <int W>
   struct Edges {
-    vf<W> az, bz, cz, u, v, w, lowest, highest, error;
+    using F = vf<W>;
+    F az, bz, cz, u, v, w, lowest, highest, error;
+
+    ARBORETUM_INLINE explicit Edges(const ShearedVertices<W>& p) : az(p.a.z), bz(p.b.z), cz(p.c.z) {
+      const auto [ax, ay, a] = p.a;
+      const auto [bx, by, b] = p.b;
+      const auto [cx, cy, c] = p.c;
+      u = msub(cx, by, cy * bx), v = msub(ax, cy, ay * cx), w = msub(bx, ay, by * ax);
+      const F width = max_x86(max_x86(max_x86(abs(ax), abs(ay)), max_x86(abs(bx), abs(by))), max_x86(abs(cx), abs(cy)));
+      const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz));
+      error = madd(F(kBound), madd(F(7.0f * 0x1p-24f), depth, width) * (depth + width), F(kLeast));
+      lowest = min_x86(min_x86(u, v), w), highest = max_x86(max_x86(u, v), w);
+    }
 
     /// Lanes that are not certainly missed. An error that is not finite misses nothing; an empty lane's depth is NaN,
     /// that of a triangle never.
@@ -123,6 +188,32 @@ struct Exact {
     ARBORETUM_INLINE vm<W> certainly_hit() const { return max_x86(lowest, -highest) > error; }
   };
 
+  /// t of a lane is within [low, high] if it is hit; the `certain` ones are.
+  template <int W>
+  struct Intervals {
+    using F = vf<W>;
+    vm<W> certain;
+    F low, high;
+
+    /// `sz`: -1 / d_z.
+    ARBORETUM_INLINE Intervals(const Edges<W>& l, F sz) {
+      const F za = sz * l.az, zb = sz * l.bz, zc = sz * l.cz;
+      const F nearest = min_x86(min_x86(za, zb), zc), farthest = max_x86(max_x86(za, zb), zc);
+      const F size = max_x86(abs(nearest), abs(farthest));
+      const F det = l.u + l.v + l.w, inverse = F(1.0f) / det;
+      const F t = madd(l.u * inverse, za, madd(l.v * inverse, zb, (l.w * inverse) * zc));
+      const F spread =
+          madd(F(3.0f) * l.error * abs(inverse), farthest - nearest, madd(F(20.0f * 0x1p-24f), size, F(kLeast)));
+      // Beyond 2^126 the reciprocal loses bits, or all.
+      certain =
+          l.certainly_hit() & (abs(det) < F(0x1p126f)) & (abs(t) + spread < F(std::numeric_limits<float>::infinity()));
+      const F pad = madd(F(8.0f * 0x1p-24f), size, F(kLeast));
+      low = select(certain, t - spread, nearest - pad), high = select(certain, t + spread, farthest + pad);
+    }
+    /// No box that begins behind the hit is let through by much.
+    ARBORETUM_INLINE vm<W> narrow() const { return high - low <= F(kWide) * abs(high); }
+  };
+
   /// The candidates within an interval: t of lane i is within [low[i], high[i]] if it is hit; the `certain` lanes are.
   template <int W>
   struct Distances {
@@ -130,40 +221,73 @@ struct Exact {
     alignas(64) float low[W], high[W];
   };
 
+  /// t of the planes of D triangles in doubles, as core/exact/hit_arithmetic.cpp computes it and bounds it; `usable`
+  /// lanes have a bound.
+  template <int D>
+  struct DoubleDistances {
+    using F = vd<D>;
+    F low, high;
+    unsigned usable;
+
+    /// `a`: the first corner as seen from the origin; e1, e2: edges from it.
+    ARBORETUM_INLINE DoubleDistances(const vd3<D>& towards, const vd3<D>& a, const vd3<D>& e1, const vd3<D>& e2) {
+      constexpr double kBound = 56 * 0x1p-53;
+      const auto dot = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
+      const auto size_of = [](const vd3<D>& p) { return max_x86(max_x86(abs(p.x), abs(p.y)), abs(p.z)); };
+      const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
+      const F along = dot(n, towards), t = dot(n, a) / along;
+      const F scale = abs(F(kBound * (1 + 0x1p-8)) / along) * size_of(e1) * size_of(e2);
+      const F along_error = scale * size_of(towards), radius = scale * size_of(a) + abs(t) * (along_error + F(0x1p-50));
+      low = t - radius, high = t + radius;
+      usable = along_error < F(0x1p-9);
+    }
+  };
+
   template <class Block>
   static ARBORETUM_INLINE Edges<Block::kWidth> filter(const RayData& ray, const Block& block) {
-    using F = vf<Block::kWidth>;
-    const ShearedVertices<Block::kWidth> p(ray.in_memory(), block);
-    const auto [ax, ay, az] = p.a;
-    const auto [bx, by, bz] = p.b;
-    const auto [cx, cy, cz] = p.c;
-    const F u = msub(cx, by, cy * bx), v = msub(ax, cy, ay * cx), w = msub(bx, ay, by * ax);
-    const F width = max_x86(max_x86(max_x86(abs(ax), abs(ay)), max_x86(abs(bx), abs(by))), max_x86(abs(cx), abs(cy)));
-    const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz));
-    const F error = madd(F(kBound), madd(F(7.0f * 0x1p-24f), depth, width) * (depth + width), F(kLeast));
-    return {az, bz, cz, u, v, w, min_x86(min_x86(u, v), w), max_x86(max_x86(u, v), w), error};
+    return Edges<Block::kWidth>(ShearedVertices<Block::kWidth>(ray.in_memory(), block));
   }
 
   template <int W>
   static ARBORETUM_INLINE void find_distances(const RayData& ray, const Edges<W>& l, float tnear, float tfar,
                                               Distances<W>& d) {
     using F = vf<W>;
-    const F sz(ray.in_memory().shear[2]), za = sz * l.az, zb = sz * l.bz, zc = sz * l.cz;
-    const F nearest = min_x86(min_x86(za, zb), zc), farthest = max_x86(max_x86(za, zb), zc);
-    const F size = max_x86(abs(nearest), abs(farthest));
-    const F det = l.u + l.v + l.w, inverse = F(1.0f) / det;
-    const F t = madd(l.u * inverse, za, madd(l.v * inverse, zb, (l.w * inverse) * zc));
-    const F spread =
-        madd(F(3.0f) * l.error * abs(inverse), farthest - nearest, madd(F(20.0f * 0x1p-24f), size, F(kLeast)));
-    // Beyond 2^126 the reciprocal loses bits, or all.
-    const vm<W> certain =
-        l.certainly_hit() & (abs(det) < F(0x1p126f)) & (abs(t) + spread < F(std::numeric_limits<float>::infinity()));
-    const F pad = madd(F(8.0f * 0x1p-24f), size, F(kLeast));
-    const F low = select(certain, t - spread, nearest - pad), high = select(certain, t + spread, farthest + pad);
-    low.store(d.low), high.store(d.high);
-    d.certain = certain.bits();
+    const Intervals<W> t(l, F(ray.in_memory().shear[2]));
+    t.low.store(d.low), t.high.store(d.high);
+    d.certain = t.certain.bits();
     // Comparisons that a NaN makes false: a lane without a usable interval stays.
-    d.candidates = l.candidates() & ~((low > F(tfar)) | (high < F(tnear))).bits();
+    d.candidates = l.candidates() & ~((t.low > F(tfar)) | (t.high < F(tnear))).bits();
+  }
+
+  /// The distances of all candidates again, in doubles: an ulp or two of float wide where a triangle is not seen edge
+  /// on. Of the two intervals what both hold; what is left are the candidates that may be within [tnear, tfar].
+  template <class Block>
+  static ARBORETUM_INLINE void narrow(const RayData& ray, const Block& block, float tnear, float tfar,
+                                      Distances<Block::kWidth>& d) {
+    constexpr int W = Block::kWidth, D = kDoubleLanes<W>;
+    using F = vd<D>;
+    const auto widened = [](const Vec3f& p) { return vd3<D>{F(double(p.x)), F(double(p.y)), F(double(p.z))}; };
+    const vd3<D> o = widened(ray.origin), towards = widened(ray.towards);
+    F low[W / D], high[W / D];
+    unsigned usable = 0;
+    for (int k = 0; k < W / D; ++k) {
+      low[k] = high[k] = 0.0;
+      if ((d.candidates >> k * D & ((1u << D) - 1u)) == 0) continue;
+      const auto corner = [&](const float(&p)[3][W]) { return load3<D>(p[0] + k * D, p[1] + k * D, p[2] + k * D); };
+      const vd3<D> a = corner(block.v0);
+      const DoubleDistances<D> t(towards, a - o, corner(block.v1) - a, corner(block.v2) - a);
+      low[k] = t.low, high[k] = t.high;
+      usable |= t.usable << k * D;
+    }
+    using L = vf<W>;
+    // Rounding to floats takes at most half of this from either end.
+    const auto ulp = [](L x) { return madd(abs(x), L(0x1p-23f), L(0x1p-149f)); };
+    const vm<W> narrowed = vm<W>::from_bits(usable);
+    const L l = to_floats<W>(low), h = to_floats<W>(high), old_low = L::load(d.low), old_high = L::load(d.high);
+    const L new_low = select(narrowed, max_x86(l - ulp(l), old_low), old_low),
+            new_high = select(narrowed, min_x86(h + ulp(h), old_high), old_high);
+    new_low.store(d.low), new_high.store(d.high);
+    d.candidates &= ~((new_low > L(tfar)) | (new_high < L(tnear))).bits();
   }
 
   /// The candidate, as a bit, that is certainly hit behind tnear, with a narrow interval before those of all other
@@ -185,6 +309,20 @@ struct Exact {
     return (first & (first - 1)) == 0 ? first & narrow.bits() : 0;
   }
 
+  /// True when it has become the best hit.
+  template <class Block>
+  static ARBORETUM_INLINE bool take_foremost(RayData& ray, const Block& block, const Distances<Block::kWidth>& d,
+                                             float tnear, NearestHit& best) {
+    const unsigned lane = foremost(d, tnear);
+    if (__builtin_expect(lane == 0, 0)) return false;
+    const int i = __builtin_ctz(lane);
+    const float high = d.high[i];
+    if (__builtin_expect(!(high < ray.best_low && high <= best.t), 0)) return false;
+    ray.has_best = true, ray.best = CornersInFours(block, i), ray.best_low = d.low[i];
+    best.t = high, best.primitive = std::int32_t(block.id[i]);
+    return true;
+  }
+
   template <class Block>
   static ARBORETUM_INLINE std::array<Vec3f, 3> corners(const Block& block, int i) {
     return {Vec3f{block.v0[0][i], block.v0[1][i], block.v0[2][i]},
@@ -193,8 +331,11 @@ struct Exact {
   }
 
   template <class Block>
-  static __attribute__((noinline)) bool nearest(RayData& ray, const Block& block, const Distances<Block::kWidth>& d,
+  static __attribute__((noinline)) bool nearest(RayData& ray, const Block& block, Distances<Block::kWidth>& d,
                                                 float tnear, NearestHit& best) {
+    narrow(ray, block, tnear, best.t, d);
+    if (d.candidates == 0) return false;
+    if (take_foremost(ray, block, d, tnear, best)) return true;
     bool changed = false;
     for (unsigned rest = d.candidates; rest; rest &= rest - 1) {
       const int i = __builtin_ctz(rest);
@@ -212,10 +353,6 @@ struct Exact {
     const Ray exact{ray.origin, tnear, ray.towards, ray.has_best ? std::numeric_limits<float>::infinity() : best.t};
     if (!certain || t.low < tnear || t.high > exact.tfar) {
       if (!meets_exactly(exact, corner, t)) return false;
-    } else if (t.high - t.low > kWide * __builtin_fabsf(t.high)) {
-      const DistanceInterval closer = distance_in_double(exact, corner);
-      if (closer.low > t.low) t.low = closer.low;
-      if (closer.high < t.high) t.high = closer.high;
     }
     if (ray.has_best && t.high >= ray.best_low) {
       if (t.low > best.t) return false;
@@ -228,23 +365,28 @@ struct Exact {
     return true;
   }
 
-  template <class Block>
-  static __attribute__((noinline)) bool any_within(const RayData& ray, const Block& block,
-                                                   const Distances<Block::kWidth>& d, float tnear, float tfar) {
+  template <int W>
+  static ARBORETUM_INLINE bool certainly_within(const Distances<W>& d, float tnear, float tfar) {
     for (unsigned rest = d.candidates & d.certain; rest; rest &= rest - 1) {
       const int i = __builtin_ctz(rest);
       if (d.low[i] >= tnear && d.high[i] <= tfar) return true;
     }
+    return false;
+  }
+
+  template <class Block>
+  static __attribute__((noinline)) bool any_within(const RayData& ray, const Block& block, Distances<Block::kWidth>& d,
+                                                   float tnear, float tfar) {
+    if (certainly_within(d, tnear, tfar)) return true;
+    narrow(ray, block, tnear, tfar, d);
+    if (d.candidates == 0) return false;
+    if (certainly_within(d, tnear, tfar)) return true;
     for (unsigned rest = d.candidates; rest; rest &= rest - 1) {
       DistanceInterval t;
       if (meets_exactly({ray.origin, tnear, ray.towards, tfar}, corners(block, __builtin_ctz(rest)), t)) return true;
     }
     return false;
   }
-
-  /// Width of an interval, relative to t, above which doubles narrow it: a wide one lets boxes through that lie behind
-  /// the hit.
-  static constexpr float kWide = 0x1p-14f;
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -11,7 +11,8 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 #if ARBORETUM_TARGET != ARBORETUM_TARGET_SCALAR
 
-/// Hits that wait. A ray and its hit stay where they are until finish_all().
+/// Hits that wait, a Hit or a NearestHit each. A ray and its hit stay where they are until finish_all().
+template <class H>
 class UnroundedHits {
   static constexpr int kLanes = kHasFma ? 4 : 2;
   using D = vd<kLanes>;
@@ -22,7 +23,7 @@ class UnroundedHits {
     ray_[count_] = &ray;
     for (int k = 0; k < 3; ++k) _mm_store_ps(corners_[k][count_], _mm_load_ps(corners.at[k]));
   }
-  ARBORETUM_INLINE void settle(Hit& hit) {
+  ARBORETUM_INLINE void settle(H& hit) {
     hit_[count_] = &hit;
     if (++count_ == kLanes) round_all();
   }
@@ -91,7 +92,7 @@ class UnroundedHits {
 
   int count_ = 0;
   const Ray* ray_[kLanes];
-  Hit* hit_[kLanes];
+  H* hit_[kLanes];
   alignas(16) float corners_[3][kLanes][4];
 };
 

@@ -23,7 +23,7 @@
 // surface all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not.
 #pragma once
 
-#include "intersectors/sheared_ray.h"
+#include "intersectors/sheared_packet.h"
 #include "intersectors/triangle_hits.h"
 #include "simd/double.h"
 
@@ -63,32 +63,10 @@ struct Watertight {
     return inside;
   }
 
-  /// What a packet keeps beside its rays: their shears (ShearedRay). Those of a group have the same kz.
-  struct PacketData {
-    static constexpr int kGroups = 3;
-    alignas(64) float sx[PacketRays::kMost], sy[PacketRays::kMost], sz[PacketRays::kMost];
-    std::uint64_t of_axis[3];
-
-    void clear() { of_axis[0] = of_axis[1] = of_axis[2] = 0; }
-    /// The W rays from k on: what RayData computes for one.
-    template <int W>
-    ARBORETUM_INLINE void prepare(const PacketRays& rays, int k) {
-      using F = vf<W>;
-      const F x = F::load(rays.direction[0] + k), y = F::load(rays.direction[1] + k),
-              z = F::load(rays.direction[2] + k);
-      const F ax = abs(x), ay = abs(y), az = abs(z);
-      const vm<W> by_x = (ax > ay) & (ax > az), by_y = ~(ax > ay) & (ay > az);
-      const F dz = select(by_x, x, select(by_y, y, z));
-      (select(by_x, y, select(by_y, z, x)) / dz).store(sx + k);
-      (select(by_x, z, select(by_y, x, y)) / dz).store(sy + k);
-      (F(-1.0f) / dz).store(sz + k);
-      of_axis[0] |= std::uint64_t(by_x.bits()) << k, of_axis[1] |= std::uint64_t(by_y.bits()) << k,
-          of_axis[2] |= std::uint64_t((~(by_x | by_y)).bits()) << k;
-    }
-    [[nodiscard]] std::uint64_t group(int kz) const { return of_axis[kz]; }
+  struct PacketData : ShearedPacket {
     /// RayData of ray i.
     [[nodiscard]] ARBORETUM_INLINE RayData alone(const Ray& ray, int i) const {
-      return RayData(ray, of_axis[0] >> i & 1u ? 0 : of_axis[1] >> i & 1u ? 1 : 2, sx[i], sy[i], sz[i]);
+      return RayData(ray, axis(i), sx[i], sy[i], sz[i]);
     }
   };
 
@@ -98,13 +76,7 @@ struct Watertight {
   static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData& shears, int kz, int k,
                                                const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
     using F = vf<W>;
-    const int kx = kz == 2 ? 0 : kz + 1, ky = kx == 2 ? 0 : kx + 1;
-    const vf3<W> o{F::load(rays.origin[kx] + k), F::load(rays.origin[ky] + k), F::load(rays.origin[kz] + k)};
-    const auto seen = [&](const float(&p)[3][Block::kWidth]) {
-      return o - vf3<W>{F(p[kx][i]), F(p[ky][i]), F(p[kz][i])};
-    };
-    const Edges<W> e(ShearedVertices<W>(F::load(shears.sx + k), F::load(shears.sy + k), seen(block.v0), seen(block.v1),
-                                        seen(block.v2)));
+    const Edges<W> e(shears.template sheared<W>(rays, kz, k, block, i));
     const vm<W> inside = e.inside();
     again = vm<W>(false);
     if (any(inside)) again = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits);

@@ -97,17 +97,37 @@ ARBORETUM_INLINE void test_leaf(const Leaves& leaves, [[maybe_unused]] const Lea
 /// else nothing.
 template <class Leaves>
 inline constexpr bool kFinishesLater = requires {
-  typename Leaves::Intersector::Unfinished;
+  typename Leaves::Intersector::template Unfinished<Hit>;
 };
 struct NothingUnfinished {};
-template <class Leaves, bool Later = kFinishesLater<Leaves>>
+template <class Leaves, class H, bool Later = kFinishesLater<Leaves>>
 struct UnfinishedOf {
   using Type = NothingUnfinished;
 };
-template <class Leaves>
-struct UnfinishedOf<Leaves, true> {
-  using Type = typename Leaves::Intersector::Unfinished;
+template <class Leaves, class H>
+struct UnfinishedOf<Leaves, H, true> {
+  using Type = typename Leaves::Intersector::template Unfinished<H>;
 };
+
+/// The searches of `rays`, a bit each, are over: finishes their hits, together where that can be. `ray(i)`, `data(i)`,
+/// `best(i)` as of test_leaf().
+template <class Leaves, class RayAt, class DataOf, class BestOf>
+ARBORETUM_INLINE void finish_hits(const Leaves& leaves, std::uint64_t rays, [[maybe_unused]] const RayAt& ray,
+                                  const DataOf& data, const BestOf& best) {
+  [[maybe_unused]] typename UnfinishedOf<Leaves, NearestHit>::Type unfinished;
+  for (; rays; rays &= rays - 1) {
+    const int i = __builtin_ctzll(rays);
+    if (best(i).primitive == NearestHit::kNone) continue;
+    auto&& of_ray = data(i);
+    if constexpr (kFinishesLater<Leaves>) {
+      unfinished.add(ray(i), of_ray.best);
+      unfinished.settle(best(i));
+    } else {
+      leaves.finish(of_ray, best(i));
+    }
+  }
+  if constexpr (kFinishesLater<Leaves>) unfinished.finish_all();
+}
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

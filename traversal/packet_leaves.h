@@ -68,7 +68,7 @@ class PacketLeaves {
   /// None of the rays has met anything.
   template <class Prepare>
   ARBORETUM_INLINE void load(const Ray* rays, int count, const Prepare& prepare) {
-    rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0};
+    rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0}, prepared_ = 0;
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
     prepare([this](int i) -> const Ray& { return rays_[i]; }, [this](int k) { prepare_lanes(k); });
     for (int i = 0; i < count; ++i) best_[i] = NearestHit{lanes_.t[i]};
@@ -87,11 +87,9 @@ class PacketLeaves {
 
   void finish() {
     if constexpr (!AnyHit) {
-      for (Mask rest = lanes_.valid; rest; rest &= rest - 1) {
-        const int i = __builtin_ctzll(rest);
-        auto&& ray = data(i);
-        leaves_.finish(ray, best_[i]);
-      }
+      finish_hits(
+          leaves_, lanes_.valid, [this](int i) -> const Ray& { return rays_[i]; },
+          [this](int i) -> decltype(auto) { return data(i); }, [this](int i) -> NearestHit& { return best_[i]; });
     }
   }
 
@@ -131,9 +129,15 @@ class PacketLeaves {
   /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever
   /// it is asked for.
   ARBORETUM_INLINE decltype(auto) data(int i) {
-    if constexpr (Leaves::kRaysInLanes) {
+    if constexpr (kMadeWhenNeeded) {
       return packet_.alone(rays_[i], i);
     } else {
+      if constexpr (Leaves::kRaysInLanes) {
+        if ((prepared_ >> i & 1u) == 0) {
+          prepared_ |= Mask{1} << i;
+          new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData))) RayData(packet_.alone(rays_[i], i));
+        }
+      }
       return (*reinterpret_cast<RayData*>(data_ + std::size_t(i) * sizeof(RayData)));
     }
   }
@@ -168,6 +172,14 @@ class PacketLeaves {
 
  private:
   using RayData = typename Leaves::RayData;
+  /// RayData is made of what the packet keeps whenever it is asked for: nothing that a search finds is kept in it.
+  static constexpr bool kMadeWhenNeeded = [] {
+    if constexpr (Leaves::kRaysInLanes) {
+      return !kFinishes<typename Leaves::Intersector>;
+    } else {
+      return false;
+    }
+  }();
   /// From so many rays on the triangles of a leaf are looked at together.
   static constexpr int kWorthLanes = 16;
   /// The intersector has a form of a block for rays of one origin.
@@ -220,7 +232,8 @@ class PacketLeaves {
   ARBORETUM_INLINE void test_triangles(const Block& block, unsigned triangles, Mask mask, const OneByOne& each_alone) {
     int chunks = 0;
     for (int c = 0; c < chunks_; ++c) chunks += lanes_of(mask, c) != 0;
-    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth))
+    if (Packet::kCost * __builtin_popcount(triangles) * chunks * W >=
+        __builtin_popcountll(mask) * std::max(W, Block::kWidth))
       return each_alone(mask);
     Mask again = 0;
     for (; triangles; triangles &= triangles - 1) {
@@ -234,33 +247,62 @@ class PacketLeaves {
     if (__builtin_expect(again != 0, 0)) each_alone(again);
   }
 
+  /// Against a triangle the rays of `mask`, which are of one group; those to be tested alone come to `again`.
   template <class Block>
   ARBORETUM_INLINE void test_triangle(const Block& block, int triangle, int group, Mask mask, Mask& again) {
-    const auto id = std::int32_t(block.id[triangle]);
     for (int c = 0; c < chunks_; ++c) {
-      const int k = c * W;
-      const unsigned in = lanes_of(mask, c);
-      if (in == 0) continue;
-      TriangleHits<W> hits;
-      vm<W> redo;
-      const vm<W> inside =
-          Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, block, triangle, hits, redo);
-      again |= Mask(redo.bits() & in) << k;
-      if ((inside.bits() & in) == 0) continue;
-      unsigned hit =
-          in & (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
-      if (hit == 0) continue;
-      alignas(64) float t[W], u[W], v[W], denominator[W];
-      hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
-      for (; hit; hit &= hit - 1) {
-        const int lane = __builtin_ctz(hit), i = k + lane;
-        if constexpr (AnyHit) {
-          occluded(i);
+      if (const unsigned in = lanes_of(mask, c)) {
+        if constexpr (requires { typename Leaves::Intersector::template FilteredRays<W>; }) {
+          filter(block, triangle, group, c * W, in, again);
         } else {
-          NearestHit& best = best_[i];
-          if (t[lane] < best.t || id < best.primitive)
-            best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, lanes_.t[i] = t[lane];
+          intersect(block, triangle, group, c * W, in, again);
         }
+      }
+    }
+  }
+
+  /// Lanes `in` of the W rays from k on, with an intersector that decides all but `again` itself.
+  template <class Block>
+  ARBORETUM_INLINE void intersect(const Block& block, int triangle, int group, int k, unsigned in, Mask& again) {
+    const auto id = std::int32_t(block.id[triangle]);
+    TriangleHits<W> hits;
+    vm<W> redo;
+    const vm<W> inside =
+        Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, block, triangle, hits, redo);
+    again |= Mask(redo.bits() & in) << k;
+    if ((inside.bits() & in) == 0) return;
+    unsigned hit =
+        in & (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
+    if (hit == 0) return;
+    alignas(64) float t[W], u[W], v[W], denominator[W];
+    hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
+    for (; hit; hit &= hit - 1) {
+      const int lane = __builtin_ctz(hit), i = k + lane;
+      if constexpr (AnyHit) {
+        occluded(i);
+      } else {
+        NearestHit& best = best_[i];
+        if (t[lane] < best.t || id < best.primitive)
+          best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, lanes_.t[i] = t[lane];
+      }
+    }
+  }
+
+  /// The same with one that knows an interval about t, and what its search has found so far (exact.h).
+  template <class Block>
+  ARBORETUM_INLINE void filter(const Block& block, int triangle, int group, int k, unsigned in, Mask& again) {
+    typename Leaves::Intersector::template FilteredRays<W> rays;
+    Leaves::Intersector::template filter_rays<AnyHit, W>(lanes_.rays, packet_, group, k, block, triangle,
+                                                         F::load(lanes_.t + k), rays);
+    again |= Mask(rays.again & in) << k;
+    for (unsigned hit = rays.hit & in; hit; hit &= hit - 1) {
+      const int lane = __builtin_ctz(hit), i = k + lane;
+      if constexpr (AnyHit) {
+        occluded(i);
+      } else if (Leaves::Intersector::take(data(i), block, triangle, rays.low[lane], rays.high[lane], best_[i])) {
+        lanes_.t[i] = best_[i].t;
+      } else {
+        again |= Mask{1} << i;
       }
     }
   }
@@ -284,7 +326,8 @@ class PacketLeaves {
   };
   using Packet =
       typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
-  alignas(64) std::byte data_[Leaves::kRaysInLanes ? 1 : kMost * sizeof(RayData)];
+  alignas(64) std::byte data_[kMadeWhenNeeded ? 1 : kMost * sizeof(RayData)];
+  Mask prepared_ = 0;
   Packet packet_;
   bool common_origin_ = false;
   int threshold_ = 0;

@@ -25,10 +25,11 @@ using UsualLeaves = std::conditional_t<
 /// What ways of traversal for many rays have compiled in: packets, rays in flight.
 using BatchLeaves = std::conditional_t<
     kRegisterWidth == 1, TypeList<>,
-    std::conditional_t<
-        kRegisterWidth == 4,
-        TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>, CompiledLeaves<VertexBlock<4>, Watertight>>,
-        TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>, CompiledLeaves<VertexBlock<8>, Watertight>>>>;
+    std::conditional_t<kRegisterWidth == 4,
+                       TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>,
+                                CompiledLeaves<VertexBlock<4>, Watertight>, CompiledLeaves<VertexBlock<4>, Exact>>,
+                       TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>,
+                                CompiledLeaves<VertexBlock<8>, Watertight>, CompiledLeaves<VertexBlock<8>, Exact>>>>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

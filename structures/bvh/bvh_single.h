@@ -156,7 +156,7 @@ struct BvhSingle {
     const LeafForm& form_;
     Counting counting_;
     TraversalStack stack_;
-    [[no_unique_address]] typename UnfinishedOf<Leaves>::Type unfinished_;
+    [[no_unique_address]] typename UnfinishedOf<Leaves, Hit>::Type unfinished_;
   };
   using Functions = SingleRayFunctions<Kernel>;
 };

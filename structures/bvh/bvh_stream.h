@@ -101,6 +101,7 @@ class Stream {
     std::uint32_t index[kRays];
     alignas(64) std::byte data[kKeepsData ? kRays * sizeof(RayData) : 1];
     unsigned count = 0, octant = 0;
+    std::uint64_t valid = 0;
     std::uint64_t active = 0;  ///< rays whose search is not over
     StreamStack stack;
     unsigned top;                ///< entries of the stack
@@ -157,7 +158,7 @@ class Stream {
     }
     for (int k = 0; k < count; k += kNative)
       (vf<kNative>::load(lanes_.t + k) * vf<kNative>(pad_.beyond())).store(g.t + k);
-    g.count = unsigned(count), g.octant = octant, g.active = lanes_.valid;
+    g.count = unsigned(count), g.octant = octant, g.active = g.valid = lanes_.valid;
     g.stack = stack, g.top = 0;
     g.target = root_, g.visitors = g.active;
     g.depths = typename Counting::Depths(typename Counting::Depth{});
@@ -177,13 +178,13 @@ class Stream {
 
   template <class Report>
   void finish(Group& g, const Report& report) {
-    for (unsigned i = 0; i < g.count; ++i) {
-      if constexpr (!AnyHit) {
-        auto&& of_ray = data(g, i);
-        leaves_.finish(of_ray, g.best[i]);
-      }
-      report(g.index[i], g.best[i]);
+    if constexpr (!AnyHit) {
+      finish_hits(
+          leaves_, g.valid, [&](int i) -> const Ray& { return ray(g, unsigned(i)); },
+          [&](int i) -> decltype(auto) { return data(g, unsigned(i)); },
+          [&](int i) -> NearestHit& { return g.best[i]; });
     }
+    for (unsigned i = 0; i < g.count; ++i) report(g.index[i], g.best[i]);
   }
 
   /// One node or leaf; false when nothing waits any more.
