@@ -1,11 +1,12 @@
 // Leaf blocks: M triangles as structure of arrays, in the forms that intersectors read.
 //
-// triangleM  (EdgeBlock):   first vertex, e1 = v0 - v1, e2 = v2 - v0; the edges are rounded, once, to float.
-// triangleMv (VertexBlock): the three vertices as they are, what the crack-free intersectors need.
-// triangleMi (IndexBlock):  the indices of the three vertices in the mesh: 16 bytes a triangle instead of 40, one
-// look-up more. triangleMw (TransformBlock), triangleMh (PlaneBlock), triangleMp (ProjectionBlock): what baldwin_weber,
-// havel_herout and wald_projection
-//   precompute (intersectors/precomputed.h), 48, 48 and 40 bytes a triangle beside the id.
+//   triangleM  (EdgeBlock):   first vertex, e1 = v0 - v1, e2 = v2 - v0; the edges are rounded, once, to float.
+//   triangleMv (VertexBlock): the three vertices as they are, what the crack-free intersectors need.
+//   triangleMi (IndexBlock):  the indices of the three vertices in the mesh: 16 bytes a triangle instead of 40, one
+//     look-up more.
+//   triangleMw (TransformBlock), triangleMh (PlaneBlock), triangleMp (ProjectionBlock): what baldwin_weber, havel_herout
+//     and wald_projection precompute (intersectors/precomputed.h), 48, 48 and 40 bytes a triangle beside the id.
+//
 // A lane without a triangle, or with one of exactly zero area, holds NaN coordinates (every comparison false: never
 // hit); without a triangle its id is kNoPrimitive. Among indices an empty lane repeats the block's first triangle, id
 // included, which changes no answer.

@@ -7,25 +7,27 @@
 // permuted so that |d_z| is the largest; S = d_x / d_z, so |S| <= 1; x' = x - S z (y' likewise) the exact sheared
 // vertex, x^ the computed one; Z, L the largest |z^| and |x^|, |y^| of a triangle. z^ and the difference x are off by u
 // of themselves, S by u / 2; |x| <= |x'| + |z|. So the shear is off by
-//   u (L + Z) + u Z + u Z / 2 + u L = u (2 L + 2.5 Z) < delta = u (2 L + 3 Z)   fused (what underflow adds, 2^-150, is
-//   less than
-// the slack u (L + Z / 2), or else so small that the last term of E holds it), with u Z more where the product is
-// rounded.
-//   An edge function U = x^_c y^_b - y^_c x^_b is then off by 4 L delta + 2 delta^2, and by its own roundings, 3 u L^2
-//   fused and
-// 4 u L^2 not: by less than u (12 L Z + 11 L^2) + 18 u^2 Z^2 + higher terms fused, and u (14 L Z + 12 L^2) + 25 u^2 Z^2
-// not. Hence
-//   E = k u (L + 7 u Z) (L + Z) + 2^-140,  k = 12.5 fused, 14.5 not:
-// at least 3.5 % are left for E's own five roundings, and 2^-140 is more than all underflows. U, V, W all beyond E on
+//   u (L + Z) + u Z + u Z / 2 + u L = u (2 L + 2.5 Z) < delta,
+//   delta = u (2 L + 3 Z) fused, u (2 L + 4 Z) where the product is rounded.
+// (What underflow adds, 2^-150, is less than the slack u (L + Z / 2), or so small that the last term of E holds it.)
+//
+// An edge function U = x^_c y^_b - y^_c x^_b is then off by
+//   4 L delta + 2 delta^2, and by its own roundings, 3 u L^2 fused and 4 u L^2 not: by less than
+//   u (12 L Z + 11 L^2) + 18 u^2 Z^2 + higher terms fused, u (14 L Z + 12 L^2) + 25 u^2 Z^2 not; hence
+//   E = k u (L + 7 u Z) (L + Z) + 2^-140,  k = 12.5 fused, 14.5 not.
+// At least 3.5 % are left for E's own five roundings, and 2^-140 is more than all underflows. U, V, W all beyond E on
 // one side: certainly hit; one beyond E, another beyond -E: certainly missed; else exact arithmetic. An overflow of z^,
 // x^, y^ or of a product makes E infinite or NaN, since (L + 7 u Z) (L + Z) is no less than any product, and then
 // nothing is certain. Denormals must not be flushed.
 //
 // Distances. With z in units of t (times 1 / d_z), t is the mean of the vertices' z with weights U / (U + V + W) >= 0.
-// The weights' errors move it by less than (E / |U + V + W|) (|z_a - t| + |z_b - t| + |z_c - t|) <= 2 (E / |U + V + W|)
-// (z_max - z_min); the roundings of weights, z and their sum by 4, 3 and 3 u max |z|, those of z_max - z_min by 4 u max
-// |z| more, as E < |U + V + W| / 3. The interval about t is padded by 3 E / |U + V + W| (z_max - z_min) + 20 u max |z|
-// + 2^-140. A hit that the filter has not decided lies within [z_min, z_max], padded by 8 u max |z|.
+// The weights' errors move it by less than
+//   (E / |U + V + W|) (|z_a - t| + |z_b - t| + |z_c - t|) <= 2 (E / |U + V + W|) (z_max - z_min);
+// the roundings of weights, z and their sum by 4, 3 and 3 u max |z|, those of z_max - z_min by 4 u max |z| more, as
+// E < |U + V + W| / 3. The interval about t is padded by
+//   3 E / |U + V + W| (z_max - z_min) + 20 u max |z| + 2^-140.
+// A hit that the filter has not decided lies within [z_min, z_max], padded by 8 u max |z|. Where these intervals leave
+// open which hit counts, doubles narrow them (DoubleDistances), for all triangles of a block at once.
 //
 // The nearest. A hit is left out only when its interval lies beyond that of the best; where they overlap the exact
 // distances are compared. best.t is the high end of the best hit's interval until finish(), so that no box in front of
@@ -231,15 +233,16 @@ struct Exact {
 
     /// `a`: the first corner as seen from the origin; e1, e2: edges from it.
     ARBORETUM_INLINE DoubleDistances(const vd3<D>& towards, const vd3<D>& a, const vd3<D>& e1, const vd3<D>& e2) {
-      constexpr double kBound = 56 * 0x1p-53;
       const auto dot = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
       const auto size_of = [](const vd3<D>& p) { return max_x86(max_x86(abs(p.x), abs(p.y)), abs(p.z)); };
       const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
       const F along = dot(n, towards), t = dot(n, a) / along;
-      const F scale = abs(F(kBound * (1 + 0x1p-8)) / along) * size_of(e1) * size_of(e2);
-      const F along_error = scale * size_of(towards), radius = scale * size_of(a) + abs(t) * (along_error + F(0x1p-50));
+      const F scale =
+          abs(F(double_bounds::kDeterminant * double_bounds::kQuotient) / along) * size_of(e1) * size_of(e2);
+      const F along_error = scale * size_of(towards),
+              radius = scale * size_of(a) + abs(t) * (along_error + F(double_bounds::kRounding));
       low = t - radius, high = t + radius;
-      usable = along_error < F(0x1p-9);
+      usable = along_error < F(double_bounds::kMostOfDivisor);
     }
   };
 

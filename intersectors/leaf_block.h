@@ -6,12 +6,26 @@
 //   kEveryLeaf: compiled for every block that it can read, else for the usual ones;
 //   RayData(ray): what it keeps for one ray, PreparedRay::kBytes at most;
 //   intersect(const RayData&, const Block&, TriangleHits<W>&): the lanes whose closed triangle the ray's line meets.
-// It may have
+// It may have, and is asked for by name (a misspelt member is none, and what it is for stays away):
 //   finish(RayData&, NearestHit&): the search is over, and this is its hit. Without it RayData never changes;
+//   Unfinished<H>: hits that wait to be finished together (intersectors/round_later.h), with add(), settle() and
+//     finish_all(); single rays, packets and streams of the kernels that have it compiled in;
 //   accept(RayData&, const Block&, lane): that lane has become the nearest hit;
+//   closest_hit_block(RayData&, const Block&, tnear, NearestHit&), any_hit_block(RayData&, const Block&, tnear, tfar):
+//     instead of those below;
 //   ForManyRays<Block>(const Block&): a block with what is the same for all rays, which intersect() takes in the
-//   block's place, with the same answers; closest_hit_block(RayData&, const Block&, tnear, NearestHit&) and
-//   any_hit_block(RayData&, const Block&, tnear, tfar): instead of those below.
+//     block's place, with the same answers; streams, rays of a packet that go one by one;
+//   kDepthBetweenCorners: boxes may be tight along the ray (traversal/box_test.h); streams.
+// For packets, whose rays stand in lanes (traversal/packet_leaves.h):
+//   PacketData: what is kept for a packet: kGroups, rays of one group sharing a form of the test; kCost, what rays in
+//     lanes cost against triangles in lanes; clear(); prepare<W>(PacketRays&, k) of the W rays from k on; group(g): its
+//     rays as bits; alone(ray, i): RayData of ray i;
+//   intersect_rays<W>(PacketRays&, PacketData&, g, k, Block&, i, TriangleHits<W>&, vm<W>& again): the W rays from k on
+//     against triangle i, `again` those that it leaves to intersect();
+//   FilteredRays<W>, filter_rays<AnyHit, W>(...), take(...): in intersect_rays()'s place where a hit is an interval and
+//     the search has a state (exact.h);
+//   FromOrigin<M>(const Block&, Vec3f origin): a block as seen from a common origin, taken in the block's place by
+//     intersect() and intersect_rays(), with the same answers.
 #pragma once
 
 #include "intersectors/triangle_hits.h"

@@ -3,6 +3,7 @@
 // here, so the same bits.
 #pragma once
 
+#include "core/exact/double_bounds.h"
 #include "core/exact/hit_arithmetic.h"
 #include "intersectors/leaf_block.h"
 
@@ -65,7 +66,6 @@ ARBORETUM_INLINE double high(__m128d x) { return _mm_cvtsd_f64(_mm_unpackhi_pd(x
 /// False where doubles leave t undecided, or u and v off by more than 2^-30; then `hit` means nothing.
 ARBORETUM_INLINE bool round_in_double(Vec3f origin, Vec3f direction, const CornersInFours& corners, RoundedHit& hit) {
   using namespace in_fours;
-  constexpr double kBound = 56 * 0x1p-53;
   const __m256d a = _mm256_cvtps_pd(_mm_load_ps(corners.at[0]));
   const __m256d e1 = _mm256_sub_pd(_mm256_cvtps_pd(_mm_load_ps(corners.at[1])), a),
                 e2 = _mm256_sub_pd(_mm256_cvtps_pd(_mm_load_ps(corners.at[2])), a);
@@ -77,17 +77,21 @@ ARBORETUM_INLINE bool round_in_double(Vec3f origin, Vec3f direction, const Corne
   const Transposed absolute(in_fours::sizes(e1), in_fours::sizes(e2), in_fours::sizes(d), in_fours::sizes(s));
   const __m256d largest = _mm256_max_pd(_mm256_max_pd(absolute.x, absolute.y), absolute.z);
   const __m256d det = _mm256_permute4x64_pd(dots, 0);
-  const __m256d quotients = _mm256_div_pd(_mm256_blend_pd(dots, _mm256_set1_pd(kBound * (1 + 0x1p-8)), 1), det);
+  const __m256d quotients = _mm256_div_pd(
+      _mm256_blend_pd(dots, _mm256_set1_pd(double_bounds::kDeterminant * double_bounds::kQuotient), 1), det);
   const __m128d scale_t = _mm256_castpd256_pd128(quotients), uv = _mm256_extractf128_pd(quotients, 1);
   const __m128d size_e = _mm256_castpd256_pd128(largest), size_ds = _mm256_extractf128_pd(largest, 1);
   const double t = high(scale_t), scale = __builtin_fabs(low(scale_t)), size_1 = low(size_e), size_2 = high(size_e),
                size_d = low(size_ds), size_s = high(size_ds);
   const double det_error = scale * size_1 * size_2 * size_d;
-  const double radius = scale * size_1 * size_2 * size_s + __builtin_fabs(t) * (det_error + 0x1p-50);
-  const double weight_radius = scale * size_d * size_s * (size_1 > size_2 ? size_1 : size_2) + det_error + 0x1p-50;
+  const double radius = scale * size_1 * size_2 * size_s + __builtin_fabs(t) * (det_error + double_bounds::kRounding);
+  const double weight_radius =
+      scale * size_d * size_s * (size_1 > size_2 ? size_1 : size_2) + det_error + double_bounds::kRounding;
   hit.t = float(t - radius);
   // Comparisons that a NaN makes false.
-  if (!(det_error < 0x1p-9 && weight_radius < 0x1p-30 && hit.t == float(t + radius))) return false;
+  if (!(det_error < double_bounds::kMostOfDivisor && weight_radius < double_bounds::kWeight &&
+        hit.t == float(t + radius)))
+    return false;
   const __m128 weights = _mm_cvtpd_ps(_mm_min_pd(_mm_max_pd(_mm_setzero_pd(), uv), _mm_set1_pd(1.0)));
   hit.u = _mm_cvtss_f32(weights), hit.v = _mm_cvtss_f32(_mm_movehdup_ps(weights));
   return true;

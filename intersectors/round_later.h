@@ -60,7 +60,6 @@ class UnroundedHits {
   }
 
   __attribute__((noinline)) void round_all() {
-    constexpr double kBound = 56 * 0x1p-53;
     count_ = 0;
     const auto corner = [&](int k) { return gather([&](int i) { return corners_[k][i]; }); };
     const vd3<kLanes> a = corner(0), e1 = corner(1) - a, e2 = corner(2) - a;
@@ -69,16 +68,17 @@ class UnroundedHits {
     const vd3<kLanes> p = cross(d, e2), q = cross(s, e1);
     const D det = dot(e1, p);
     const D size_1 = size_of(e1), size_2 = size_of(e2), size_d = size_of(d), size_s = size_of(s);
-    const D t = dot(e2, q) / det, scale = abs(D(kBound * (1 + 0x1p-8)) / det);
+    const D t = dot(e2, q) / det, scale = abs(D(double_bounds::kDeterminant * double_bounds::kQuotient) / det);
     const D det_error = scale * size_1 * size_2 * size_d;
-    const D radius = scale * size_1 * size_2 * size_s + abs(t) * (det_error + D(0x1p-50));
-    const D weight_radius = scale * size_d * size_s * max_x86(size_1, size_2) + det_error + D(0x1p-50);
+    const D radius = scale * size_1 * size_2 * size_s + abs(t) * (det_error + D(double_bounds::kRounding));
+    const D weight_radius = scale * size_d * size_s * max_x86(size_1, size_2) + det_error + D(double_bounds::kRounding);
     const auto weight = [](D w) { return min_x86(max_x86(D(0.0), w), D(1.0)); };
     float low[kLanes], high[kLanes], u[kLanes], v[kLanes];
     (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) / det).store(u),
         weight(dot(d, q) / det).store(v);
     // Comparisons that a NaN makes false.
-    const unsigned bounded = (det_error < D(0x1p-9)) & (weight_radius < D(0x1p-30));
+    const unsigned bounded =
+        (det_error < D(double_bounds::kMostOfDivisor)) & (weight_radius < D(double_bounds::kWeight));
     for (int i = 0; i < kLanes; ++i) {
       RoundedHit hit{low[i], u[i], v[i]};
       if (__builtin_expect((bounded >> i & 1u) == 0 || low[i] != high[i], 0)) hit = exactly(i);

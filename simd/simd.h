@@ -25,6 +25,10 @@ inline constexpr int kRegisterWidth = ARBORETUM_TARGET == ARBORETUM_TARGET_AVX51
                                       : ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2 ? 8
                                       : ARBORETUM_TARGET == ARBORETUM_TARGET_SSE  ? 4
                                                                                   : 1;
+/// Lanes of one register; four where there is none.
+inline constexpr int kNativeWidth = kRegisterWidth < 4 ? 4 : kRegisterWidth;
+/// Lanes in which N things stand: a vector has four at least.
+constexpr int lanes_for(int n) { return n < 4 ? 4 : n; }
 inline constexpr Isa kIsa = static_cast<Isa>(ARBORETUM_TARGET);
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

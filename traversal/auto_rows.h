@@ -38,7 +38,6 @@ struct AutoFunctions {
   static constexpr float kTimesAlone = 0.1f;
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
-  static constexpr int kThreshold = 6;  ///< packet64's
   /// Smaller batches are too few to share anything; runs of tiles below the second too few for streams.
   static constexpr std::size_t kFew = 8, kShort = 96;
   /// Of `count` rays' directions or origins, of which some `samples` are looked at: the largest extent along an axis,
@@ -105,8 +104,6 @@ struct AutoFunctions {
     run(rays.size(), kind);
   }
 
-  static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
-
   template <class Packets, RowFunctions (*Other)(), RowFunctions (*Few)()>
   struct Batch {
     static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits,
@@ -116,7 +113,7 @@ struct AutoFunctions {
           rays, kCone,
           [&](std::size_t begin, std::size_t count) {
             return Packets::closest_hit(accel, row, rays.part(begin, count), hits.subspan(begin, count), counters,
-                                        int(kTile), kThreshold);
+                                        int(kTile), kFewOf64);
           },
           [&](std::size_t begin, std::size_t count) {
             (count < kShort ? Few() : Other())
@@ -130,7 +127,7 @@ struct AutoFunctions {
           rays, kAnyHitCone,
           [&](std::size_t begin, std::size_t count) {
             return Packets::any_hit(accel, row, rays.part(begin, count), occluded.subspan(begin, count), counters,
-                                    int(kTile), kThreshold);
+                                    int(kTile), kFewOf64);
           },
           [&](std::size_t begin, std::size_t count) {
             (count < kShort ? Few() : Other())
@@ -147,14 +144,14 @@ struct AutoFunctions {
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
     using Packets = std::conditional_t<holds<Leaves>(CompiledPackets{}), Leaves, CalledLeaves>;
-    using B = Batch<PacketBatch<Family, kNative, Packets, NoCounters>, &Incoherent::template timed<Leaves, Padded>,
+    using B = Batch<PacketBatch<Family, kNativeWidth, Packets, NoCounters>, &Incoherent::template timed<Leaves, Padded>,
                     &Alone::template timed<Leaves, Padded>>;
     return {&B::closest_hit, &B::any_hit};
   }
   template <bool Padded>
   static RowFunctions counting() {
-    using B = Batch<PacketBatch<Family, kNative, CalledLeaves, WithCounters>, &Incoherent::template counting<Padded>,
-                    &Alone::template counting<Padded>>;
+    using B = Batch<PacketBatch<Family, kNativeWidth, CalledLeaves, WithCounters>,
+                    &Incoherent::template counting<Padded>, &Alone::template counting<Padded>>;
     return {&B::closest_hit, &B::any_hit};
   }
 };

@@ -20,20 +20,20 @@ template <class F>
 /// Structures of arrays. The constants are computed W rays at a time by the operations of BoxRay, so they are the same
 /// bits, but for pads that are tight along the ray.
 struct BoxRays : LaneRays {
-  alignas(64) float r[3][kMost], near[3][kMost], far[3][kMost];  ///< BoxRay's r, f, g
+  alignas(64) float r[3][kMost], near[3][kMost], far[3][kMost];  ///< as BoxRay's r and offsets
   alignas(64) float first[kMost];                                ///< distance from which boxes count
-  std::uint64_t overflown;  ///< those whose constants overflow, so that BoxRay mended them
+  std::uint64_t overflowed;  ///< those whose constants overflow, so that BoxRay mended them
 
   /// As LaneRays::prepare().
   template <int W, int N, class RayAt, class Each>
   ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, bool padded, BoxPad pad, const Each& each) {
-    overflown = 0;
+    overflowed = 0;
     LaneRays::prepare<W>(count, ray_at, [&](int k) {
       constants<W, N>(k, padded, pad);
       each(k);
     });
-    if (__builtin_expect((overflown &= valid) != 0, 0)) {
-      for (std::uint64_t rest = overflown; rest; rest &= rest - 1) {
+    if (__builtin_expect((overflowed &= valid) != 0, 0)) {
+      for (std::uint64_t rest = overflowed; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
         if (padded) {
           mend(i, BoxRay<N, true>(ray_at(i), pad.max_coordinate));
@@ -65,23 +65,23 @@ struct BoxRays : LaneRays {
     }
     vm<W> overflows(false);
     for (int a = 0; a < 3; ++a) {
-      F rs, fs, gs;
+      F rs, nears, fars;
       if (padded) {
-        Box::template constants<true>(o[a], d[a], largest, origin, reach[a], share[a], rs, fs, gs);
+        Box::template constants<true>(o[a], d[a], largest, origin, reach[a], share[a], rs, nears, fars);
       } else {
-        Box::template constants<false>(o[a], d[a], largest, origin, reach[a], share[a], rs, fs, gs);
+        Box::template constants<false>(o[a], d[a], largest, origin, reach[a], share[a], rs, nears, fars);
       }
-      rs.store(r[a] + k), fs.store(near[a] + k), gs.store(far[a] + k);
-      overflows = overflows | Box::overflows(d[a], rs, fs, gs);
+      rs.store(r[a] + k), nears.store(near[a] + k), fars.store(far[a] + k);
+      overflows = overflows | Box::overflows(d[a], rs, nears, fars);
     }
-    overflown |= std::uint64_t(overflows.bits()) << k;
+    overflowed |= std::uint64_t(overflows.bits()) << k;
   }
 
   template <class Box>
   void mend(int i, const Box& box) {
     r[0][i] = box.r.x, r[1][i] = box.r.y, r[2][i] = box.r.z;
-    near[0][i] = box.f.x, near[1][i] = box.f.y, near[2][i] = box.f.z;
-    far[0][i] = box.g.x, far[1][i] = box.g.y, far[2][i] = box.g.z;
+    near[0][i] = box.near_offset.x, near[1][i] = box.near_offset.y, near[2][i] = box.near_offset.z;
+    far[0][i] = box.far_offset.x, far[1][i] = box.far_offset.y, far[2][i] = box.far_offset.z;
   }
 };
 

@@ -1,8 +1,8 @@
 // Box tests: one ray against the N child boxes of a node.
 //
-// FastBox keeps no promise at all: rounding can lose a box that the exact ray touches only at a face, edge or corner.
-// PaddedBox never misses a box that the exact ray touches: its interval [near, far] holds the exact one, for every t
-// (but see "tight" below).
+// BoxRay<N, false> keeps no promise at all: rounding can lose a box that the exact ray touches only at a face, edge or
+// corner. BoxRay<N, true> never misses a box that the exact ray touches: its interval [near, far] holds the exact one,
+// for every t (but see "tight" below).
 //
 // With FMA (AVX2, AVX-512) a plane costs one fused multiply: t = plane * r - o * r. Padded: the constants are
 // o * r +- e with e = 2^-21 (M + |o|) |r|, M the scene's largest |coordinate|. Proof: r = (1/d)(1 + a), |a| <= u =
@@ -61,6 +61,8 @@ template <class F, class Mask>
 struct BoxPad {
   /// shares: of M + |o|, along other axes than a tight one, and of |o| along that
   static constexpr float kWide = 0x1p-21f, kBeside = 0x1.4p-20f, kAlong = kHasFma ? 0x1.00001p-23f : 0.0f;
+  /// At least; more than what underflow takes from products.
+  static constexpr float kLeast = 0x1p-100f;
 
   float max_coordinate;  ///< the scene's largest
   bool tight = false;    ///< along the axis where the direction is largest
@@ -73,31 +75,33 @@ struct BoxPad {
 /// One ray's constants for boxes.
 template <int N, bool Padded>
 struct BoxRay {
-  static constexpr int W = N < 4 ? 4 : N;
+  static constexpr int W = lanes_for(N);
   static constexpr unsigned kSide = N * sizeof(float);
 
-  Vec3f r;          ///< reciprocal direction
-  Vec3f f;          ///< for the near planes: o * r (FMA) or the origin (no FMA), padded
-  Vec3f g;          ///< the same for the far planes
-  unsigned octant;  ///< bit a: the direction is negative along axis a, or is -0
+  Vec3f r;            ///< reciprocal direction
+  Vec3f near_offset;  ///< for the near planes: o * r (FMA) or the origin (no FMA), padded
+  Vec3f far_offset;   ///< the same for the far planes
+  unsigned octant;    ///< bit a: the direction is negative along axis a, or is -0
 
   /// The axes stand in lanes: some forty instructions fewer a ray than one axis after the other.
   ARBORETUM_INLINE BoxRay(const Ray& ray, float max_coordinate) {
     using F = vf<4>;
     const F o = F::load(&ray.origin), d = F::load(&ray.direction);
-    F rs, fs, gs;
+    F rs, nears, fars;
     constants<Padded>(
         o, d, F(largest_component(ray.direction)), [&] { return F(largest_component(ray.origin)); }, F(max_coordinate),
-        F(BoxPad::kWide), rs, fs, gs);
-    r = axes(rs), f = axes(fs), g = axes(gs);
-    if (__builtin_expect((overflows(d, rs, fs, gs).bits() & 7u) != 0, 0))
-      leave_out(ray.direction.x, r.x, f.x, g.x), leave_out(ray.direction.y, r.y, f.y, g.y),
-          leave_out(ray.direction.z, r.z, f.z, g.z);
+        F(BoxPad::kWide), rs, nears, fars);
+    r = axes(rs), near_offset = axes(nears), far_offset = axes(fars);
+    if (__builtin_expect((overflows(d, rs, nears, fars).bits() & 7u) != 0, 0))
+      leave_out(ray.direction.x, r.x, near_offset.x, far_offset.x),
+          leave_out(ray.direction.y, r.y, near_offset.y, far_offset.y),
+          leave_out(ray.direction.z, r.z, near_offset.z, far_offset.z);
     octant = sign_mask(rs) & 7u;
   }
   /// Of constants that are known: those of such a BoxRay.
-  ARBORETUM_INLINE BoxRay(Vec3f known_r, Vec3f known_f, Vec3f known_g)
-      : r(known_r), f(known_f), g(known_g), octant(sign_bit(r.x) | sign_bit(r.y) << 1 | sign_bit(r.z) << 2) {}
+  ARBORETUM_INLINE BoxRay(Vec3f known_r, Vec3f known_near, Vec3f known_far)
+      : r(known_r), near_offset(known_near), far_offset(known_far),
+        octant(sign_bit(r.x) | sign_bit(r.y) << 1 | sign_bit(r.z) << 2) {}
 
   /// Where a node's near planes lie: in bytes from its begin.
   ARBORETUM_INLINE unsigned near_x() const { return (octant & 1u) * kSide; }
@@ -108,36 +112,36 @@ struct BoxRay {
   /// of the ray's direction and origin; the pad is a `share` of max_coordinate + |o|.
   template <bool Pad, class F, class Origin>
   static ARBORETUM_INLINE void constants(F o, F d, F largest, [[maybe_unused]] const Origin& origin,
-                                         [[maybe_unused]] F max_coordinate, [[maybe_unused]] F share, F& r, F& f,
-                                         F& g) {
+                                         [[maybe_unused]] F max_coordinate, [[maybe_unused]] F share, F& r, F& near,
+                                         F& far) {
     if constexpr (kHasFma) {
       r = F(1.0f) / d;
       // A branch, rarely taken: no division waits for `largest`.
       const auto tiny = ~(abs(d) > largest * F(0x1p-60f));
       if (__builtin_expect(any(tiny), 0)) r = select(tiny, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
-      f = g = o * r;
+      near = far = o * r;
       if constexpr (Pad) {
         // In this order: 2^-21 of a tiny scene may be nothing
-        F e = share * ((max_coordinate + abs(o)) * abs(r)) + F(0x1p-100f);
+        F e = share * ((max_coordinate + abs(o)) * abs(r)) + F(BoxPad::kLeast);
         if (__builtin_expect(any(tiny), 0)) e = pad_or_leave_out(e, tiny, max_coordinate, origin(), largest);
-        f = f + e, g = g - e;
+        near = near + e, far = far - e;
       }
     } else {
       r = F(1.0f) / d;
-      f = g = o;
+      near = far = o;
       if constexpr (Pad) {
-        const F e = xor_sign(share * (max_coordinate + abs(o)) + F(0x1p-100f), sign_bits(r));
-        f = f + e, g = g - e;
+        const F e = xor_sign(share * (max_coordinate + abs(o)) + F(BoxPad::kLeast), sign_bits(r));
+        near = near + e, far = far - e;
       }
     }
   }
   /// Where the constants of such directions are too large, or NaN, and must be mended; so is an infinite reciprocal of
   /// anything but 0.
   template <class F>
-  static ARBORETUM_INLINE auto overflows(F d, F r, F f, F g) {
-    const auto too_large = ~(abs(f) + abs(g) < F(kTooLarge));
+  static ARBORETUM_INLINE auto overflows(F d, F r, F near, F far) {
+    const auto too_large = ~(abs(near) + abs(far) < F(kTooLarge));
     if constexpr (kHasFma) {
-      return too_large;  // r is part of f
+      return too_large;  // r is part of `near`
     } else {
       return too_large | ((abs(r) == F(std::numeric_limits<float>::infinity())) & (d != F(0.0f)));
     }
@@ -148,17 +152,17 @@ struct BoxRay {
   static ARBORETUM_INLINE Vec3f axes(vf<4> a) { return {lane<0>(a), lane<1>(a), lane<2>(a)}; }
   /// An axis whose constants overflow: with it a child that does not exist would be met, infinite planes giving NaN.
   /// Its interval becomes all t for boxes that exist, and stays empty for others.
-  static void leave_out(float d, float& r, float& f, float& g) {
+  static void leave_out(float d, float& r, float& near, float& far) {
     const bool infinite = !kHasFma && __builtin_fabsf(r) == std::numeric_limits<float>::infinity() && d != 0.0f;
-    if (!infinite && __builtin_fabsf(f) + __builtin_fabsf(g) < kTooLarge) return;
+    if (!infinite && __builtin_fabsf(near) + __builtin_fabsf(far) < kTooLarge) return;
     constexpr float largest = std::numeric_limits<float>::max();
     r = __builtin_copysignf(1.0f, r);
-    f = kHasFma ? largest : __builtin_copysignf(largest, r);
-    g = -f;
+    near = kHasFma ? largest : __builtin_copysignf(largest, r);
+    far = -near;
   }
 };
 
-/// The constants in registers, one ray on all lanes.
+/// The constants in registers, one ray on all lanes: fx to fz the near planes' offsets, gx to gz the far ones'.
 template <int N, bool Padded>
 struct BoxLanes {
   static constexpr int W = BoxRay<N, Padded>::W;
@@ -168,8 +172,9 @@ struct BoxLanes {
   unsigned near_x, near_y, near_z;
 
   ARBORETUM_INLINE explicit BoxLanes(const BoxRay<N, Padded>& b)
-      : rx(b.r.x), ry(b.r.y), rz(b.r.z), fx(b.f.x), fy(b.f.y), fz(b.f.z), gx(b.g.x), gy(b.g.y), gz(b.g.z),
-        near_x(b.near_x()), near_y(b.near_y()), near_z(b.near_z()) {}
+      : rx(b.r.x), ry(b.r.y), rz(b.r.z), fx(b.near_offset.x), fy(b.near_offset.y), fz(b.near_offset.z),
+        gx(b.far_offset.x), gy(b.far_offset.y), gz(b.far_offset.z), near_x(b.near_x()), near_y(b.near_y()),
+        near_z(b.near_z()) {}
 
   /// Entry distances (at least tnear) and, as bits, the children whose interval within [tnear, tfar] is not empty.
   ARBORETUM_INLINE unsigned test(const std::byte* node, F tnear, F tfar, F& entry) const {

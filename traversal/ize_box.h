@@ -19,7 +19,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// One ray's constants in registers, the ray on all lanes: what BoxLanes is for the other box tests.
 template <int N>
 struct IzeLanes {
-  static constexpr int W = N < 4 ? 4 : N;
+  static constexpr int W = lanes_for(N);
   static constexpr unsigned kSide = N * sizeof(float);
   using F = vf<W>;
   F ox, oy, oz, rx, ry, rz, gx, gy, gz;  ///< origin, reciprocals for the near planes, for the far ones

@@ -17,8 +17,8 @@ void for_each_test(const Visit& visit) {
 }
 
 /// Adds the rows of one way of traversal. `Functions` makes a row's functions:
-///   template <class Leaves, bool Padded> static RowFunctions timed();   template <bool Padded> static RowFunctions
-///   counting();
+///   template <class Leaves, bool Padded> static RowFunctions timed();
+///   template <bool Padded> static RowFunctions counting();
 /// `Compiled...` are the CompiledLeaves (traversal/leaves.h) that get functions of their own; all others share those of
 /// CalledLeaves.
 template <class Structure, class Functions, class... Compiled>

@@ -46,8 +46,6 @@ struct PacketBatch {
 /// may set it.
 template <class Family, int Rays, int Threshold, bool Hybrid = false>
 struct PacketFunctions {
-  static constexpr int kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
-
   template <class Batch>
   static RowFunctions functions() {
     return {[](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* c) {
@@ -63,15 +61,19 @@ struct PacketFunctions {
   }
   template <class Leaves, bool>
   static RowFunctions timed() {
-    return functions < PacketBatch < Family, Family::kFewerLanes && Rays < kNative ? Rays : kNative, Leaves,
-           NoCounters >> ();
+    constexpr int kLanes = Family::kFewerLanes ? std::min(Rays, kNativeWidth) : kNativeWidth;
+    return functions<PacketBatch<Family, kLanes, Leaves, NoCounters>>();
   }
   /// What is visited does not depend on the lanes.
   template <bool>
   static RowFunctions counting() {
-    return functions<PacketBatch<Family, kNative, CalledLeaves, WithCounters>>();
+    return functions<PacketBatch<Family, kNativeWidth, CalledLeaves, WithCounters>>();
   }
 };
+
+/// With no more than so many rays in a node they go on alone: what was fastest (docs/performance/packets.md). Packets
+/// of up to 16 rays stay together to the end, which is what tells them from hybrids.
+inline constexpr int kFewOf32 = 4, kFewOf64 = 6, kFewOfHybrid4 = 1, kFewOfHybrid8 = 2, kFewOfHybrid16 = 3;
 
 /// `Compiled`: what packet32 and packet64 have compiled in. `Family::kFewerLanes`: packets of fewer rays than a
 /// register holds have narrower registers.
@@ -80,11 +82,11 @@ void add_packet_rows(KernelRows& rows, Compiled compiled) {
   add_rows<Structure, PacketFunctions<Family, 4, 0>>(rows, "packet4", TypeList<>{});
   add_rows<Structure, PacketFunctions<Family, 8, 0>>(rows, "packet8", TypeList<>{});
   add_rows<Structure, PacketFunctions<Family, 16, 0>>(rows, "packet16", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 32, 4>>(rows, "packet32", compiled);
-  add_rows<Structure, PacketFunctions<Family, 64, 6>>(rows, "packet64", compiled);
-  add_rows<Structure, PacketFunctions<Family, 4, 1, true>>(rows, "hybrid4", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 8, 2, true>>(rows, "hybrid8", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 16, 3, true>>(rows, "hybrid16", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 32, kFewOf32>>(rows, "packet32", compiled);
+  add_rows<Structure, PacketFunctions<Family, 64, kFewOf64>>(rows, "packet64", compiled);
+  add_rows<Structure, PacketFunctions<Family, 4, kFewOfHybrid4, true>>(rows, "hybrid4", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 8, kFewOfHybrid8, true>>(rows, "hybrid8", TypeList<>{});
+  add_rows<Structure, PacketFunctions<Family, 16, kFewOfHybrid16, true>>(rows, "hybrid16", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -14,6 +14,15 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Rays in flight at most.
 inline constexpr unsigned kMostInFlight = 64;
 
+/// Entries from one ray's stack to the next: an odd number of cache lines where entries fill lines, and nearly so where
+/// they do not, so that stacks do not share sets of the cache.
+template <class Entry>
+[[nodiscard]] constexpr std::size_t stride_of(std::size_t entries) {
+  static_assert(sizeof(Entry) <= 64);
+  constexpr std::size_t line = 64 / sizeof(Entry);
+  return ((entries + line - 1) / line | 1) * line;
+}
+
 /// Queue is of closest hit.
 template <class Queue, class Counting>
 void queued_closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight,

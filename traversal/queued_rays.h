@@ -7,14 +7,18 @@
 // the bit, however many rays are in flight.
 //
 // What a structure brings is a Walk:
-//   static constexpr bool kAnyHit; using Target, Entry (of a ray's stack), State, Leaves
-//   Walk(const Accel&, const KernelRow&)
+//   static constexpr bool kAnyHit;
+//   using Target, Entry (of a ray's stack), State, Leaves;
+//   Walk(const Accel&, const KernelRow&);
 //   std::size_t stack_entries() const;
-//   void start(void* state, const Ray&, Entry* stack) const;      makes a State with members `best` (NearestHit) and
-//   `data` (Leaves::RayData) Target first(State&) const; static unsigned kind(Target); 0 a node, 1 a leaf, 2 nothing is
-//   left void prefetch(Target) const; Target node(State&, Target) const;                              what comes after
-//   this step Target leaf(State&, Target, Entry* stack) const; void finish(State&) const; before a ray's closest hit is
-//   reported
+//   void start(void* state, const Ray&, Entry* stack) const;
+//                                      makes a State with members `best` (NearestHit) and `data` (Leaves::RayData)
+//   Target first(State&) const;
+//   static unsigned kind(Target);      0 a node, 1 a leaf, 2 nothing is left
+//   void prefetch(Target) const;
+//   Target node(State&, Target) const;                   what comes after this step
+//   Target leaf(State&, Target, Entry* stack) const;     the same
+//   void finish(State&) const;         before a ray's closest hit is reported
 #pragma once
 
 #include "traversal/queued_functions.h"
@@ -27,7 +31,7 @@ class QueuedRays {
  public:
   /// `in_flight`: 1 to kMostInFlight.
   QueuedRays(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight)
-      : in_flight_(in_flight), walk_(accel, row), rays_(rays), stride_(stride_of(walk_.stack_entries())),
+      : in_flight_(in_flight), walk_(accel, row), rays_(rays), stride_(stride_of<Entry>(walk_.stack_entries())),
         stacks_(stride_ * in_flight) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
@@ -62,13 +66,6 @@ class QueuedRays {
     Target target;
   };
 
-  /// Stacks lie an odd number of cache lines apart where entries fill lines, and nearly so where they do not, so that
-  /// they do not share sets of the cache.
-  [[nodiscard]] static std::size_t stride_of(std::size_t entries) {
-    static_assert(sizeof(Entry) <= 64);
-    constexpr std::size_t line = 64 / sizeof(Entry);
-    return ((entries + line - 1) / line | 1) * line;
-  }
   Slot& slot_of(unsigned slot) { return *reinterpret_cast<Slot*>(slots_ + slot * sizeof(Slot)); }
   Entry* stack_of(unsigned slot) { return stacks_.data() + slot * stride_; }
 

@@ -13,6 +13,7 @@
 // In double-doubles the differences are exact, five operations remain, each within 10 * 2^-106: 6 * 5.01 * 10
 // * 2^-106 < 2^-97.
 #include "core/exact/exact_predicate.h"
+#include "core/exact/double_bounds.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +22,7 @@
 namespace arboretum {
 namespace {
 
-constexpr double kDoubleBound = 56 * 0x1p-53;
+constexpr double kDoubleBound = double_bounds::kDeterminant;
 constexpr double kDoubleDoubleBound = 0x1p-96;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

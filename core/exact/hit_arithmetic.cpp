@@ -3,8 +3,8 @@
 //   JGT 1997).
 // Each of the six products of a determinant carries at most eight factors (1 + e), |e| <= u: three rounded differences,
 // the product, its difference, the second product, two sums; so with |.| the largest component it is off by less than
-// 6 * 8.01 u |.||.||.|, and kBound = 56 u leaves room for the roundings of that bound. As in exact_predicate.cpp
-// nothing can under- or overflow.
+// 6 * 8.01 u |.||.||.|, and kDeterminant (double_bounds.h) = 56 u leaves room for the roundings of that bound. As in
+// exact_predicate.cpp nothing can under- or overflow.
 #include "core/exact/hit_arithmetic.h"
 
 #include <algorithm>
@@ -13,13 +13,13 @@
 
 #include <emmintrin.h>
 
+#include "core/exact/double_bounds.h"
 #include "core/exact/exact_predicate.h"
 #include "core/rounding.h"
 
 namespace arboretum {
 namespace {
 
-constexpr double kBound = 56 * 0x1p-53;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// Two triples of doubles side by side: what is done to one is done to the other in the same instruction.
@@ -66,13 +66,15 @@ inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
   const __m128d size_e = size_of(e), size_ds = size_of(ds);
   const __m128d det = _mm_unpacklo_pd(det_t, det_t);
   // (n + dn) / (det + dd) - n / det = (dn - (n / det) dd) / (det + dd), and dd is at most 2^-9 |det|.
-  const __m128d scale_t = _mm_div_pd(_mm_shuffle_pd(_mm_set1_pd(kBound * (1 + 0x1p-8)), det_t, 2), det);
+  const __m128d scale_t =
+      _mm_div_pd(_mm_shuffle_pd(_mm_set1_pd(double_bounds::kDeterminant * double_bounds::kQuotient), det_t, 2), det);
   const __m128d uv = _mm_div_pd(weights, det);
   const double t = high(scale_t), scale = std::fabs(low(scale_t)), size_1 = low(size_e), size_2 = high(size_e);
   const double size_d = low(size_ds), size_s = high(size_ds), det_error = scale * size_1 * size_2 * size_d;
-  if (!(det_error < 0x1p-9)) return {t, std::numeric_limits<double>::infinity(), low(uv), high(uv), 1.0};
-  return {t, scale * size_1 * size_2 * size_s + std::fabs(t) * (det_error + 0x1p-50), low(uv), high(uv),
-          scale * size_d * size_s * std::max(size_1, size_2) + det_error + 0x1p-50};
+  if (!(det_error < double_bounds::kMostOfDivisor))
+    return {t, std::numeric_limits<double>::infinity(), low(uv), high(uv), 1.0};
+  return {t, scale * size_1 * size_2 * size_s + std::fabs(t) * (det_error + double_bounds::kRounding), low(uv),
+          high(uv), scale * size_d * size_s * std::max(size_1, size_2) + det_error + double_bounds::kRounding};
 }
 
 float weight(double w) { return static_cast<float>(std::clamp(w, 0.0, 1.0)); }
@@ -103,7 +105,8 @@ int compare_distances_exactly(const Ray& ray, const Corners& first, const Corner
 RoundedHit round_exactly(const Ray& ray, const Corners& corners) noexcept {
   const DoublePoint p = point_in_double(ray, corners);
   const float t = static_cast<float>(p.t - p.radius);
-  if (t == static_cast<float>(p.t + p.radius) && p.weight_radius < 0x1p-30) return {t, weight(p.u), weight(p.v)};
+  if (t == static_cast<float>(p.t + p.radius) && p.weight_radius < double_bounds::kWeight)
+    return {t, weight(p.u), weight(p.v)};
   const RoundedPoint exact = ExactPredicate(ray).round(corners);
   return {exact.t_rounded, exact.u, exact.v};
 }

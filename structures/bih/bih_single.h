@@ -17,7 +17,7 @@ struct IntervalRay {
   unsigned negative[3];
 
   template <bool Padded>
-  ARBORETUM_INLINE explicit IntervalRay(const BoxRay<2, Padded>& b) : IntervalRay(b.r, b.f, b.g) {}
+  ARBORETUM_INLINE explicit IntervalRay(const BoxRay<2, Padded>& b) : IntervalRay(b.r, b.near_offset, b.far_offset) {}
   ARBORETUM_INLINE IntervalRay(Vec3f known_r, Vec3f f, Vec3f g)
       : r{known_r.x, known_r.y, known_r.z}, begin{f.x, f.y, f.z}, end{g.x, g.y, g.z} {
     for (int a = 0; a < 3; ++a) negative[a] = unsigned(__builtin_signbit(r[a]) != 0);

@@ -13,7 +13,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Nodes of bvh::SoaNodes<N>.
 template <int N>
 struct IzeNodeTest {
-  static constexpr int W = N < 4 ? 4 : N, kSlots = W, kStride = 1;
+  static constexpr int W = lanes_for(N), kSlots = W, kStride = 1;
   using F = vf<W>;
   IzeLanes<N> box;
   F tnear, tfar;

@@ -68,9 +68,7 @@ class BvhNodeWalk {
   static ARBORETUM_INLINE unsigned kind(Target target) { return kind_of(target); }
 
   ARBORETUM_INLINE void prefetch(Target target) const {
-    constexpr int kLines = int((std::max(Nodes::kBytes, Leaves::kBytesAhead) + 63 + 32) / 64);
-    const auto* at = reinterpret_cast<const char*>(base_ + bvh::offset_of(target));
-    for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+    prefetch_lines<lines_of(std::max(Nodes::kBytes, Leaves::kBytesAhead))>(base_ + bvh::offset_of(target));
   }
 
   ARBORETUM_INLINE Target node(State& s, Target target) const {

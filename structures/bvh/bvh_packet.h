@@ -77,7 +77,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
 
   Interval interval_of(Mask mask) {
     Interval v;
-    v.usable = (mask & lanes_.overflown) == 0;
+    v.usable = (mask & lanes_.overflowed) == 0;
     Bounds r[3], o[3];
     float unused;
     range(lanes_.first, mask, v.tnear, unused);
@@ -96,7 +96,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       v.r_low[a] = r[a].low, v.r_high[a] = r[a].high;
       v.near_origin[a] = negative ? o[a].low : o[a].high, v.far_origin[a] = negative ? o[a].high : o[a].low;
       // In this order: 2^-20 of a tiny scene may be nothing.
-      v.pad[a] = 0x1p-20f * (size[a] * (negative ? -r[a].low : r[a].high)) + 0x1p-99f;
+      v.pad[a] = 0x1p-20f * (size[a] * (negative ? -r[a].low : r[a].high)) + 2.0f * BoxPad::kLeast;
       v.near[a] = unsigned(2 * a + negative);
       v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
       Base::set_axis(a, o[a].low, o[a].high, mask);
@@ -212,8 +212,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
           if (mask == 0) continue;
           met.add(mask);
           const bvh::NodeReference child = Format::child(node, i);
-          const auto* target = reinterpret_cast<const char*>(base_ + bvh::offset_of(child));
-          for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
+          prefetch_lines<kPrefetchLines>(base_ + bvh::offset_of(child));
           Entry* p = top++;
           if constexpr (!AnyHit) {
             for (; p != bottom && p[-1].t < t[i]; --p) *p = p[-1];

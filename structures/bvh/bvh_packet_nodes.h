@@ -11,7 +11,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// children; where rays meet that of child i, as their own box test computes it.
 template <int N>
 struct SoaPacketNodes {
-  static constexpr int kBranching = N, kLanes = N < 4 ? 4 : N;
+  static constexpr int kBranching = N, kLanes = lanes_for(N);
   template <bool Padded>
   using Single = SoaNodeTest<N, Padded>;
 

@@ -1,10 +1,6 @@
-// Queued traversal: K rays of a batch in flight, their next steps in two queues, one of nodes, one of leaves.
-//
-// A step of one ray waits some fifty cycles for memory and mispredicted branches. Here a step only says what the ray
-// needs next: the target's cache lines are asked for and {ray, target} is put on the queue of its kind, so that by the
-// time it is its turn the lines are there, and the steps of a queue are independent of each other and all of one kind.
-// Every ray keeps its own stack and visits nodes in the very order of single-ray traversal: the answers are the same to
-// the bit, however many rays are in flight.
+// Queued traversal of the wide BVHs: as traversal/queued_rays.h, which says what it is for, with a loop of its own. A
+// reference's own bits tell the kind of a step here, the end of a stack is a reference too, and the stack is cleared of
+// what lies behind a new hit, so that a step has no branch but those of its test.
 #pragma once
 
 #include "simd/lane_order.h"
@@ -99,8 +95,8 @@ ARBORETUM_INLINE void sort_down(__m128d& a, __m128d& b) {
 /// The same for all: up to four children, the usual case, without a branch where the registers can do it. Writes up to
 /// four entries whatever their number.
 template <int N, bool AnyHit>
-ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<(N < 4 ? 4 : N)> entry, unsigned hit, StackEntry*& top) {
-  constexpr int W = N < 4 ? 4 : N;
+ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<lanes_for(N)> entry, unsigned hit, StackEntry*& top) {
+  constexpr int W = lanes_for(N);
   [[maybe_unused]] const unsigned count = unsigned(__builtin_popcount(hit));
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
   if constexpr (kOrdersLanes<N>) {
@@ -145,8 +141,8 @@ class Queued {
       : Queued(static_cast<const bvh::BvhBase&>(accel), row, rays, in_flight) {}
   Queued(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, unsigned in_flight)
       : in_flight_(in_flight), base_(tree.base()), leaves_(row, tree.vertices()), root_(tree.root()),
-        max_coordinate_(tree.max_coordinate()), rays_(rays), stride_(((tree.stack_entries() + 6 + 7) / 8 | 1) * 8),
-        stacks_(stride_ * in_flight) {}
+        max_coordinate_(tree.max_coordinate()), rays_(rays),
+        stride_(stride_of<StackEntry>(tree.stack_entries() + kSpareEntries)), stacks_(stride_ * in_flight) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit. Of `counting` the
   /// queues' lengths alone.
@@ -170,7 +166,9 @@ class Queued {
   }
 
  private:
-  static constexpr int W = N < 4 ? 4 : N;
+  static constexpr int W = lanes_for(N);
+  /// Of a stack: kDone at its bottom, and what push() writes beyond the top.
+  static constexpr std::size_t kSpareEntries = 6;
   using F = vf<W>;
   using Box = BoxRay<N, Padded>;
 
@@ -204,9 +202,7 @@ class Queued {
 
     /// Asks for the lines of the target and puts the step on the queue of its kind.
     ARBORETUM_INLINE void route(unsigned slot, bvh::NodeReference target) {
-      constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead) + 63 + 32) / 64);
-      const auto* at = reinterpret_cast<const char*>(q.base_ + bvh::offset_of(target));
-      for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+      prefetch_lines<lines_of(std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead))>(q.base_ + bvh::offset_of(target));
       const Step step{slot, target};
       const unsigned kind = kind_of(target);
       q.queues_[0][node] = step, q.queues_[1][leaf] = step, q.queues_[2][done] = step;

@@ -4,9 +4,9 @@
 // `Nodes` is one ray and how it meets the nodes of a format:
 //   Nodes(ray, max_coordinate): the ray's constants, its interval [tnear, tfar] among them;
 //   Nodes(box, first, last): the same where the constants are known (BoxRay), between two distances;
-//   kSlots: children that a node has room for; W: lanes of a test; test(node, entry): the children whose box the ray
-//   meets within its interval, as bits, and in those lanes of
-//     `entry` the distances at which it enters them, at least tnear;
+//   kSlots: children that a node has room for; W: lanes of a test;
+//   test(node, entry): the children whose box the ray meets within its interval, as bits, and in those lanes of `entry`
+//     the distances at which it enters them, at least tnear;
 //   children(node): an array in which bit i's child has its reference at [i * kStride];
 //   shorten(tfar): the interval ends earlier; boxes(node): how many children there are.
 #pragma once
@@ -21,7 +21,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Nodes of bvh::SoaNodes<N>.
 template <int N, bool Padded>
 struct SoaNodeTest {
-  static constexpr int W = N < 4 ? 4 : N, kSlots = W, kStride = 1;
+  static constexpr int W = lanes_for(N), kSlots = W, kStride = 1;
   using F = vf<W>;
   BoxLanes<N, Padded> box;
   F tnear, tfar;

@@ -71,16 +71,16 @@ class Stream {
  private:
   static constexpr unsigned kRays = BoxRays::kMost;
   /// of a node, or of a leaf's first block, wherever they begin
-  static constexpr int kLines = int((std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead) + 63 + 32) / 64);
+  static constexpr int kLines = lines_of(std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead));
   using Test = SoaNodeTest<N, Padded>;
   using Box = BoxRay<N, Padded>;
-  static constexpr int W = Test::W, kNative = kRegisterWidth < 4 ? 4 : kRegisterWidth;
+  static constexpr int W = Test::W;
   using F = vf<W>;
 
-  /// BoxRay's g is not its f.
+  /// The far planes' offsets are not the near ones'.
   static constexpr bool kTwoOffsets = Padded || !kHasFma;
-  /// What nodes need of a ray, in one cache line: BoxRay's r, the distance from which boxes count, f and g; where f
-  /// serves as g there is room for the ray.
+  /// What nodes need of a ray, in one cache line: BoxRay's r, the distance from which boxes count, the near planes'
+  /// offsets and the far ones'; where these are the same there is room for the ray.
   struct alignas(64) Constants {
     float number[12];
   };
@@ -145,7 +145,7 @@ class Stream {
     const std::uint32_t* const list = list_[octant];
     const int count = int(std::exchange(waiting_[octant], 0u));
     const auto ray_at = [&](int i) -> const Ray& { return rays_[list[i]]; };
-    lanes_.template prepare<kNative, N>(count, ray_at, Padded, pad_, [](int) {});
+    lanes_.template prepare<kNativeWidth, N>(count, ray_at, Padded, pad_, [](int) {});
     for (int k = 0; k < count; k += 4) gather(g, k);
     for (int i = 0; i < count; ++i) {
       g.index[i] = list[i], ray(g, unsigned(i)) = ray_at(i);
@@ -156,8 +156,8 @@ class Stream {
               std::remove_const_t<RayData>(leaves_.prepare(ray_at(i)));
       }
     }
-    for (int k = 0; k < count; k += kNative)
-      (vf<kNative>::load(lanes_.t + k) * vf<kNative>(pad_.beyond())).store(g.t + k);
+    for (int k = 0; k < count; k += kNativeWidth)
+      (vf<kNativeWidth>::load(lanes_.t + k) * vf<kNativeWidth>(pad_.beyond())).store(g.t + k);
     g.count = unsigned(count), g.octant = octant, g.active = g.valid = lanes_.valid;
     g.stack = stack, g.top = 0;
     g.target = root_, g.visitors = g.active;
@@ -207,8 +207,7 @@ class Stream {
       const std::uint64_t rays = g.stack.rays(top) & (AnyHit ? g.active : nearer(g, g.stack.t[top]));
       if (rays == 0) continue;
       g.top = top, g.target = g.stack.target[top], g.visitors = rays;
-      const auto* at = reinterpret_cast<const char*>(base_ + bvh::offset_of(g.target));
-      for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+      prefetch_lines<kLines>(base_ + bvh::offset_of(g.target));
       return true;
     }
     return false;
@@ -216,7 +215,7 @@ class Stream {
 
   /// The rays that have found nothing before t.
   static ARBORETUM_INLINE std::uint64_t nearer(const Group& g, float t) {
-    constexpr int V = kNative;
+    constexpr int V = kNativeWidth;
     std::uint64_t rays = 0;
     for (int k = 0; k < int(kRays); k += V) rays |= std::uint64_t((vf<V>(t) <= vf<V>::load(g.t + k)).bits()) << k;
     return rays;

@@ -198,8 +198,7 @@ class StreamLists {
     if (entries_.size() < free + total) entries_.resize(2 * (free + total));
     for (unsigned k = 0; k < children; ++k) {
       const unsigned i = order[k];
-      const auto* target = reinterpret_cast<const char*>(base_ + bvh::offset_of(child[i]));
-      for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
+      prefetch_lines<kPrefetchLines>(base_ + bvh::offset_of(child[i]));
       const StackEntry* const from = children_.data() + std::size_t(i) * group_;
       const auto count = unsigned(tail[i] - from);
       std::copy(from, from + count, entries_.data() + free);

@@ -38,7 +38,7 @@ struct StreamStack {
 /// is read.
 template <int N, bool AnyHit>
 class MetChildrenInLanes {
-  static constexpr int W = N < 4 ? 4 : N;
+  static constexpr int W = lanes_for(N);
 
  public:
   ARBORETUM_INLINE MetChildrenInLanes() : low_(0), high_(0), least_(std::numeric_limits<float>::infinity()) {}
@@ -87,7 +87,7 @@ class MetChildrenInLanes {
 /// by ray.
 template <int N, bool AnyHit>
 class MetChildrenInBytes {
-  static constexpr int W = N < 4 ? 4 : N, kBytes = (W + 7) / 8;
+  static constexpr int W = lanes_for(N), kBytes = (W + 7) / 8;
 
  public:
   ARBORETUM_INLINE MetChildrenInBytes() : least_(std::numeric_limits<float>::infinity()) {}
@@ -136,7 +136,7 @@ class MetChildrenInBytes {
 
 template <int N, bool AnyHit>
 using MetChildren =
-    std::conditional_t<kOrdersLanes<(N < 4 ? 4 : N)>, MetChildrenInLanes<N, AnyHit>, MetChildrenInBytes<N, AnyHit>>;
+    std::conditional_t<kOrdersLanes<lanes_for(N)>, MetChildrenInLanes<N, AnyHit>, MetChildrenInBytes<N, AnyHit>>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

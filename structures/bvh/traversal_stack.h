@@ -5,6 +5,7 @@
 #pragma once
 
 #include "traversal/batch_stack.h"
+#include "traversal/prefetch.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -33,8 +34,7 @@ ARBORETUM_INLINE bvh::NodeReference push_children(const std::byte* base, const b
     const int i = __builtin_ctz(hit);
     hit &= hit - 1;
     const bvh::NodeReference reference = child[i * Stride];
-    const auto* target = reinterpret_cast<const char*>(base + bvh::offset_of(reference));
-    for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
+    prefetch_lines<kPrefetchLines>(base + bvh::offset_of(reference));
     return stack_entry(key[i], reference);
   };
   StackEntry a = next(), b = next();
@@ -70,8 +70,7 @@ ARBORETUM_INLINE bvh::NodeReference push_unordered(const std::byte* base, const 
                                                    StackEntry*& top) {
   for (; hit & (hit - 1); hit &= hit - 1) {
     const bvh::NodeReference reference = child[__builtin_ctz(hit) * Stride];
-    const auto* target = reinterpret_cast<const char*>(base + bvh::offset_of(reference));
-    for (int line = 0; line < kPrefetchLines; ++line) _mm_prefetch(target + 64 * line, _MM_HINT_T0);
+    prefetch_lines<kPrefetchLines>(base + bvh::offset_of(reference));
     *top++ = reference;
   }
   return child[__builtin_ctz(hit) * Stride];

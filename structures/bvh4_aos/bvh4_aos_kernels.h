@@ -32,8 +32,9 @@ struct AosNodeTest {
   ARBORETUM_INLINE AosNodeTest(const Ray& ray, float max_coordinate)
       : AosNodeTest(BoxRay<4, Padded>(ray, max_coordinate), first_distance(ray), ray.tfar) {}
   ARBORETUM_INLINE AosNodeTest(const BoxRay<4, Padded>& b, float first, float last)
-      : r(repeat_four<16>(four(b.r.x, b.r.y, b.r.z, 1.0f))), f(repeat_four<16>(four(b.f.x, b.f.y, b.f.z, -first))),
-        g(repeat_four<16>(four(b.g.x, b.g.y, b.g.z, -last))),
+      : r(repeat_four<16>(four(b.r.x, b.r.y, b.r.z, 1.0f))),
+        f(repeat_four<16>(four(b.near_offset.x, b.near_offset.y, b.near_offset.z, -first))),
+        g(repeat_four<16>(four(b.far_offset.x, b.far_offset.y, b.far_offset.z, -last))),
         upper_is_near(vm<16>::from_bits((b.octant | 8u) * 0x1111u)),
         upper_is_far(vm<16>::from_bits((~b.octant & 15u) * 0x1111u)) {}
 

@@ -80,8 +80,8 @@ struct QuantisedNodeTest {
   using Box = BoxRay<N, Padded>;
 
   ARBORETUM_INLINE QuantisedNodeTest(float first, float last, const Box& b)
-      : r(axes(b.r)), f(axes(b.f)), g(axes(b.g)), tnear(first), tfar(last), near_x((b.octant & 1u) * kSide),
-        near_y((b.octant >> 1 & 1u) * kSide), near_z((b.octant >> 2) * kSide) {}
+      : r(axes(b.r)), f(axes(b.near_offset)), g(axes(b.far_offset)), tnear(first), tfar(last),
+        near_x((b.octant & 1u) * kSide), near_y((b.octant >> 1 & 1u) * kSide), near_z((b.octant >> 2) * kSide) {}
 
   static ARBORETUM_INLINE F axes(Vec3f a) { return repeat_four<W>(four(a.x, a.y, a.z, 0.0f)); }
   static ARBORETUM_INLINE vf<4> steps(const Node* node) {
@@ -96,12 +96,12 @@ struct QuantisedNodeTest {
   /// 2^126 or more. Such an axis is left out: no box is missed for it.
   static ARBORETUM_INLINE const Box& within_range(Box& b) {
     if constexpr (kHasFma && Padded) {
-      const Vec3f pad = b.f - b.g;
+      const Vec3f pad = b.near_offset - b.far_offset;
       if (__builtin_expect(!(pad.x < 0x1p106f && pad.y < 0x1p106f && pad.z < 0x1p106f), 0)) {
         for (int a = 0; a < 3; ++a) {
           if ((&pad.x)[a] < 0x1p106f) continue;
           (&b.r.x)[a] = __builtin_copysignf(1.0f, (&b.r.x)[a]);
-          (&b.f.x)[a] = std::numeric_limits<float>::max(), (&b.g.x)[a] = -(&b.f.x)[a];
+          (&b.near_offset.x)[a] = std::numeric_limits<float>::max(), (&b.far_offset.x)[a] = -(&b.near_offset.x)[a];
         }
       }
     }

@@ -22,6 +22,7 @@
 
 #include "structures/kdtree/kdtree_single.h"
 #include "traversal/packet_leaves.h"
+#include "traversal/prefetch.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -30,12 +31,12 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// bits.
 struct KdLanes : LaneRays {
   alignas(64) float r[3][kMost], enter[3][kMost], leave[3][kMost];
-  std::uint64_t overflown;  ///< those of which an axis is left out
+  std::uint64_t overflowed;  ///< those of which an axis is left out
 
   /// As LaneRays::prepare(). `pad`: KdRay::kPad, or 0 for `fast` planes.
   template <int W, class RayAt, class Each>
   ARBORETUM_INLINE void prepare(int count, const RayAt& ray_at, float pad, float max_coordinate, const Each& each) {
-    overflown = 0;
+    overflowed = 0;
     LaneRays::prepare<W>(count, ray_at, [&](int k) {
       constants<W>(k, pad, max_coordinate);
       each(k);
@@ -54,7 +55,7 @@ struct KdLanes : LaneRays {
       F reciprocal, in, out;
       const vm<W> fits = KdRay::constants(o[a], d[a], largest, origin, max_coordinate, pad, reciprocal, in, out);
       reciprocal.store(r[a] + k), in.store(enter[a] + k), out.store(leave[a] + k);
-      overflown |= std::uint64_t((~fits).bits()) << k;
+      overflowed |= std::uint64_t((~fits).bits()) << k;
     }
   }
 };
@@ -114,7 +115,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   /// of planes.
   Interval interval_of(Mask group) {
     Interval v;
-    v.usable = chunks_ > 2 && (lanes_.overflown & group) == 0;
+    v.usable = chunks_ > 2 && (lanes_.overflowed & group) == 0;
     if (!v.usable && !Leaves::kRaysInLanes) return v;
     for (int a = 0; a < 3; ++a) {
       float o0, o1;
@@ -310,10 +311,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   ARBORETUM_INLINE const std::byte* place_of(std::uint64_t node) const {
     return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
   }
-  ARBORETUM_INLINE void prefetch(std::uint64_t node) const {
-    const auto* at = reinterpret_cast<const char*>(place_of(node));
-    for (int line = 0; line < 4; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
-  }
+  ARBORETUM_INLINE void prefetch(std::uint64_t node) const { prefetch_lines<4>(place_of(node)); }
 
   const std::byte* base_;
   const std::uint64_t root_;

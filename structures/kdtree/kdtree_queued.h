@@ -8,6 +8,7 @@
 #pragma once
 
 #include "structures/kdtree/kdtree_single.h"
+#include "traversal/prefetch.h"
 #include "traversal/queued_rays.h"
 
 namespace arboretum {
@@ -47,11 +48,7 @@ class KdQueuedWalk {
     return unsigned(leaf) + unsigned(node == kdtree::kEmptyCell);
   }
 
-  ARBORETUM_INLINE void prefetch(Target node) const {
-    constexpr int kLines = int((Leaves::kBytesAhead + 63 + 32) / 64);
-    const auto* at = reinterpret_cast<const char*>(place_of(node));
-    for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
-  }
+  ARBORETUM_INLINE void prefetch(Target node) const { prefetch_lines<lines_of(Leaves::kBytesAhead)>(place_of(node)); }
 
   ARBORETUM_INLINE Target node(State& s, Target node) const {
     Entry* top = s.top - 1;

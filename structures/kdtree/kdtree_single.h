@@ -40,18 +40,18 @@ struct KdRay {
 
   /// The constants of a lane's axis, or of one axis of a lane's ray. `largest` and `origin()`: the largest |component|
   /// of the ray's direction and origin; `pad`: kPad, or 0 for `fast` planes. Returns the lanes whose axis counts: where
-  /// constants may have overflown, or a parallel ray comes from so far that its pad is less than t
+  /// constants may have overflowed, or a parallel ray comes from so far that its pad is less than t
   /// (traversal/box_test.h), it is left out, with a reciprocal of 1 and constants by which every plane is met at all t.
   template <class F, class Origin>
   static ARBORETUM_INLINE auto constants(F o, F d, F largest, const Origin& origin, float max_coordinate, float pad,
                                          F& r, F& enter, F& leave) {
     r = F(1.0f) / d;
-    F share(pad), least(pad * 0x1p-79f);
+    F share(pad), least(pad * (BoxPad::kLeast / kPad));
     // Branches, rarely taken: no division waits for `largest`.
     const auto parallel = ~(abs(d) > largest * F(0x1p-60f));
     if (__builtin_expect(any(parallel), 0)) {
       r = select(parallel, xor_sign(F(0x1p60f) / largest, sign_bits(d)), r);
-      share = select(parallel, F(kPad), share), least = select(parallel, F(0x1p-100f), least);
+      share = select(parallel, F(kPad), share), least = select(parallel, F(BoxPad::kLeast), least);
     }
     // In this order, since a share of a tiny scene may be nothing. Where the product overflows the axis is left out, as
     // below.

@@ -4,6 +4,7 @@
 
 #include "structures/leaves/leaf_lists.h"
 #include "traversal/box_test.h"
+#include "traversal/prefetch.h"
 #include "traversal/queued_rays.h"
 
 namespace arboretum {
@@ -43,9 +44,7 @@ class ListedQueuedWalk {
   }
 
   ARBORETUM_INLINE void prefetch_leaf(LeafCode code) const {
-    constexpr int kLines = int((Leaves::kBytesAhead + 63 + 32) / 64);
-    const auto* at = reinterpret_cast<const char*>(blocks_of(store_.range(code)));
-    for (int line = 0; line < kLines; ++line) _mm_prefetch(at + 64 * line, _MM_HINT_T0);
+    prefetch_lines<lines_of(Leaves::kBytesAhead)>(blocks_of(store_.range(code)));
   }
 
   /// Returns whether the search ends: any hit has its answer. `State` has tnear beside what traversal/queued_rays.h

@@ -63,7 +63,8 @@ struct OctreeRay {
       : reciprocal(four(r.x, r.y, r.z, 0)), near_constant(four(f.x, f.y, f.z, 0)), far_constant(four(g.x, g.y, g.z, 0)),
         negative(reciprocal.as_int() < vi<4>(0)), octant(negative.bits() & 7u) {}
   template <bool Padded>
-  ARBORETUM_INLINE explicit OctreeRay(const BoxRay<8, Padded>& box) : OctreeRay(box.r, box.f, box.g) {}
+  ARBORETUM_INLINE explicit OctreeRay(const BoxRay<8, Padded>& box)
+      : OctreeRay(box.r, box.near_offset, box.far_offset) {}
   ARBORETUM_INLINE F near(F face) const { return plane_distance(face, reciprocal, near_constant); }
   ARBORETUM_INLINE F far(F face) const { return plane_distance(face, reciprocal, far_constant); }
 };

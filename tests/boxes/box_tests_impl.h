@@ -17,8 +17,8 @@ inline unsigned meets(box_test::Test test, const Ray& ray, float max_coordinate,
     return BoxLanes<8, true>(BoxRay<8, true>(ray, max_coordinate)).test(node, tnear, tfar, entry);
   const BoxPad pad{max_coordinate, true};
   BoxRays rays;
-  rays.prepare < kRegisterWidth<4 ? 4 : kRegisterWidth, 8>(
-                     1, [&](int) -> const Ray& { return ray; }, true, pad, [](int) {});
+  rays.prepare<kNativeWidth, 8>(
+      1, [&](int) -> const Ray& { return ray; }, true, pad, [](int) {});
   const auto first_of = [](const float(&of_axis)[3][BoxRays::kMost]) {
     return Vec3f{of_axis[0][0], of_axis[1][0], of_axis[2][0]};
   };
