@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/exact/exact_predicate.h"
 #include "core/names.h"
+#include "experiments/json_text.h"
 
 namespace arboretum {
 namespace {
@@ -162,7 +163,7 @@ class CaseReader {
 
 /// The file as JSON. A number beyond double ends the parser's work, so that no CaseReader sees it: it is told here,
 /// with the case.
-Json parse(const std::filesystem::path& file, std::istream& stream) {
+Json parse(const std::filesystem::path& file, const std::string& text) {
   constexpr int kInDocument = 1, kEntry = 2, kInEntry = 3;  // the parser's depths
   std::size_t number = 1;
   std::string id, list, key;
@@ -174,7 +175,7 @@ Json parse(const std::filesystem::path& file, std::istream& stream) {
     return true;
   };
   try {
-    return Json::parse(stream, watch);
+    return Json::parse(text, watch);
   } catch (const Json::out_of_range& e) {
     const std::string what = e.what(),
                       place = list == "cases" ? fmt::format(": case {}", id.empty() ? std::to_string(number) : id) : "";
@@ -182,8 +183,8 @@ Json parse(const std::filesystem::path& file, std::istream& stream) {
     throw UserError(
         fmt::format("{}{}: {} is beyond float32", file.string(), place,
                     quote == std::string::npos ? "a number" : what.substr(quote + 1, what.rfind('\'') - quote - 1)));
-  } catch (const Json::exception& e) {
-    throw UserError(fmt::format("{}: no JSON: {}", file.string(), e.what()));
+  } catch (const Json::parse_error& e) {
+    fail_syntax(file, text, e, "mend the line or the one above it");
   }
 }
 
@@ -198,9 +199,8 @@ std::string decimal(Vec3f p) { return fmt::format("[{},{},{}]", decimal(p.x), de
 }  // namespace
 
 std::vector<VerifyCase> read_case_file(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream) throw UserError(fmt::format("{}: no such file, or it cannot be read", file.string()));
-  const Json document = parse(file, stream);
+  if (!std::ifstream(file)) throw UserError(fmt::format("{}: no such file, or it cannot be read", file.string()));
+  const Json document = parse(file, read_text(file));
   if (!document.is_object() || !document.contains("cases") || !document["cases"].is_array() ||
       document["cases"].empty())
     throw UserError(

@@ -9,6 +9,15 @@ namespace {
 
 Json parse(const std::string& line) { return Json::parse(line, nullptr, false); }
 
+void refuse_damaged(const Json& line, const std::filesystem::path& file, std::size_t number) {
+  for (const char* key : {"name", "configuration_hash"})
+    if (!line.contains(key) || !line.at(key).is_string())
+      throw UserError(
+          fmt::format("{}:{}: not a line as `run` writes it: no {}; take the line out, and what it told "
+                      "is measured again",
+                      file.string(), number, key));
+}
+
 }  // namespace
 
 Journal::Journal(std::filesystem::path folder, std::string configuration_hash, const Plan& plan, bool resume)
@@ -19,17 +28,20 @@ Journal::Journal(std::filesystem::path folder, std::string configuration_hash, c
     for (const auto* list : {&plan.cells, &plan.elsewhere})
       for (const Cell& cell : *list) wanted.emplace(cell.name(), &cell);
     for (const auto& path : {cells, repetitions}) {
+      std::size_t number = 0;
       for (const std::string& text : read_lines(path)) {
         const Json line = parse(text);
+        ++number;
         if (!line.is_object()) continue;  // torn by a kill
-        const std::string hash = line.value("configuration_hash", "");
+        refuse_damaged(line, path, number);
+        const std::string hash = line.at("configuration_hash");
         if (hash != hash_) {
           throw UserError(
               fmt::format("{}: holds another configuration (hash {}, this one is {}); resume with the "
                           "command that began it, or choose another folder with --out",
-                          folder_.string(), hash.empty() ? "unknown" : hash, hash_));
+                          folder_.string(), hash, hash_));
         }
-        const auto found = wanted.find(line.value("name", ""));
+        const auto found = wanted.find(line.at("name").get<std::string>());
         if (found == wanted.end()) continue;
         if (path == cells) {
           if (auto result = parse_cell_line(line, *found->second, hash_))

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "experiments/json_text.h"
 
 namespace arboretum {
 namespace {
@@ -77,10 +78,11 @@ std::string to_text(const PlanRecord& record) {
 }
 
 std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) {
-  std::ifstream stream(folder / kPlanFile);
-  if (!stream) return std::nullopt;
+  const std::filesystem::path file = folder / kPlanFile;
+  if (!std::ifstream(file)) return std::nullopt;
+  const std::string text = read_text(file);
   try {
-    const Json json = Json::parse(stream);
+    const Json json = Json::parse(text);
     PlanRecord record;
     record.context = json.at("context");
     for (const Json& context : json.value("earlier_contexts", Json::array())) record.earlier.push_back(context);
@@ -90,9 +92,11 @@ std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) 
     record.geometry = json.value("geometry", record.geometry);
     record.cells = entries_of(json.at("cells")), record.skipped = entries_of(json.at("skipped"));
     return record;
-  } catch (const nlohmann::json::exception& e) {
-    throw UserError(fmt::format("{}: not the JSON that `run` writes ({}); copy the folder anew, or measure again",
-                                (folder / kPlanFile).string(), e.what()));
+  } catch (const nlohmann::json::parse_error& e) {
+    fail_syntax(file, text, e, "copy the folder anew, or measure again");
+  } catch (const nlohmann::json::exception&) {
+    throw UserError(
+        fmt::format("{}: not the plan that `run` writes; copy the folder anew, or measure again", file.string()));
   }
 }
 

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "experiments/append_file.h"
+#include "experiments/json_text.h"
 #include "experiments/results_writer.h"
 
 namespace arboretum {
@@ -51,11 +52,13 @@ std::vector<std::string> folders_in(const fs::path& path) {
 }
 
 Json read_json(const fs::path& path) {
-  std::ifstream stream(path);
-  if (!stream) throw UserError(fmt::format("{}: cannot be read; check its permissions", path.string()));
+  if (!std::ifstream(path)) throw UserError(fmt::format("{}: cannot be read; check its permissions", path.string()));
+  const std::string text = read_text(path);
   try {
-    Json document = Json::parse(stream);
+    Json document = Json::parse(text);
     if (document.is_object() && document.value("context", Json::object()).is_object()) return document;
+  } catch (const nlohmann::json::parse_error& e) {
+    fail_syntax(path, text, e, "copy the folder anew, or measure again");
   } catch (const nlohmann::json::exception&) {
   }
   throw UserError(

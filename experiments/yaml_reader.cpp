@@ -103,6 +103,8 @@ void YamlReader::check_map(const YAML::Node& node, std::string_view what, std::s
     if (!entry.first.IsScalar())
       fail(entry.first, fmt::format("{}: a key must be a word, not {}", what, shown(entry.first)));
     const std::string key = entry.first.Scalar();
+    if (key == "<<")
+      fail(entry.first, fmt::format("{}: merge keys (<<) are not read; write out the keys that it stands for", what));
     if (std::ranges::find(keys, key) == keys.end())
       fail(entry.first, unknown_name_message(fmt::format("key in {}", what), key, keys));
     if (!seen.insert(key).second) fail(entry.first, fmt::format("{}: '{}' is given twice; keep one", what, key));

@@ -5,6 +5,7 @@
 #include "experiments/interleave.h"
 #include "experiments/journal.h"
 #include "experiments/results_writer.h"
+#include "experiments/shell_words.h"
 #include "experiments/runner.h"
 #include "experiments/sampling.h"
 #include "experiments/summary.h"
@@ -87,6 +88,25 @@ TEST_CASE("the journal gives back what it was told, and refuses another configur
   CHECK(error_of([&] { Journal(folder.path, "other", plan, true); }).find("another configuration") !=
         std::string::npos);
   CHECK(Journal(folder.path, "other", plan, false).done().empty());
+}
+
+TEST_CASE("a damaged line of a journal is named by file and line") {
+  const Registry registry = paper_registry();
+  for (const char* line : {"{\"name\": 5, \"configuration_hash\": \"hash\"}", "{\"name\": \"x\"}", "{}"}) {
+    const TemporaryFolder folder;
+    const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+    Journal(folder.path, "hash", plan, false).finish(result_of(plan.cells[0]));
+    std::ofstream(folder.path / "cells.jsonl", std::ios::app) << line << "\n";
+    CHECK(error_of([&] { Journal(folder.path, "hash", plan, true); }).find("cells.jsonl:2: not a line as `run`") !=
+          std::string::npos);
+  }
+}
+
+TEST_CASE("words of a command line are quoted where a shell would read them otherwise, and read back") {
+  const std::vector<std::string> words{"run", "a.yaml", "isa=sse,avx2", "two words", "a|b", "it's", "", "$x", "\\d"};
+  CHECK(shell_line(words) == R"(run a.yaml isa=sse,avx2 'two words' 'a|b' 'it'\''s' '' '$x' '\d')");
+  CHECK(shell_split(shell_line(words)) == words);
+  CHECK(shell_split("a  b").size() == 2);
 }
 
 TEST_CASE("results.json has what Google Benchmark's compare.py reads; the verdict follows the answers") {
