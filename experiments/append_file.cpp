@@ -168,18 +168,16 @@ void require_writable(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(folder, ignored)) cannot_write(path, ENOTDIR);
 }
 
-void make_output_folder(const std::filesystem::path& folder) {
+void make_output_folder(const std::filesystem::path& folder, std::string_view what, std::string_view mend) {
   std::error_code error, ignored;
   const bool taken = std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored);
   if (!taken) std::filesystem::create_directories(folder, error);
   if (taken || !std::filesystem::is_directory(folder, ignored)) {
     const std::string why = taken ? "there is a file of that name" : error ? error.message() : "it vanished";
-    throw UserError(
-        fmt::format("{}: the output folder cannot be made: {}; choose another with --out", folder.string(), why));
+    throw UserError(fmt::format("{}: {} cannot be made: {}; {}", folder.string(), what, why, mend));
   }
   if (::access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
-    throw UserError(fmt::format("{}: the output folder cannot be used: {}; choose another with --out", folder.string(),
-                                std::strerror(errno)));
+    throw UserError(fmt::format("{}: {} cannot be used: {}; {}", folder.string(), what, std::strerror(errno), mend));
   }
   const std::filesystem::path probe = folder / ".arboretum-probe";
   const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);

@@ -40,7 +40,9 @@ void write_whole(const std::filesystem::path& path, std::string_view text);
 void flush_output();
 /// Throws UserError where write_whole could not write to `path`, as far as can be seen without writing.
 void require_writable(const std::filesystem::path& path);
-/// Creates the folder, if need be, and tries whether files can be made in it. Throws UserError.
-void make_output_folder(const std::filesystem::path& folder);
+/// Creates the folder, if need be, and tries whether files can be made in it. Throws UserError: `what` cannot be,
+/// `mend`.
+void make_output_folder(const std::filesystem::path& folder, std::string_view what = "the output folder",
+                        std::string_view mend = "choose another with --out");
 
 }  // namespace arboretum

@@ -12,6 +12,7 @@
 #include "experiments/folder_lock.h"
 #include "experiments/plotting.h"
 #include "experiments/results_writer.h"
+#include "experiments/shell_words.h"
 
 namespace arboretum {
 namespace {
@@ -74,10 +75,11 @@ void print_missing(const MergeCommand& command, const Merged& merged) {
   if (merged.missing.size() > kMostNamed)
     fmt::print("  and {} more: `missing` in results.json\n", merged.missing.size() - kMostNamed);
   const auto option = [](const char* name, const std::string& value) {
-    return value.empty() ? "" : fmt::format(" {} '{}'", name, value);
+    return value.empty() ? "" : fmt::format(" {} {}", name, shell_word(value));
   };
-  fmt::print("to measure them: arboretum run {} --resume --out {}{}{}\n", (command.out / "effective.yaml").string(),
-             command.out.string(), option("--filter", merged.record.filter), option("--skip", merged.record.skip));
+  fmt::print("to measure them: arboretum run {} --resume --out {}{}{}\n",
+             shell_word((command.out / "effective.yaml").string()), shell_word(command.out.string()),
+             option("--filter", merged.record.filter), option("--skip", merged.record.skip));
 }
 
 }  // namespace

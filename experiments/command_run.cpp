@@ -32,12 +32,15 @@
 namespace arboretum {
 namespace {
 
+constexpr std::size_t kMostNamed = 10;
+
 double total_seconds(const Experiment& experiment, const Plan& plan) {
   const std::vector<double> seconds = estimate_seconds(experiment, plan.cells);
   return std::accumulate(seconds.begin(), seconds.end(), 0.0);
 }
 
-ExitStatus print_list(const Plan& plan) {
+ExitStatus print_list(const Experiment& experiment, const Plan& plan) {
+  for (const std::string& line : experiment.left_out) fmt::print(stderr, "{}\n", line);
   for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.name());
   return ExitStatus::kDone;
 }
@@ -45,6 +48,12 @@ ExitStatus print_list(const Plan& plan) {
 ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
   for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.name());
   for (const SkippedCell& cell : plan.skipped) fmt::print("{}  skipped: {}\n", cell.name, cell.reason);
+  for (std::size_t i = 0; i < std::min(plan.excluded_includes.size(), kMostNamed); ++i)
+    fmt::print("{}\n", plan.excluded_includes[i]);
+  if (plan.excluded_includes.size() > kMostNamed)
+    fmt::print("and {} more cells of `include` that `exclude` takes away\n",
+               plan.excluded_includes.size() - kMostNamed);
+  for (const std::string& line : experiment.left_out) fmt::print("{}\n", line);
   const std::string others = plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "";
   fmt::print("\n{} cells, {} skipped,{} {} excluded, {} filtered out; about {}\n", plan.cells.size(),
              plan.skipped.size(), others, plan.excluded, plan.filtered,
@@ -75,6 +84,16 @@ LoadedScene require_scenes(const Experiment& experiment, const Plan& plan,
   }
   if (wanted > 1) loaded.data.reset();
   return loaded;
+}
+
+/// While measuring, a structure that cannot be kept is only noted.
+void require_structure_cache(const Experiment& experiment) {
+  if (experiment.measure.structure_cache.empty()) return;
+  try {
+    make_output_folder(experiment.measure.structure_cache, "the structure cache", "name another folder");
+  } catch (const UserError& e) {
+    throw UserError(fmt::format("{}: {}", experiment.structure_cache_where, e.what()));
+  }
 }
 
 void refuse_other_configuration(const std::filesystem::path& folder, const std::string& hash) {
@@ -213,11 +232,8 @@ void set_aside(const std::filesystem::path& folder) {
 /// What --benchmark_context says of the run goes into the context, beside what is there already and will be.
 void add_custom_context(Json& context, const BenchmarkFlags& flags) {
   for (const auto& [key, value] : flags.context) {
-    for (const char* later :
-         {"shard", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"})
-      if (key == later)
-        throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
-    if (context.contains(key))
+    const bool later = std::ranges::any_of(kLaterContextKeys, [&key = key](const char* k) { return key == k; });
+    if (later || context.contains(key))
       throw UserError(fmt::format("--benchmark_context: the context has a '{}' of its own; choose another key", key));
     context[key] = value;
   }
@@ -234,6 +250,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   add_custom_context(context, command.benchmark);
   if (!command.no_plots && command.benchmark.format == "console") require_chosen_python();
   LoadedScene loaded = require_scenes(experiment, plan, record.geometry);
+  require_structure_cache(experiment);
   make_output_folder(folder);
   const FolderLock lock(folder, "give another --out");
   if (command.resume) {
@@ -256,6 +273,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   for (const Json& earlier : record.earlier)
     std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
   write_whole(folder / kPlanFile, to_text(record));
+  for (const std::string& line : experiment.left_out) fmt::print(stderr, "{}\n", line);
   fmt::print(stderr, "{}: {} cells ({} done before), {} skipped{}; about {}\n", experiment.name, plan.cells.size(),
              journal.done().size(), plan.skipped.size(),
              shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
@@ -314,7 +332,7 @@ ExitStatus command_run(RunCommand command) {
   PlanRecord record = record_of(plan, shards, shard);
   record.filter = filter, record.skip = skip;
   if (!shard.is_whole()) keep_shard(plan, shards, shard.index);
-  if (command.list || command.benchmark.list) return print_list(plan);
+  if (command.list || command.benchmark.list) return print_list(experiment, plan);
   if (command.dry_run) return print_dry_run(experiment, plan);
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));

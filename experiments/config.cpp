@@ -100,7 +100,7 @@ class ConfigReader {
   }
 
   std::vector<CellChoice> read_choices(const YAML::Node& node, std::string_view what) {
-    if (!node.IsSequence() || node.size() == 0) {
+    if (!node.IsSequence()) {
       yaml_.fail(node, fmt::format("{} must be a list of maps, as in {}: [{{structure: embree}}]", what, what));
     }
     std::vector<CellChoice> choices;
@@ -109,9 +109,6 @@ class ConfigReader {
       choice.where = yaml_.where(entry);
       choice.axes = read_axes(entry, what, true, &choice);
       if (entry.size() == 0) yaml_.fail(entry, fmt::format("{}: an entry names no axis", what));
-      if (what == "include" && choice.axes[index_of(Axis::structure)].empty()) {
-        yaml_.fail(entry, "include: an entry names its structure, as in {structure: embree, builder: medium}");
-      }
       choices.push_back(std::move(choice));
     }
     return choices;
@@ -177,8 +174,10 @@ class ConfigReader {
     if (const auto n = map["threads"]) threads_ = std::to_string(yaml_.integer(n, "threads", 1, kMaxThreads));
     if (const auto n = map["memory"]) m.memory = yaml_.bytes(n, "memory");
     if (const auto n = map["seed"]) m.seed = yaml_.integer(n, "seed", 0, ~std::uint64_t{0});
-    if (const auto n = map["structure_cache"])
+    if (const auto n = map["structure_cache"]) {
       m.structure_cache = experiment_.file.parent_path() / yaml_.text(n, "structure_cache");
+      experiment_.structure_cache_where = yaml_.where(n);
+    }
     if (const auto n = map["resolution"]) {
       if (!n.IsSequence() || n.size() != 2) yaml_.fail(n, "resolution must be [width, height], as in [512, 512]");
       m.width = static_cast<unsigned>(yaml_.integer(n[0], "resolution: width", 1, 32768));
@@ -211,8 +210,10 @@ class ConfigReader {
         throw UserError(fmt::format("--threads: an integer from 1 to {}, not {}", kMaxThreads, *overrides.threads));
       }
       axis(Axis::threads) = {std::to_string(*overrides.threads)};
+      given_.push_back(Axis::threads);
       experiment_.overridden = true;
     }
+    restrict_includes();
     if (overrides.repetitions) experiment_.measure.repetitions = *overrides.repetitions;
     if (overrides.seed) experiment_.measure.seed = *overrides.seed;
     if (overrides.min_warmup_time) experiment_.measure.min_warmup_time = *overrides.min_warmup_time;
@@ -222,10 +223,46 @@ class ConfigReader {
   void apply_axis(const std::string& word) {
     auto [key, values] = read_axis_word(word, registry_, {"scene"});
     experiment_.overridden = true;
-    if (key == "scene")
-      choose_scenes(values);
-    else
-      axis(*parse_axis(key)) = values;
+    if (key == "scene") return choose_scenes(values);
+    axis(*parse_axis(key)) = values;
+    given_.push_back(*parse_axis(key));
+  }
+
+  /// What the command line names of an axis holds for `include` too: of an entry's own values those stay that it names.
+  void restrict_includes() {
+    std::erase_if(experiment_.include, [&](CellChoice& choice) {
+      std::string_view none;
+      for (Axis a : given_) {
+        std::vector<std::string>& named = choice.axes[index_of(a)];
+        if (named.empty()) continue;
+        named = common_values(named, axis(a));
+        if (named.empty()) none = to_string(a);
+      }
+      if (std::erase_if(choice.scenes, [&](const std::string& word) { return !has_scene(word); }) > 0 &&
+          choice.scenes.empty())
+        none = "scene";
+      if (none.empty()) return false;
+      experiment_.left_out.push_back(
+          fmt::format("{}: this include is left out: the command line names no {} of it", choice.where, none));
+      return true;
+    });
+  }
+
+  bool has_scene(const std::string& word) const {
+    return std::ranges::any_of(experiment_.scenes, [&](const SceneChoice& s) { return s.is_called(word); });
+  }
+
+  /// `all` stands for every builder.
+  static std::vector<std::string> common_values(const std::vector<std::string>& named,
+                                                const std::vector<std::string>& given) {
+    const auto has = [](const std::vector<std::string>& list, std::string_view value) {
+      return std::ranges::find(list, value) != list.end();
+    };
+    if (has(given, kAll)) return named;
+    if (has(named, kAll)) return given;
+    std::vector<std::string> both;
+    std::ranges::copy_if(named, std::back_inserter(both), [&](const std::string& value) { return has(given, value); });
+    return both;
   }
 
   /// A scene on the command line is one of the configuration's by its name, or any other that the word names.
@@ -264,6 +301,7 @@ class ConfigReader {
   const Registry& registry_;
   Experiment experiment_;
   std::string threads_ = "1";
+  std::vector<Axis> given_;  ///< by the command line
 };
 
 }  // namespace

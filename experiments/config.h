@@ -76,6 +76,9 @@ struct Experiment {
   MeasureSettings measure;
   Metrics metrics;
   std::vector<std::string> plots;
+  std::string structure_cache_where = {};  ///< file:line of measure.structure_cache
+  /// A line for each entry of `include` of which the command line's axes leave no cell.
+  std::vector<std::string> left_out = {};
   bool overridden = false;  ///< the command line changed an axis: an exclude may then match nothing
 };
 

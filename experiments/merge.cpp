@@ -6,9 +6,10 @@
 #include <fstream>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "core/error.h"
+#include "experiments/results_writer.h"
+#include "experiments/shell_words.h"
 #include "experiments/summary.h"
 
 namespace arboretum {
@@ -106,22 +107,23 @@ void refuse_doubled_cells(const std::vector<ResultFolder>& parts) {
 
 /// The command without what made it a part of the whole.
 std::string whole_command(const std::string& command) {
-  std::istringstream stream(command);
+  const std::vector<std::string> words = shell_split(command);
   std::vector<std::string> kept;
-  for (std::string word; stream >> word;) {
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
     if (word == "--shard" || word == "--out") {
-      stream >> word;
+      ++i;
     } else if (word != "--resume" && !word.starts_with("--shard=") && !word.starts_with("--out=")) {
       kept.push_back(word);
     }
   }
-  return fmt::format("{}", fmt::join(kept, " "));
+  return shell_line(kept);
 }
 
 Json merged_context(const std::vector<ResultFolder>& parts, const std::string& command) {
   Json context = parts.front().context;
   if (!context.is_object()) context = Json::object();
-  for (const char* key : {"shard", "warnings", "cells", "skipped_cells", "missing_cells"}) context.erase(key);
+  for (const char* key : kLaterContextKeys) context.erase(key);
   std::set<std::string> commands;
   Json from = Json::array();
   for (const ResultFolder& part : parts) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/missing_isa.h"
 #include "experiments/name_filter.h"
 #include "experiments/why_impossible.h"
 #include "rendering/workload.h"
@@ -147,7 +148,7 @@ class Planner {
   std::string lacking(const Cell& cell) const {
     const std::string& missing = experiment_.scenes[cell.scene_index].missing;
     if (!missing.empty()) return missing;
-    return registry_.has(cell.isa) ? "" : fmt::format("no {}", to_string(cell.isa));
+    return registry_.has(cell.isa) ? "" : missing_isa_reason(cell.isa);
   }
 
   static bool names_scene(const CellChoice& choice, const SceneChoice& scene) {
@@ -180,13 +181,16 @@ class Planner {
   void add(Cell cell, std::vector<Cell>& out) {
     const StructureEntry* entry = registry_.structure(cell.structure);
     resolve(cell, entry);
+    if (!experiment_.metrics.trace) cell.metric = Cell::Metric::build;
     for (std::size_t i = 0; i < experiment_.exclude.size(); ++i) {
       if (!matches(experiment_.exclude[i], cell)) continue;
       used_excludes_.insert(i);
       ++plan_.excluded;
+      if (include_)
+        plan_.excluded_includes.push_back(fmt::format("{}  excluded: {} takes away what {} adds", cell.name(),
+                                                      experiment_.exclude[i].where, include_->where));
       return;
     }
-    if (!experiment_.metrics.trace) cell.metric = Cell::Metric::build;
     std::string name = cell.name();
     if (!names_.insert(name).second) return;
     ++added_;
@@ -207,12 +211,31 @@ class Planner {
     if (never.empty()) elsewhere_.push_back(std::move(cell));
   }
 
+  /// The structures that an include means. Where it names none they are those of the sweep that take a builder and a
+  /// leaf that it names; where none does, all, so that the reason is seen.
+  std::vector<std::string> structures_of(const CellChoice& choice) const {
+    const auto& named = choice.axes[index_of(Axis::structure)];
+    if (!named.empty()) return named;
+    std::vector<std::string> taking = experiment_.axes[index_of(Axis::structure)];
+    std::erase_if(taking, [&](const std::string& structure) {
+      const StructureEntry* entry = registry_.structure(structure);
+      const auto takes = [&](Axis axis, const std::vector<std::string_view>& taken) {
+        const auto& values = choice.axes[index_of(axis)];
+        return values.empty() || std::ranges::any_of(values, [&](const std::string& v) {
+                 return v == kAuto || v == kAll || std::ranges::find(taken, v) != taken.end();
+               });
+      };
+      return entry && !(takes(Axis::builder, entry->info.builders) && takes(Axis::leaf, entry->info.leaves));
+    });
+    return taking.empty() ? experiment_.axes[index_of(Axis::structure)] : taking;
+  }
+
   /// Axes that an include does not name take the sweep's values where they apply: a builder, leaf or
   /// traversal that the structure does not take gives way to its own default.
   void add_include(std::size_t index, std::size_t scene, std::vector<Cell>& out) {
     const CellChoice& choice = experiment_.include[index];
     if (!names_scene(choice, experiment_.scenes[scene])) return;
-    for (const std::string& structure : choice.axes[index_of(Axis::structure)]) {
+    for (const std::string& structure : structures_of(choice)) {
       AxisLists lists = choice.axes;
       lists[index_of(Axis::structure)] = {structure};
       const StructureEntry* entry = registry_.structure(structure);
@@ -231,7 +254,9 @@ class Planner {
       }
       const std::size_t before = added_;
       const std::size_t excluded_before = plan_.excluded;
+      include_ = &choice;
       product(scene, lists, out);
+      include_ = nullptr;
       if (added_ > before || plan_.excluded > excluded_before) used_includes_.insert(index);
     }
   }
@@ -299,6 +324,7 @@ class Planner {
   std::map<std::array<std::string, 4>, bool> reads_;  ///< of parameter, structure, builder, below
   std::set<std::size_t> used_includes_, used_excludes_;
   std::size_t added_ = 0;
+  const CellChoice* include_ = nullptr;  ///< the one whose cells are being added
 };
 
 }  // namespace

@@ -15,6 +15,8 @@ struct Plan {
   std::size_t excluded = 0;         ///< by the configuration's `exclude`
   std::size_t filtered = 0;         ///< by --filter and --skip
   std::size_t in_other_shards = 0;  ///< by --shard
+  /// Cells of `include` that `exclude` takes away, a line for each: name, and which entries.
+  std::vector<std::string> excluded_includes = {};
   /// Cells that a machine with more instruction sets, or with the optional scenes, would measure. The trace cells of
   /// them are among `skipped`.
   std::vector<Cell> elsewhere;

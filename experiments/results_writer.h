@@ -14,6 +14,10 @@ struct ResultForm {
   std::string time_unit = "ms";  ///< ns, us, ms or s
 };
 
+/// What the context is given after the machine's: the shard, and by results_json() what the run came to.
+inline constexpr const char* kLaterContextKeys[] = {
+    "shard", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"};
+
 /// `context`, `benchmarks` (every cell's repetitions, then its aggregates) `skipped` (name and reason)
 /// and, of a merge that lacks some, `missing`.
 [[nodiscard]] std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context,

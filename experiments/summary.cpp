@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "core/missing_isa.h"
 #include "experiments/sampling.h"
 #include "experiments/table_text.h"
 
@@ -32,6 +33,14 @@ const CellResult* embree_beside(const CellResult& r, const std::vector<CellResul
   return best;
 }
 
+/// Of one pass of each repetition, wall time.
+std::vector<double> milliseconds(const CellResult& r) {
+  std::vector<double> all;
+  for (const Repetition& rep : r.repetitions)
+    all.push_back(1e3 * rep.wall_seconds / static_cast<double>(rep.iterations));
+  return all;
+}
+
 std::optional<double> build_milliseconds(const CellResult& r, const std::vector<CellResult>& all) {
   for (const CellResult& other : all) {
     const Cell &a = r.cell, &b = other.cell;
@@ -39,10 +48,7 @@ std::optional<double> build_milliseconds(const CellResult& r, const std::vector<
         a.leaf != b.leaf || a.isa != b.isa || a.threads != b.threads) {
       continue;
     }
-    std::vector<double> seconds;
-    for (const Repetition& rep : other.repetitions)
-      seconds.push_back(rep.wall_seconds / static_cast<double>(rep.iterations));
-    return median(seconds) * 1e3;
+    return median(milliseconds(other));
   }
   return std::nullopt;
 }
@@ -90,10 +96,7 @@ std::string build_table(const std::vector<CellResult>& all) {
       {"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %", "Mtri/s", "bytes/tri", "SAH"}};
   for (const CellResult& r : all) {
     if (r.is_trace()) continue;
-    std::vector<double> ms;
-    for (const Repetition& rep : r.repetitions)
-      ms.push_back(1e3 * rep.wall_seconds / static_cast<double>(rep.iterations));
-    const Interval time = bootstrap_median(ms);
+    const Interval time = bootstrap_median(milliseconds(r));
     const Cell& c = r.cell;
     rows.push_back({c.scene, c.structure, c.builder_name(), c.leaf, std::string(to_string(c.isa)),
                     std::to_string(c.threads), fmt::format("{:.2f}", time.median),
@@ -175,7 +178,7 @@ std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan&
   std::set<std::string> lacking;
   for (const SkippedCell& cell : plan.skipped)
     for (Isa isa : kAllIsas)
-      if (cell.reason == fmt::format("no {}", to_string(isa))) lacking.insert(std::string(to_string(isa)));
+      if (cell.reason == missing_isa_reason(isa)) lacking.insert(std::string(to_string(isa)));
   for (const std::string& isa : lacking)
     warnings.push_back(fmt::format("this machine (or ARBORETUM_ISA) has no {}: its cells are skipped", isa));
   return warnings;

@@ -83,7 +83,8 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [{catalogue: bunny, triangles: 100}]\n", ":1", "no effect without generate"},
       {"scenes: [bunny]\nmetrics: [trace, accuracy]\nplots: [leak_picture]\n", ":3",
        "leak_picture has no data: it shows the workload camera_edges"},
-      {"scenes: [bunny]\ninclude: [{builder: morton}]\n", ":2", "names its structure"},
+      {"scenes: [bunny]\ninclude: [{builder: nought}]\n", ":2", "unknown builder"},
+      {"scenes: [bunny]\nmeasure: {<<: {}, seed: 1}\n", ":2", "merge keys (<<) are not read"},
       {"scenes: [bunny]\nexclude: {structure: tree}\n", ":2", "must be a list of maps"},
       {"scenes: [bunny]\nexclude: [{scene: dragon}]\n", ":2", "unknown scene"},
       {"scenes: [bunny]\nexperiment: ../up\n", ":2", "names a folder"},
@@ -255,6 +256,53 @@ metrics: [trace]
             "trace/sphere-500/tree/morton/triangle8/moller_trumbore/padded/single/sse/primary/threads:1"});
   CHECK(plan.excluded == 1);
   CHECK(names(plan, Cell::Metric::build).empty());
+}
+
+TEST_CASE("an include without a structure is of the sweep's structures that take what it names") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const std::string sweep =
+      "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree, list], intersector: moller_trumbore, "
+      "isa: "
+      "sse}\nmetrics: [trace]\nexclude: []\n";
+  const auto added = [&](const std::string& include) {
+    return names(make_plan(read_experiment(folder.write("plan.yaml", sweep + include), registry), registry),
+                 Cell::Metric::trace);
+  };
+  CHECK(added("include: []").size() == 2);
+  CHECK(added("include: [{builder: morton}]").size() == 3);  // list has no morton
+  const std::vector<std::string> more = added("include: [{isa: scalar}]");
+  REQUIRE(more.size() == 4);
+  CHECK(more[3].find("/list/none/triangle4/moller_trumbore/fast/single/scalar/") != std::string::npos);
+}
+
+TEST_CASE(
+    "axes of the command line hold for includes too; what is left without a cell is told, as what exclude takes") {
+  const TemporaryFolder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("plan.yaml", R"(scenes: [{generate: sphere, triangles: 500}]
+axes: {structure: [tree], intersector: moller_trumbore, isa: [scalar, sse, avx2]}
+include:
+  - {structure: list, isa: [sse, avx2]}
+  - {structure: tree, builder: morton, isa: avx2}
+exclude: [{structure: list, isa: sse}]
+metrics: [trace]
+)");
+  const auto read = [&](std::vector<std::string> axes) {
+    return read_experiment(file, registry, {.axes = std::move(axes)});
+  };
+  CHECK(names(make_plan(read({}), registry), Cell::Metric::trace).size() == 5);
+  const Experiment one = read({"isa=sse"});
+  const Plan plan = make_plan(one, registry);
+  REQUIRE(names(plan, Cell::Metric::trace).size() == 1);
+  REQUIRE(one.left_out.size() == 1);
+  CHECK(one.left_out[0].find("plan.yaml:5: this include is left out: the command line names no isa of it") !=
+        std::string::npos);
+  REQUIRE(plan.excluded_includes.size() == 1);
+  CHECK(plan.excluded_includes[0].find("/list/none/triangle4/moller_trumbore/fast/single/sse/") != std::string::npos);
+  CHECK(plan.excluded_includes[0].find("plan.yaml:6 takes away what ") != std::string::npos);
+  CHECK(read({"structure=tree"}).left_out.size() == 1);
+  CHECK(read({"builder=all"}).left_out.empty());
 }
 
 TEST_CASE(

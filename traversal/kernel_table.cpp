@@ -4,6 +4,7 @@
 #include <map>
 #include <tuple>
 
+#include "core/missing_isa.h"
 #include "core/error.h"
 #include "intersectors/blocks.h"
 #include "structures/leaves/leaf_form.h"
@@ -151,7 +152,7 @@ std::string_view default_leaf(std::string_view structure, std::string_view inter
 std::string why_no_kernel(std::string_view structure, std::string_view leaf, std::string_view intersector,
                           std::string_view box, std::string_view traversal, Isa isa) {
   if (find_kernel(structure, leaf, intersector, box, traversal, isa)) return {};
-  if (!cpu_supports(isa)) return "no " + std::string(to_string(isa));
+  if (!cpu_supports(isa)) return missing_isa_reason(isa);
   const std::string s(structure), l(leaf), i(intersector), b(box), t(traversal), a(to_string(isa));
   if (!any_row(structure, "", "", "", "", nullptr)) return "no kernels for " + s;
   if (!any_row(structure, "", "", "", "", &isa)) return s + " has no " + a + " kernels";
