@@ -119,6 +119,8 @@ BenchmarkFlags take_benchmark_flags(std::vector<std::string>& words) {
       throw UserError(fmt::format("{} has no effect: {}; take it out", flag, why));
     if (std::ranges::find(known, flag) == known.end())
       throw UserError(unknown_name_message("flag of Google Benchmark", flag, known));
+    if (equals != std::string::npos && value.empty())
+      throw UserError(fmt::format("{} has an empty value; give one, or leave it out", flag));
     if (!given.insert(flag).second) throw UserError(fmt::format("{} is given twice; keep one", flag));
     if (flag == "--benchmark_repetitions")
       flags.repetitions = number<unsigned>(flag, value, 1, 100000);

@@ -2,7 +2,9 @@
 #include "experiments/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -18,6 +20,7 @@
 #include "experiments/append_file.h"
 #include "experiments/build_info.h"
 #include "experiments/commands.h"
+#include "experiments/shell_words.h"
 
 namespace arboretum {
 namespace {
@@ -41,6 +44,24 @@ std::string refuse_no_count(const std::string& word) {
   return error == std::errc{} && end == word.data() + word.size()
              ? ""
              : fmt::format("'{}' is no whole number from 0 to {}", word, ~std::uint64_t{0});
+}
+
+/// CLI11's own ranges let NaN through, which then compares with nothing.
+auto number_from_to(double low, double high) {
+  return [low, high](const std::string& word) -> std::string {
+    double number = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+    const bool whole = error == std::errc{} && end == word.data() + word.size();
+    return whole && number >= low && number <= high ? ""
+                                                    : fmt::format("'{}' is no number from {} to {}", word, low, high);
+  };
+}
+
+std::string refuse_not_positive(const std::string& word) {
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  const bool whole = error == std::errc{} && end == word.data() + word.size();
+  return whole && number > 0.0 ? "" : fmt::format("'{}' is no number above 0", word);
 }
 
 void declare_run(CLI::App& app, RunCommand& run) {
@@ -83,10 +104,10 @@ void declare_compare(CLI::App& app, CompareCommand& compare) {
   c->add_option("B", compare.b, "The result folder compared (after)")->required();
   c->add_option("--min-difference", compare.options.min_difference,
                 "Smallest difference of speed that counts, in per cent (default 3)")
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(number_from_to(0.0, 1000.0));
   c->add_option("--significance", compare.options.significance,
                 "Share of false findings among the findings at most (default 0.05)")
-      ->check(CLI::Range(1e-6, 0.5));
+      ->check(number_from_to(1e-6, 0.5));
   c->add_option(
       "--control", compare.options.control,
       "Cells whose code did not change, by a regular expression (/embree/): speeds are taken relative to theirs");
@@ -152,7 +173,7 @@ void declare_render(CLI::App& app, RenderCommand& render) {
   c->add_option("--clamp", render.clamp,
                 "Most light that one path brings at once from beyond its first hit: fewer bright specks, some light "
                 "lost (default: none)")
-      ->check(CLI::PositiveNumber);
+      ->check(refuse_not_positive);
   c->add_option("--exposure", render.exposure,
                 "auto, or stops: radiance 1 is white at 0 (default auto; of ambient_occlusion and normals 0)");
   c->add_option("--seed", render.settings.seed, "Seed of the random numbers (default 1)")->check(refuse_no_count);
@@ -201,6 +222,15 @@ std::vector<std::string> command_names(const CLI::App& app) {
   return names;
 }
 
+/// Of a word cut short, what it begins is meant.
+std::string unknown_option(const std::string& word, const std::vector<std::string>& options) {
+  std::vector<std::string> begun;
+  std::ranges::copy_if(options, std::back_inserter(begun), [&](const std::string& o) { return o.starts_with(word); });
+  if (begun.empty() || word == "--") return unknown_name_message("option", word, options);
+  return fmt::format("unknown option '{}'; did you mean '{}'? (valid: {})", word, fmt::join(begun, "' or '"),
+                     fmt::join(options, " "));
+}
+
 void refuse_extras(const CLI::App& command) {
   for (const std::string& word : command.remaining()) {
     if (!word.starts_with("-"))
@@ -210,15 +240,28 @@ void refuse_extras(const CLI::App& command) {
     for (const CLI::Option* option : command.get_options({})) {
       for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
     }
-    throw UserError(fmt::format("{}: {}", command.get_name(),
-                                unknown_name_message("option", word.substr(0, word.find('=')), options)));
+    throw UserError(fmt::format("{}: {}", command.get_name(), unknown_option(word.substr(0, word.find('=')), options)));
   }
+}
+
+/// `--out ''` would mean what leaving --out away means.
+void refuse_empty_values(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options({}))
+    if (option->get_name() != "--shard" && std::ranges::find(option->results(), "") != option->results().end())
+      throw UserError(
+          fmt::format("{}: {} has an empty value; give one, or leave it out", command.get_name(), option->get_name()));
+}
+
+/// The command line without --resume, which would repeat nothing of what was measured.
+std::string repeatable(std::vector<std::string> words) {
+  std::erase_if(words, [](const std::string& word) { return word == "--resume" || word.starts_with("--resume="); });
+  return "arboretum " + shell_line(words);
 }
 
 ExitStatus dispatch(std::vector<std::string> words) {
   Arguments a;
   a.render.settings.threads = 0;
-  a.run.command_line = a.merge.command_line = fmt::format("arboretum {}", fmt::join(words, " "));
+  a.run.command_line = a.merge.command_line = repeatable(words);
   CLI::App app("Arboretum: a research testbed of ray-tracing acceleration structures", "arboretum");
   declare(app, a);
   const std::vector<std::string> commands = command_names(app);
@@ -244,6 +287,7 @@ ExitStatus dispatch(std::vector<std::string> words) {
   const auto used = app.get_subcommands();
   if (used.empty()) throw UserError(fmt::format("no command; one of {}", fmt::join(commands, ", ")));
   refuse_extras(*used.front());
+  refuse_empty_values(*used.front());
   const std::string name = used.front()->get_name();
   if (name == "run") return command_run(std::move(a.run));
   if (name == "merge") return command_merge(a.merge);
@@ -267,9 +311,24 @@ int fail(std::string message) {
   return static_cast<int>(ExitStatus::kUsage);
 }
 
+std::string why_no_output(const std::error_code& code) {
+  if (code == std::errc::bad_file_descriptor) return "stdout is closed; leave it open, or send it to a file";
+  const bool full = code == std::errc::no_space_on_device || code == std::errc::file_too_large;
+  return fmt::format("{}; {}", code.message(), full ? "free some space or write elsewhere" : "write elsewhere");
+}
+
+/// A closed one of the three would be given to the next file that is opened, and what is printed would go there. To
+/// what takes its place nothing can be written but to stderr's.
+void fill_closed_descriptors() {
+  for (int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(descriptor, F_GETFD) < 0)
+      static_cast<void>(::open("/dev/null", descriptor == STDERR_FILENO ? O_WRONLY : O_RDONLY));
+}
+
 }  // namespace
 
 int command_line(int argc, char** argv) {
+  fill_closed_descriptors();
   std::signal(SIGXFSZ, SIG_IGN);  // a file-size limit is told by the failing write, not by a signal
   std::signal(SIGPIPE, SIG_IGN);
   try {
@@ -283,7 +342,7 @@ int command_line(int argc, char** argv) {
     return fail("out of memory; lower the number of triangles or the resolution");
   } catch (const std::system_error& e) {
     if (e.code() == std::errc::broken_pipe) return kReaderLeft;
-    return fail(fmt::format("output cannot be written: {}; free some space or write elsewhere", e.code().message()));
+    return fail(fmt::format("output cannot be written: {}", why_no_output(e.code())));
   } catch (const std::exception& e) {
     return fail(fmt::format("internal error: {}; please report it with the command line", e.what()));
   }

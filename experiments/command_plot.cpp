@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "core/names.h"
+#include "experiments/axis_words.h"
 #include "experiments/commands.h"
 #include "experiments/config_plots.h"
 #include "experiments/plotting.h"
@@ -39,6 +40,7 @@ ExitStatus command_plot(const std::filesystem::path& results, const std::vector<
   for (const std::string& figure : figures) {
     if (std::ranges::find(known, figure) == known.end()) throw UserError(unknown_name_message("plot", figure, known));
   }
+  refuse_doubled("plot: --only", figures);
   const std::string problem = draw_plots(results, figures.empty() ? figures_of(results) : figures, false);
   if (!problem.empty()) throw UserError(problem);
   return ExitStatus::kDone;

@@ -7,10 +7,14 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "core/names.h"
 #include "core/timer.h"
 #include "experiments/append_file.h"
+#include "experiments/axis_words.h"
 #include "experiments/commands.h"
 #include "experiments/progress.h"
 #include "rendering/heat_map.h"
@@ -38,6 +42,15 @@ void set_resolution(const std::string& word, const Camera& camera, RenderSetting
   if (cross == std::string::npos || !read(std::string_view(word).substr(0, cross), settings.width) ||
       !read(std::string_view(word).substr(cross + 1), settings.height))
     throw UserError(fmt::format("--resolution '{}' is no WIDTHxHEIGHT, as in 640x480", word));
+  if (settings.width == 0 || settings.height == 0)
+    throw UserError(fmt::format("--resolution {}: width and height must each be 1 or more, as in 640x480", word));
+}
+
+void refuse_doubled_effects(const std::string& list) {
+  std::vector<std::string> names;
+  std::istringstream stream(list);
+  for (std::string name; std::getline(stream, name, ',');) names.push_back(name);
+  refuse_doubled("--effects", names);
 }
 
 bool draws_light(Integrator integrator) { return integrator == Integrator::path || integrator == Integrator::whitted; }
@@ -185,6 +198,7 @@ void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSet
 ExitStatus command_render(const RenderCommand& command) {
   const std::filesystem::path out = command.out.empty() ? "image.png" : command.out;
   check_picture_path(out);
+  refuse_doubled_effects(command.effects);
   static_cast<void>(parse_exposure(command.exposure, Integrator::path));  // before the scene is read
   const Scene scene = load_scene(parse_scene_word(command.scene));
   const std::vector<Effect> effects = effects_of(scene);

@@ -13,6 +13,7 @@
 #include "core/names.h"
 #include "core/timer.h"
 #include "experiments/append_file.h"
+#include "experiments/axis_words.h"
 #include "experiments/case_file.h"
 #include "experiments/commands.h"
 #include "experiments/config_scenes.h"
@@ -55,6 +56,8 @@ class Verify {
       if (std::abs(exponent) > 120)
         throw UserError(fmt::format("verify: --scale {} is an exponent of two, -120 to 120", exponent));
     for (const std::string& kind : command.kinds) (void)kind_of(kind);
+    refuse_doubled("verify: --kinds", command.kinds);
+    refuse_doubled("verify: --offset", command.offsets), refuse_doubled("verify: --scale", command.scales);
   }
 
   ExitStatus run() {
@@ -281,7 +284,11 @@ class Verify {
     if (!cases_.empty()) fmt::print("\n{}", document);
     if (!command_.out.empty()) {
       write_whole(command_.out / "verify.csv", verify_csv(cells_, variants_));
-      if (!cases_.empty()) write_whole(command_.out / "cases.json", document);
+      std::error_code ignored;
+      if (!cases_.empty())
+        write_whole(command_.out / "cases.json", document);
+      else
+        std::filesystem::remove(command_.out / "cases.json", ignored);  // of a run before
       fmt::print("\n{}\n", (command_.out / "verify.csv").string());
     }
     if (untested > 0)

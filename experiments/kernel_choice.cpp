@@ -37,6 +37,18 @@ const StructureEntry& chosen_structure(const std::string& name, const TriangleMe
   return *entry;
 }
 
+/// The mend where there is no kernel.
+std::string what_is_possible(std::string_view structure, Isa isa, const Registry& registry) {
+  std::vector<std::string_view> isas;
+  for (Isa other : registry.isas)
+    if (std::ranges::any_of(registry.kernels,
+                            [&](const KernelRow& row) { return row.structure == structure && row.isa == other; }))
+      isas.push_back(to_string(other));
+  if (isas.empty() || std::ranges::find(isas, to_string(isa)) != isas.end())
+    return "choose another --structure, --leaf, --intersector, --box, --traversal or --isa";
+  return fmt::format("possible with --structure {}: --isa {}", structure, fmt::join(isas, ", "));
+}
+
 }  // namespace
 
 std::string BuiltKernel::name() const {
@@ -65,7 +77,8 @@ BuiltKernel build_kernel(const KernelChoice& choice, const TriangleMesh& mesh, c
     built.kernel = registry.kernel(info.name, leaf, intersector, box, traversal = "single", isa);
   if (!built.kernel) {
     const std::string why = registry.why_no_kernel(info.name, leaf, intersector, box, traversal, isa);
-    throw UserError(why.empty() ? "no such kernel in this build" : why);
+    throw UserError(fmt::format("{}; {}", why.empty() ? "no such kernel in this build" : why,
+                                what_is_possible(info.name, isa, registry)));
   }
   const std::vector<std::string_view>& builders = below ? below->info.builders : info.builders;
   built.builder = choice.builder == kAuto && !builders.empty() ? std::string(builders.front()) : choice.builder;

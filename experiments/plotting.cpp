@@ -6,6 +6,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <system_error>
 
@@ -18,18 +20,34 @@ extern char** environ;
 namespace arboretum {
 namespace {
 
-/// Exit status, or -1 when the program could not be started or died.
-int run_program(std::vector<std::string> words, bool quiet_out, bool quiet_error) {
+std::string read_all(int descriptor) {
+  std::string text;
+  char part[4096];
+  for (;;) {
+    const ssize_t got = ::read(descriptor, part, sizeof part);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return text;
+    text.append(part, static_cast<std::size_t>(got));
+  }
+}
+
+/// Exit status, or -1 when the program could not be started or died. What it writes to stderr goes to `errors`.
+int run_program(std::vector<std::string> words, bool quiet_out, std::string& errors) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   if (quiet_out) posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  if (quiet_error) posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) return posix_spawn_file_actions_destroy(&actions), -1;
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
   pid_t pid = 0;
   const int error = ::posix_spawnp(&pid, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
+  ::close(ends[1]);
+  if (error == 0) errors = read_all(ends[0]);
+  ::close(ends[0]);
   int status = 0;
   if (error != 0 || ::waitpid(pid, &status, 0) != pid || !WIFEXITED(status)) return -1;
   return WEXITSTATUS(status);
@@ -48,6 +66,14 @@ std::string python_problem() {
       chosen_python());
 }
 
+/// Of a script's stderr: its `error: …`, or how Python ends a trace.
+std::string last_line(std::string text) {
+  while (text.ends_with('\n')) text.pop_back();
+  text.erase(0, text.rfind('\n') + 1);
+  constexpr std::string_view kHead = "error: ";
+  return text.starts_with(kHead) ? text.substr(kHead.size()) : text;
+}
+
 /// Runs a script of plots/ with its arguments. One line that says why not, or empty.
 std::string run_script(const char* name, const std::vector<std::string>& arguments, bool quiet) {
   const std::filesystem::path script = data_folder() / "plots" / name;
@@ -58,8 +84,11 @@ std::string run_script(const char* name, const std::vector<std::string>& argumen
     return "no plots: no python3 here has matplotlib; apt-get install python3-matplotlib, then `plot` the results";
   std::vector<std::string> words{*python, script.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
-  const int status = run_program(words, quiet, false);
-  return status == 0 ? "" : fmt::format("no plots: {} ended with status {}", name, status);
+  std::string errors;
+  const int status = run_program(words, quiet, errors);
+  if (status == 0) return fmt::print(stderr, "{}", errors), "";
+  const std::string why = last_line(errors);
+  return fmt::format("no plots: {}", why.empty() ? fmt::format("{} ended with status {}", name, status) : why);
 }
 
 }  // namespace
@@ -70,7 +99,8 @@ std::optional<std::string> find_plot_python() {
   for (const std::string& python : candidates) {
     const char* kTry =
         "import sys, importlib.util as u; sys.exit(not (u.find_spec('matplotlib') and u.find_spec('numpy')))";
-    if (run_program({python, "-c", kTry}, true, true) == 0) return python;
+    std::string ignored;
+    if (run_program({python, "-c", kTry}, true, ignored) == 0) return python;
   }
   return std::nullopt;
 }
@@ -80,8 +110,9 @@ void require_chosen_python() {
 }
 
 std::string draw_plots(const std::filesystem::path& results, const std::vector<std::string>& figures, bool quiet) {
-  std::vector<std::string> words{results.string()};
-  if (!figures.empty()) words.insert(words.end(), {"--only", fmt::format("{}", fmt::join(figures, ","))});
+  std::vector<std::string> words;
+  if (!figures.empty()) words = {"--only", fmt::format("{}", fmt::join(figures, ","))};
+  words.insert(words.end(), {"--", results.string()});  // whose name may begin with a dash
   return run_script("plot.py", words, quiet);
 }
 

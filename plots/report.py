@@ -100,6 +100,15 @@ def facts(context):
     return found
 
 
+def without_resume(command):
+    """Results of older revisions have --resume in their command, which would measure nothing anew."""
+    try:
+        words = shlex.split(command)
+    except ValueError:  # of an older revision, not quoted
+        return command
+    return shlex.join(word for word in words if word != "--resume") if "--resume" in words else command
+
+
 def reproduce(results):
     context = results.context
     parts = []
@@ -108,7 +117,7 @@ def reproduce(results):
         command = shlex.join(str(c) for c in command)
     revision = context.get("git_revision") or context.get("revision")
     lines = [f"git checkout {revision}"] if revision and revision != "unknown" else []
-    command = str(command or "arboretum run effective.yaml")
+    command = without_resume(str(command or "arboretum run effective.yaml"))
     lines.append(f"./{command}" if command.startswith("arboretum ") else command)
     parts.append(f"<pre>{escape(chr(10).join(lines))}</pre>")
     if str(context.get("git_dirty", context.get("dirty", ""))).lower() in ("true", "1", "yes"):

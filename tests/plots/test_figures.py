@@ -195,6 +195,11 @@ class Drawing(unittest.TestCase):
         for revision, told in (("unknown", False), ("", False), ("abc", True)):
             self.assertEqual("git checkout" in report.reproduce(load(Folder(whole(), {"git_revision": revision}).path)), told)
 
+    def test_what_is_repeated_is_measured_anew(self):
+        for command, shown in (("arboretum run a.yaml --resume --filter 'a|b'", "./arboretum run a.yaml --filter &#x27;a|b&#x27;"),
+                               ("arboretum run a.yaml --filter it's --resume", "./arboretum run a.yaml --filter it&#x27;s --resume")):
+            self.assertIn(f"{shown}</pre>", report.reproduce(load(Folder(whole(), {"command": command}).path)))
+
     def test_report_is_well_formed_and_escaped(self):
         evil = "<script>alert(1)</script>&\"'"
         folder = Folder(everything() + [trace(evil)], {"experiment": PUBLISHED, "cpu": evil, "warnings": [evil], "command": f"./arboretum run {evil}", "git_revision": "abc"},
