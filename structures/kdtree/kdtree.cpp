@@ -12,6 +12,7 @@
 #include "structures/archive.h"
 #include "structures/kdtree/builders.h"
 #include "structures/kdtree/emit.h"
+#include "structures/leaves/block_padding.h"
 
 namespace arboretum::kdtree {
 namespace {
@@ -74,7 +75,9 @@ void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, Buil
     arena_ = std::move(layout.arena), root_ = layout.root, depth_ = layout.depth;
     tbb::parallel_for(std::size_t{0}, layout.leaves.size(), [&](std::size_t i) {
       const LeafPlan& leaf = layout.leaves[i];
-      fill_blocks(reinterpret_cast<Block*>(arena_.data() + leaf.offset), mesh, {leaf.ids, leaf.count});
+      auto* blocks = reinterpret_cast<Block*>(arena_.data() + leaf.offset);
+      fill_blocks(blocks, mesh, {leaf.ids, leaf.count});
+      clear_padding(blocks, (leaf.count + unsigned(Block::kWidth) - 1) / unsigned(Block::kWidth));
     });
     report.phases.emplace_back("leaves", wall_seconds() - start);
   });
