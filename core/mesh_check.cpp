@@ -22,8 +22,10 @@ void check_frames(const TriangleMesh& mesh) {
   }
 }
 
+bool is_allowed(Vec3f p, Largest largest) { return largest == Largest::finite ? is_finite(p) : is_in_range(p); }
+
 /// `of`: what the mesh is, for messages.
-void check_triangles_of(const TriangleMesh& mesh, const std::string& of) {
+void check_triangles_of(const TriangleMesh& mesh, const std::string& of, Largest largest) {
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const Triangle t = mesh.triangles[i];
     for (std::uint32_t vertex : {t.a, t.b, t.c}) {
@@ -32,10 +34,12 @@ void check_triangles_of(const TriangleMesh& mesh, const std::string& of) {
                         number(mesh.vertices.size()) + "; indices count from 0");
       }
       for (std::size_t k = 0; k < mesh.frames(); ++k) {
-        if (is_in_range(mesh.frame(k)[vertex])) continue;
+        if (is_allowed(mesh.frame(k)[vertex], largest)) continue;
         throw UserError(of + "triangle " + number(i) + ": vertex " + number(vertex) +
                         (k == 0 ? "" : " of key frame " + number(k)) +
-                        " is not finite or beyond 2^40; drop such triangles or scale the mesh");
+                        (largest == Largest::finite ? " is not finite; drop such triangles"
+                                                    : " is not finite or beyond 2^40; drop such triangles or scale "
+                                                      "the mesh"));
       }
     }
   }
@@ -47,7 +51,7 @@ double determinant(const AffineMap& map) {
          m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
 }
 
-bool is_finite(const AffineMap& map) {
+bool has_finite_numbers(const AffineMap& map) {
   for (const auto& row : map.m)
     for (const double x : row)
       if (!std::isfinite(x)) return false;
@@ -68,16 +72,16 @@ bool is_image(const AffineMap& map, Vec3f object, Vec3f flat) {
   return true;
 }
 
-void check_prototypes(const std::vector<TriangleMesh>& prototypes) {
+void check_prototypes(const std::vector<TriangleMesh>& prototypes, Largest largest) {
   for (std::size_t k = 0; k < prototypes.size(); ++k) {
     if (prototypes[k].moves() || prototypes[k].instancing)
       throw UserError("prototype " + number(k) + " moves or has instances itself; it can do neither");
-    check_triangles_of(prototypes[k], "prototype " + number(k) + ": ");
+    check_triangles_of(prototypes[k], "prototype " + number(k) + ": ", largest);
   }
 }
 
 void check_map(const AffineMap& map, const std::string& of) {
-  if (!is_finite(map)) throw UserError(of + "has a map with a number that is not finite; give it finite ones");
+  if (!has_finite_numbers(map)) throw UserError(of + "has a map with a number that is not finite; give it finite ones");
   if (const double d = determinant(map); !std::isfinite(d) || d == 0.0)
     throw UserError(of + "has a map whose determinant is 0 or not finite; it flattens what it places");
 }
@@ -98,15 +102,15 @@ void check_place(const TriangleMesh& mesh, const TriangleMesh& prototype, const 
 
 }  // namespace
 
-void check_triangles(const TriangleMesh& mesh) {
+void check_triangles(const TriangleMesh& mesh, Largest largest) {
   check_frames(mesh);
-  check_triangles_of(mesh, "");
+  check_triangles_of(mesh, "", largest);
 }
 
-void check_instances(const TriangleMesh& mesh) {
+void check_instances(const TriangleMesh& mesh, Largest largest) {
   if (!mesh.instancing) return;
   const Instancing& instancing = *mesh.instancing;
-  check_prototypes(instancing.prototypes);
+  check_prototypes(instancing.prototypes, largest);
   const auto name = [](std::size_t k) { return "instance " + number(k) + " "; };
   std::size_t next = 0;
   for (std::size_t k = 0; k < instancing.instances.size(); ++k) {

@@ -112,6 +112,8 @@ TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle
 
 Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
     : mesh_(std::make_unique<const TriangleMesh>(std::move(mesh))), settings_(std::move(settings)) {
+  check_triangles(*mesh_);
+  check_instances(*mesh_);
   settings_.structure = std::string(resolve_structure(settings_.structure, mesh_->moves()));
   const StructureEntry* entry = find_structure(settings_.structure);
   if (!entry) {
@@ -119,7 +121,6 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
     for (const StructureEntry& e : all_structures()) names.push_back(e.info.name);
     check_name("structure", settings_.structure, names);
   }
-  if (!entry->info.takes_below) check_instances(*mesh_);  // of the others building asks it
   if (is_auto(settings_.builder)) settings_.builder = default_builder(entry->info, settings_.parameters);
   if (settings_.threads == 0) settings_.threads = std::max(1u, std::thread::hardware_concurrency());
   batch_ = &resolve_kernel(settings_);

@@ -71,12 +71,12 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   check("leaf", settings.leaf, entry->info.leaves);
 
   check_parameters(settings.parameters);
-  check_triangles(mesh);
+  check_triangles(mesh, Largest::finite);
   if (mesh.moves() && !entry->info.holds_motion) {
     throw UserError(std::string(name) + " holds one moment, and the mesh has " + std::to_string(mesh.frames()) +
                     " key frames: take bvh4_motion, or pose(mesh, time)");
   }
-  if (entry->info.takes_below) check_instances(mesh);
+  if (entry->info.takes_below) check_instances(mesh, Largest::finite);
 
   std::unique_ptr<Accel> accel = entry->create();
   report = {};

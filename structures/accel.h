@@ -148,8 +148,8 @@ struct StructureEntry {
 [[nodiscard]] const StructureEntry* find_structure(std::string_view name);
 /// Creates and builds, filling in the report's seconds and peak. Throws UserError for a name or setting that is not one
 /// of the structure's, for a builder parameter out of its limits (structures/parameter_limits.h), for a mesh that moves
-/// where the structure holds one moment, and, before the clock starts, for what check_triangles() refuses, and
-/// check_instances() where the structure takes instances (core/mesh_check.h).
+/// where the structure holds one moment, and, before the clock starts, for what check_triangles() refuses of any finite
+/// mesh, and check_instances() where the structure takes instances (core/mesh_check.h).
 [[nodiscard]] std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh,
                                                      const BuildSettings& settings, BuildReport& report);
 
