@@ -6,6 +6,19 @@
 #include "core/error.h"
 
 namespace arboretum {
+namespace {
+
+/// No name of ours is nearly as long, nor near to one that is.
+constexpr std::size_t kLongestName = 100;
+
+std::string shortened(std::string_view name) {
+  if (name.size() <= kLongestName) return std::string(name);
+  std::size_t end = kLongestName;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xc0) == 0x80) --end;  // within a UTF-8 character
+  return std::string(name.substr(0, end)) + "... (" + std::to_string(name.size()) + " characters)";
+}
+
+}  // namespace
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
@@ -40,7 +53,8 @@ std::string close_name(std::string_view name, std::span<const std::string> candi
 
 std::string unknown_name_message(std::string_view kind, std::string_view name,
                                  std::span<const std::string> candidates) {
-  std::string message = "unknown " + std::string(kind) + " '" + std::string(name) + "'";
+  std::string message = "unknown " + std::string(kind) + " '" + shortened(name) + "'";
+  name = name.substr(0, kLongestName);
   if (candidates.empty()) return message;
   const std::string close = close_name(name, candidates);
   message += close.empty() ? " (valid:" : "; did you mean '" + close + "'? (valid:";

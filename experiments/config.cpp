@@ -228,11 +228,14 @@ class ConfigReader {
     given_.push_back(*parse_axis(key));
   }
 
-  /// What the command line names of an axis holds for `include` too: of an entry's own values those stay that it names.
+  /// What the command line says of the rays and the machine (isa, workload, threads, scene) holds for `include` too: of
+  /// an entry's own values those stay that it names. What an entry is there for, its structure, builder, leaf,
+  /// intersector, boxes and traversal, are its own.
   void restrict_includes() {
     std::erase_if(experiment_.include, [&](CellChoice& choice) {
       std::string_view none;
       for (Axis a : given_) {
+        if (a != Axis::isa && a != Axis::workload && a != Axis::threads) continue;
         std::vector<std::string>& named = choice.axes[index_of(a)];
         if (named.empty()) continue;
         named = common_values(named, axis(a));

@@ -6,7 +6,7 @@
 #include <charconv>
 #include <span>
 
-#include "structures/bvh/bvh.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum {
 namespace {
@@ -26,8 +26,6 @@ struct Field {
   [[nodiscard]] unsigned& of(Parameters& all) const { return setting ? all.traversal.*setting : all.builder.*integer; }
 };
 
-constexpr std::string_view kCollapses[] = {"optimal", "greedy"};
-constexpr unsigned kMortonBits[] = {30, 63};
 constexpr std::string_view kOwn = "auto";  ///< the builder's or the way of traversal's own choice
 static_assert(BuilderParameters::kOwn == TraversalSettings::kOwn);
 
@@ -43,31 +41,64 @@ std::span<const std::string_view> structure_names() {
 
 const std::vector<Field>& fields() {
   static const std::vector<Field> table{
-      {.name = "bins", .low = 4, .high = 64, .integer = &BuilderParameters::bins},
-      {.name = "traversal_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::traversal_cost},
-      {.name = "intersection_cost", .low = 1e-3, .high = 1e3, .real = &BuilderParameters::intersection_cost},
+      {.name = "bins",
+       .low = kBuilderLimits.bins.low,
+       .high = kBuilderLimits.bins.high,
+       .integer = &BuilderParameters::bins},
+      {.name = "traversal_cost",
+       .low = kBuilderLimits.traversal_cost.low,
+       .high = kBuilderLimits.traversal_cost.high,
+       .real = &BuilderParameters::traversal_cost},
+      {.name = "intersection_cost",
+       .low = kBuilderLimits.intersection_cost.low,
+       .high = kBuilderLimits.intersection_cost.high,
+       .real = &BuilderParameters::intersection_cost},
       {.name = "max_leaf_blocks",
-       .low = 1,
-       .high = bvh::kMaxLeafBlocks,
+       .low = kBuilderLimits.max_leaf_blocks.low,
+       .high = kBuilderLimits.max_leaf_blocks.high,
        .integer = &BuilderParameters::max_leaf_blocks},
       {.name = "morton_bits",
-       .low = 30,
-       .high = 63,
+       .low = kBuilderLimits.morton_bits.low,
+       .high = kBuilderLimits.morton_bits.high,
        .integer = &BuilderParameters::morton_bits,
        .choices = kMortonBits},
-      {.name = "ploc_radius", .low = 1, .high = 128, .integer = &BuilderParameters::ploc_radius},
-      {.name = "duplication_budget", .low = 0, .high = 4, .real = &BuilderParameters::duplication_budget},
-      {.name = "spatial_overlap", .low = 0, .high = 1, .real = &BuilderParameters::spatial_overlap},
-      {.name = "spatial_gain", .low = 0.01, .high = 1, .real = &BuilderParameters::spatial_gain},
-      {.name = "reinsertion_rounds", .low = 1, .high = 64, .integer = &BuilderParameters::reinsertion_rounds},
+      {.name = "ploc_radius",
+       .low = kBuilderLimits.ploc_radius.low,
+       .high = kBuilderLimits.ploc_radius.high,
+       .integer = &BuilderParameters::ploc_radius},
+      {.name = "duplication_budget",
+       .low = kBuilderLimits.duplication_budget.low,
+       .high = kBuilderLimits.duplication_budget.high,
+       .real = &BuilderParameters::duplication_budget},
+      {.name = "spatial_overlap",
+       .low = kBuilderLimits.spatial_overlap.low,
+       .high = kBuilderLimits.spatial_overlap.high,
+       .real = &BuilderParameters::spatial_overlap},
+      {.name = "spatial_gain",
+       .low = kBuilderLimits.spatial_gain.low,
+       .high = kBuilderLimits.spatial_gain.high,
+       .real = &BuilderParameters::spatial_gain},
+      {.name = "reinsertion_rounds",
+       .low = kBuilderLimits.reinsertion_rounds.low,
+       .high = kBuilderLimits.reinsertion_rounds.high,
+       .integer = &BuilderParameters::reinsertion_rounds},
       {.name = "reinsertion_top",
-       .low = 0,
-       .high = 65536,
+       .low = kBuilderLimits.reinsertion_top.low,
+       .high = kBuilderLimits.reinsertion_top.high,
        .integer = &BuilderParameters::reinsertion_top,
        .has_own = true},
-      {.name = "empty_bonus", .low = 0, .high = 0.95, .real = &BuilderParameters::empty_bonus},
-      {.name = "max_depth", .low = 0, .high = 63, .integer = &BuilderParameters::max_depth},
-      {.name = "grid_density", .low = 0.01, .high = 64, .real = &BuilderParameters::grid_density},
+      {.name = "empty_bonus",
+       .low = kBuilderLimits.empty_bonus.low,
+       .high = kBuilderLimits.empty_bonus.high,
+       .real = &BuilderParameters::empty_bonus},
+      {.name = "max_depth",
+       .low = kBuilderLimits.max_depth.low,
+       .high = kBuilderLimits.max_depth.high,
+       .integer = &BuilderParameters::max_depth},
+      {.name = "grid_density",
+       .low = kBuilderLimits.grid_density.low,
+       .high = kBuilderLimits.grid_density.high,
+       .real = &BuilderParameters::grid_density},
       {.name = "below", .low = 0, .high = 0, .word = &BuilderParameters::below, .words = structure_names()},
       {.name = "collapse", .low = 0, .high = 0, .word = &BuilderParameters::collapse, .words = kCollapses},
       {.name = "hybrid_threshold", .low = 0, .high = 16, .setting = &TraversalSettings::hybrid_threshold},

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/mesh_check.h"
 #include "core/names.h"
-#include "library/mesh_check.h"
 #include "traversal/kernel_keys.h"
 
 namespace arboretum {
@@ -47,6 +47,12 @@ std::vector<Isa> allowed_isas(const TracerSettings& s) {
     throw UserError(line);
   }
   return {*isa};
+}
+
+/// The first of the structure's; of one that stands above others the first that the one below has.
+std::string_view default_builder(const StructureInfo& info, const BuilderParameters& parameters) {
+  const StructureEntry* below = info.takes_below ? find_structure(parameters.below) : nullptr;
+  return below ? below->info.builders.front() : info.builders.front();
 }
 
 void check_sizes(const RayBatch& rays, std::size_t answers) {
@@ -106,7 +112,8 @@ TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle
 
 Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
     : mesh_(std::make_unique<const TriangleMesh>(std::move(mesh))), settings_(std::move(settings)) {
-  check_mesh(*mesh_);
+  check_triangles(*mesh_);
+  check_instances(*mesh_);
   settings_.structure = std::string(resolve_structure(settings_.structure, mesh_->moves()));
   const StructureEntry* entry = find_structure(settings_.structure);
   if (!entry) {
@@ -114,7 +121,7 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
     for (const StructureEntry& e : all_structures()) names.push_back(e.info.name);
     check_name("structure", settings_.structure, names);
   }
-  if (is_auto(settings_.builder)) settings_.builder = entry->info.builders.front();
+  if (is_auto(settings_.builder)) settings_.builder = default_builder(entry->info, settings_.parameters);
   if (settings_.threads == 0) settings_.threads = std::max(1u, std::thread::hardware_concurrency());
   batch_ = &resolve_kernel(settings_);
   const auto row_or_batch = [&](const std::string& traversal) {

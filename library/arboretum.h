@@ -35,7 +35,7 @@ namespace arboretum {
 /// boxes.
 struct TracerSettings {
   std::string structure = "bvh8";
-  std::string builder = {};  ///< `auto`: the structure's first
+  std::string builder = {};  ///< `auto`: the structure's first, of two_level the first of what stands below it
   std::string leaf = {};     ///< `auto`: the block that suits structure, intersector and instruction set
   std::string intersector = "watertight";
   std::string box = "padded";
@@ -52,10 +52,13 @@ struct TracerSettings {
 class Tracer {
  public:
   /// Builds. Throws UserError for a key that does not exist (naming the nearest), for keys that do not go together, for
-  /// an instruction set that the machine lacks, and for an invalid mesh: an index beyond the vertices, a vertex of
-  /// a triangle that in some key frame is not finite or beyond kMaxCoordinate (2^40), key frames of different lengths,
-  /// instances that do not lay out their prototypes one after the other. An empty mesh is none of these: every ray
-  /// misses it.
+  /// an instruction set that the machine lacks, for a builder parameter out of the command line's limits
+  /// (structures/parameter_limits.h), and for an invalid mesh: an index beyond the vertices, a vertex of a triangle
+  /// that in some key frame is not finite or beyond kMaxCoordinate (2^40), key frames of different lengths, instances
+  /// that do not lay out their prototypes one after the other or whose maps are not finite, flatten, or put a corner
+  /// elsewhere than the mesh has it (core/mesh_check.h); of two_level also a map that takes its prototype's box beyond
+  /// float. An empty mesh is none of these: every ray misses it. Nor is an instance without triangles, which takes no
+  /// part.
   explicit Tracer(TriangleMesh mesh, TracerSettings settings = {});
 
   /// The nearest hit within the closed interval [tnear, tfar], t in units of the direction's length. A miss has t =

@@ -52,7 +52,7 @@ Scene read_model(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
   if (extension == ".obj") return read_obj(path);
   if (extension == ".ply") return read_ply(path);
-  check_header(path, extension);
+  check_before_assimp(path, extension);
   return read_assimp(path);
 }
 

@@ -1,5 +1,6 @@
 // Preflight: refuses files whose headers promise more than they hold, for formats where assimp would ask for
-// the memory first: a few damaged bytes could otherwise take all of a machine's.
+// the memory first (a few damaged bytes could otherwise take all of a machine's), and what assimp reads past or never
+// ends with.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +8,7 @@
 
 namespace arboretum {
 
-/// `extension` in lower case, with its dot. Formats other than .off and .glb pass. Throws UserError.
-void check_header(const std::filesystem::path& path, std::string_view extension);
+/// `extension` in lower case, with its dot. Formats other than .off, .gltf, .glb and .vrm pass. Throws UserError.
+void check_before_assimp(const std::filesystem::path& path, std::string_view extension);
 
 }  // namespace arboretum

@@ -1,10 +1,12 @@
 // OBJ through tinyobjloader's callback interface: no intermediate copy, and the text of the line at hand
-// stays in reach. tinyobjloader reads `nan` and `inf` as 0, rounds some decimals wrongly and wraps indices
-// beyond 32 bits; so coordinates are read again here from the line itself, and faces with over-long numbers
-// are refused.
+// stays in reach. tinyobjloader reads `nan` and `inf` as 0, rounds some decimals wrongly, wraps indices beyond
+// 32 bits, cuts them at a decimal point and takes a comment behind a face for corners; so coordinates and
+// faces are read again here from the line itself. Lines that a backslash continues are put together before.
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <istream>
 #include <map>
 #include <optional>
@@ -27,7 +29,8 @@ namespace {
 /// it.
 class MappedBuffer : public std::streambuf {
  public:
-  explicit MappedBuffer(std::string_view text) {
+  explicit MappedBuffer(std::string_view text) : whole_(joined(text)), original_(text.data()) {
+    if (!whole_.empty()) text = whole_;
     char* p = const_cast<char*>(text.data());
     setg(p, p, p + text.size());
   }
@@ -41,9 +44,40 @@ class MappedBuffer : public std::streambuf {
     return {begin, std::size_t(end - begin)};
   }
   [[nodiscard]] std::size_t line_number() const {
-    return 1 + std::size_t(std::count(static_cast<const char*>(eback()), line().data(), '\n'));
+    return 1 + std::size_t(std::count(original_, original_ + (line().data() - eback()), '\n'));
   }
+
+ private:
+  /// As long as the text, with blanks in place of each backslash and the end of line behind it; empty where there is
+  /// none.
+  static std::string joined(std::string_view text) {
+    std::string whole;
+    for (std::size_t at = text.find('\\'); at != std::string_view::npos; at = text.find('\\', at + 1)) {
+      const std::size_t end = text.substr(at + 1).starts_with("\r\n") ? 3 : 2;
+      if (at + end > text.size() || text[at + end - 1] != '\n') continue;
+      if (whole.empty()) whole = text;
+      std::fill_n(whole.begin() + std::ptrdiff_t(at), end, ' ');
+    }
+    return whole;
+  }
+
+  std::string whole_;
+  const char* original_;
 };
+
+/// A corner of a face as it is written: from 1 on, or from -1 down; 0 where there is none.
+struct ObjCorner {
+  std::int64_t vertex = 0, texture = 0;
+};
+
+/// The next word of a line, taken off its front; empty at its end or before a comment.
+std::string_view next_word(std::string_view& line) {
+  line.remove_prefix(std::min(line.size(), line.find_first_not_of(" \t\r")));
+  if (line.starts_with('#')) line = {};
+  const std::string_view word = line.substr(0, line.find_first_of(" \t\r#"));
+  line.remove_prefix(word.size());
+  return word;
+}
 
 struct ObjReader {
   const std::filesystem::path& path;
@@ -53,6 +87,7 @@ struct ObjReader {
   std::set<std::string> libraries, unknown_materials;  // those told of
   bool library_missing = false;
   std::optional<std::uint16_t> material, default_material;
+  std::vector<ObjCorner> written;  // of the face at hand
   std::vector<std::uint32_t> corners;
   std::vector<std::array<float, 2>> texture_vertices, texture_corners;
   std::size_t short_faces = 0;
@@ -84,26 +119,37 @@ struct ObjReader {
     scene.mesh.vertices.push_back(v);
   }
 
-  void check_number_lengths() const {
-    std::size_t digits = 0;
-    for (const char c : buffer.line()) {
-      digits = c >= '0' && c <= '9' ? digits + 1 : 0;
-      if (digits > 9) fail("a face index is out of range");
+  /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+  [[nodiscard]] ObjCorner corner(std::string_view word) const {
+    std::int64_t index[3] = {};
+    const char *p = word.data(), *const end = p + word.size();
+    for (unsigned i = 0; i < 3; ++i) {
+      if (i > 0 && p != end && *p == '/') ++p;
+      if (p != end && *p == '+') ++p;
+      const auto [next, error] = std::from_chars(p, end, index[i]);
+      if (error == std::errc::result_out_of_range) fail("a face index is out of range");
+      if ((error != std::errc{} && i == 0) || (next != end && *next != '/')) break;
+      if ((p = next) == end) return {index[0], index[1]};
     }
+    fail(fmt::format("'{}' is no corner of a face; write 'v', 'v/vt', 'v//vn' or 'v/vt/vn'", one_line(word)));
   }
 
-  void add_face(const tinyobj::index_t* indices, int count) {
-    check_number_lengths();
+  [[nodiscard]] std::uint32_t vertex_of(std::int64_t index) const {
     const auto vertices = std::int64_t(scene.mesh.vertices.size());
-    corners.clear();
-    for (int i = 0; i < count; ++i) {
-      const std::int64_t index = indices[i].vertex_index;
-      const std::int64_t vertex = index > 0 ? index - 1 : vertices + index;
-      if (index == 0 || vertex < 0 || vertex >= vertices) {
-        fail(fmt::format("face index {} is out of range: {} vertices precede it, so valid are 1 to {} and -1 to -{}",
-                         index, vertices, vertices, vertices));
-      }
-      corners.push_back(std::uint32_t(vertex));
+    const std::int64_t vertex = index > 0 ? index - 1 : vertices + index;
+    if (index != 0 && vertex >= 0 && vertex < vertices) return std::uint32_t(vertex);
+    if (vertices == 0) fail(fmt::format("face index {} is out of range: no vertex precedes it", index));
+    fail(fmt::format("face index {} is out of range: {} vertices precede it, so valid are 1 to {} and -1 to -{}", index,
+                     vertices, vertices, vertices));
+  }
+
+  void add_face() {
+    std::string_view line = buffer.line();
+    (void)next_word(line);  // the `f`
+    written.clear(), corners.clear();
+    for (std::string_view word = next_word(line); !word.empty(); word = next_word(line)) {
+      written.push_back(corner(word));
+      corners.push_back(vertex_of(written.back().vertex));
     }
     if (corners.size() < 3) {
       ++short_faces;
@@ -111,18 +157,18 @@ struct ObjReader {
     }
     scene.report.polygons_split += corners.size() > 3;
     triangulate(corners, scene.mesh.vertices, scene.mesh.triangles);
-    if (!texture_vertices.empty()) add_texture_coordinates(indices);
+    if (!texture_vertices.empty()) add_texture_coordinates();
     if (scene.mesh.triangles.size() >= kNoTriangle) fail("more than 2^32 - 2 triangles");
     if (!material) use_default_material();
     scene.mesh.materials.resize(scene.mesh.triangles.size(), *material);
   }
 
   /// Of the triangles that the face has just become; a corner without any has (0, 0).
-  void add_texture_coordinates(const tinyobj::index_t* indices) {
+  void add_texture_coordinates() {
     texture_corners.assign(corners.size(), {0.0f, 0.0f});
     const auto known = std::int64_t(texture_vertices.size());
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      const std::int64_t index = indices[i].texcoord_index;
+      const std::int64_t index = written[i].texture;
       const std::int64_t vertex = index > 0 ? index - 1 : known + index;
       if (index == 0) continue;
       if (vertex < 0 || vertex >= known)
@@ -230,9 +276,7 @@ Scene read_obj(const std::filesystem::path& path) {
   callback.texcoord_cb = [](void* self, tinyobj::real_t u, tinyobj::real_t v, tinyobj::real_t) {
     static_cast<ObjReader*>(self)->texture_vertices.push_back({float(u), float(v)});
   };
-  callback.index_cb = [](void* self, tinyobj::index_t* indices, int count) {
-    static_cast<ObjReader*>(self)->add_face(indices, count);
-  };
+  callback.index_cb = [](void* self, auto...) { static_cast<ObjReader*>(self)->add_face(); };
   callback.usemtl_cb = [](void* self, const char*, int) {
     auto& r = *static_cast<ObjReader*>(self);
     r.use_material(argument(r.buffer.line(), 6));

@@ -7,8 +7,10 @@
 
 #include "core/error.h"
 #include "core/memory_meter.h"
+#include "core/mesh_check.h"
 #include "core/names.h"
 #include "core/timer.h"
+#include "structures/parameter_limits.h"
 #include "structures/registry.h"
 
 namespace arboretum {
@@ -51,18 +53,6 @@ const StructureEntry* find_structure(std::string_view name) {
   return nullptr;
 }
 
-void require_finite(const TriangleMesh& mesh) {
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    const Triangle& t = mesh.triangles[i];
-    for (std::size_t k = 0; k < mesh.frames(); ++k) {
-      const std::vector<Vec3f>& frame = mesh.frame(k);
-      if (is_finite(frame[t.a]) && is_finite(frame[t.b]) && is_finite(frame[t.c])) continue;
-      throw UserError("triangle " + std::to_string(i) +
-                      " has a vertex that is not finite; drop such triangles first, as load_scene() does");
-    }
-  }
-}
-
 std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh, const BuildSettings& settings,
                                        BuildReport& report) {
   const StructureEntry* entry = find_structure(name);
@@ -80,11 +70,13 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   check("builder", settings.builder, entry->info.builders);
   check("leaf", settings.leaf, entry->info.leaves);
 
+  check_parameters(settings.parameters);
+  check_triangles(mesh, Largest::finite);
   if (mesh.moves() && !entry->info.holds_motion) {
     throw UserError(std::string(name) + " holds one moment, and the mesh has " + std::to_string(mesh.frames()) +
                     " key frames: take bvh4_motion, or pose(mesh, time)");
   }
-  require_finite(mesh);
+  if (entry->info.takes_below) check_instances(mesh, Largest::finite);
 
   std::unique_ptr<Accel> accel = entry->create();
   report = {};

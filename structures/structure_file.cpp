@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <boost/crc.hpp>
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
@@ -157,6 +158,12 @@ void write_whole(Accel& accel, const TriangleMesh& mesh, const BuildSettings& se
   if (!stream) throw std::runtime_error("write failed");
 }
 
+/// No two savings have the same, whatever process and thread they are of.
+std::filesystem::path unfinished_name(const std::filesystem::path& file) {
+  static std::atomic<std::uint64_t> next{0};
+  return file.string() + "." + std::to_string(::getpid()) + "." + std::to_string(next++) + ".unfinished";
+}
+
 }  // namespace
 
 std::string text_of(const BuilderParameters& parameters) {
@@ -219,7 +226,7 @@ std::string structure_file_name(std::string_view name, const TriangleMesh& mesh,
 
 void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings,
                     const std::filesystem::path& file) {
-  const std::filesystem::path unfinished = file.string() + "." + std::to_string(::getpid()) + ".unfinished";
+  const std::filesystem::path unfinished = unfinished_name(file);
   try {
     write_whole(accel, mesh, settings, unfinished);
     std::filesystem::rename(unfinished, file);

@@ -5,6 +5,7 @@
 #include "core/arena.h"
 #include "core/bounds.h"
 #include "core/coordinates.h"
+#include "core/error.h"
 #include "core/instances.h"
 #include "core/isa.h"
 #include "core/memory_meter.h"
@@ -155,6 +156,17 @@ TEST_CASE("the nearest name to a misspelt one") {
   CHECK(close_name("rotation", std::vector<std::string>{"scale", "rotate"}) == "rotate");
   CHECK(close_name("", names).empty());
   CHECK(close_name("bvh", {}).empty());
+}
+
+TEST_CASE("an error is one line, whatever it quotes, and no page") {
+  CHECK(std::string(UserError("a\nb\tc\r\x7f, ä").what()) == "a\\nb\\tc\\x0d\\x7f, ä");
+  std::string path = "begin ";
+  for (int i = 0; i < 50000; ++i) path += "ö";
+  const std::string line = UserError(path + ": no file; name one").what();
+  CHECK(line.size() <= UserError::kLongest);
+  CHECK(line.starts_with("begin öö"));
+  CHECK(line.ends_with("ö: no file; name one"));
+  CHECK(line.find("ö ... ö") != std::string::npos);
 }
 
 TEST_CASE("random numbers depend on seed, index and dimension alone, and fill [0, 1)") {

@@ -238,6 +238,42 @@ TEST_CASE("misuse is told in one line that names the mend") {
   CHECK_THAT(placed(wrong), Catch::Contains("the instances have 0 triangles"));
   wrong = one, wrong.instances[0].to_world.m[0][0] = 0.0;
   CHECK_THAT(placed(wrong), Catch::Contains("determinant"));
+  for (const double x : {double(kInfinity), -double(kInfinity), std::numeric_limits<double>::quiet_NaN()}) {
+    wrong = one, wrong.instances[0].to_world.m[1][3] = x;
+    CHECK_THAT(placed(wrong), Catch::Contains("instance 0 has a map with a number that is not finite"));
+  }
+  for (const double shift : {1e-3, 100.0, 1e300}) {
+    wrong = one, wrong.instances[0].to_world.m[2][3] = shift;
+    CHECK_THAT(placed(wrong), Catch::Contains("instance 0 does not lie where its map puts it: triangle 0"));
+  }
+  wrong = one, wrong.prototypes[0].vertices.back().x += 0.01f;
+  CHECK_THAT(placed(wrong), Catch::Contains("does not lie where its map puts it"));
+
+  // Of a build: whether or not the structure reads it, and what `auto` chooses
+  const auto tuned = [](const char* structure, const auto& set) {
+    TracerSettings settings = with(&TracerSettings::structure, structure);
+    set(settings.parameters);
+    return message_of(settings);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const float cost : {0.0f, -1.0f, nan, kInfinity, 1e-30f}) {
+    CHECK_THAT(tuned("bvh8", [=](BuilderParameters& p) { p.traversal_cost = cost; }),
+               Catch::Contains("is not within 0.001 .. 1000"));
+    CHECK_THAT(tuned("kdtree", [=](BuilderParameters& p) { p.intersection_cost = cost; }),
+               Catch::Contains("intersection_cost: "));
+  }
+  CHECK_THAT(tuned("bvh8", [=](BuilderParameters& p) { p.spatial_overlap = nan; }),
+             Catch::Contains("spatial_overlap: nan is not within 0 .. 1"));
+  CHECK_THAT(tuned("bvh8", [](BuilderParameters& p) { p.spatial_gain = 0; }), Catch::Contains("spatial_gain: 0 is"));
+  CHECK_THAT(tuned("kdtree", [](BuilderParameters& p) { p.max_leaf_blocks = 9; }),
+             Catch::Contains("max_leaf_blocks: 9 is not within 1 .. 8"));
+  CHECK_THAT(tuned("grid", [](BuilderParameters& p) { p.morton_bits = 31; }), Catch::Contains("neither 30 nor 63"));
+  CHECK(tuned("bvh8", [](BuilderParameters& p) { p.spatial_gain = 0.01f, p.grid_density = 0.01f; }).empty());
+  CHECK(tuned("two_level", [](BuilderParameters& p) { p.below = "grid"; }).empty());
+
+  const std::string line = message_of(with(&TracerSettings::structure, "bvh8\n\x1b[2J" + std::string(100000, 'x')));
+  CHECK_THAT(line, Catch::Contains("unknown structure 'bvh8\\n\\x1b[2Jxxx") && Catch::Contains("(100009 characters)"));
+  CHECK(line.size() < 2000);
 
   const Tracer tracer(sphere(4));
   const std::vector<Ray> rays(3);

@@ -2,7 +2,7 @@
 #include <bit>
 
 #include "core/error.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 #include "structures/parameters_read.h"
 #include "tests/builder_checks.h"
 
@@ -148,11 +148,12 @@ TEST_CASE("what is above another structure reads what that one reads; none is re
 }
 
 TEST_CASE("what is out of range is refused, with the limits") {
-  require_bins(4), require_bins(64);
-  CHECK_THROWS_WITH(require_bins(3), "bins: 3 is not within 4 .. 64");
-  CHECK_THROWS_WITH(require_bins(65), "bins: 65 is not within 4 .. 64");
-  CHECK_THROWS_WITH(require_within("x", 0.96f, 0.0f, 0.95f), "x: 0.96 is not within 0 .. 0.95");
-  CHECK_THROWS_WITH(require_within("x", std::numeric_limits<float>::quiet_NaN(), 0, 1), "x: nan is not within 0 .. 1");
+  require_within("bins", 4u, kBuilderLimits.bins), require_within("bins", 64u, kBuilderLimits.bins);
+  CHECK_THROWS_WITH(require_within("bins", 3u, kBuilderLimits.bins), "bins: 3 is not within 4 .. 64");
+  CHECK_THROWS_WITH(require_within("bins", 65u, kBuilderLimits.bins), "bins: 65 is not within 4 .. 64");
+  CHECK_THROWS_WITH(require_within("x", 0.96f, {0, 0.95}), "x: 0.96 is not within 0 .. 0.95");
+  CHECK_THROWS_WITH(require_within("x", std::numeric_limits<float>::quiet_NaN(), {0, 1}),
+                    "x: nan is not within 0 .. 1");
   require_triangles("bih", kMaxReferences);
   CHECK_THROWS_WITH(require_triangles("bih", kMaxReferences + 1), "bih takes at most 2^30 - 1 triangles");
   CHECK_THROWS_WITH(require_triangles("kdtree", 1u << 28, (1u << 28) - 1), "kdtree takes at most 2^28 - 1 triangles");

@@ -97,6 +97,13 @@ TEST_CASE("refit says what it cannot do, and then leaves the structure as it was
   TriangleMesh broken = mesh;
   broken.vertices[7].y = std::numeric_limits<float>::quiet_NaN();
   CHECK_THROWS_WITH(accel->refit(broken), Catch::Contains("not finite"));
+  broken.vertices[7].y = 3e12f;
+  CHECK_THROWS_WITH(accel->refit(broken), Catch::Contains("beyond 2^40"));
+  broken = mesh, broken.vertices.resize(30);
+  CHECK_THROWS_WITH(accel->refit(broken), Catch::Contains("names vertex 30 of 30"));
+  CHECK_THROWS_WITH(build_structure("bvh8", broken, settings, report), Catch::Contains("names vertex 30 of 30"));
+  broken = mesh, broken.later_frames.resize(1);
+  CHECK_THROWS_WITH(accel->refit(broken), Catch::Contains("key frame 1 has 0 vertices"));
   settings.leaf = "triangle1", settings.builder = "in_order";
   CHECK_THROWS_WITH(build_structure("brute_force", mesh, settings, report)->refit(mesh),
                     Catch::Contains("cannot be refitted"));

@@ -263,6 +263,35 @@ TEST_CASE("numbers beyond float's range are read alike in every locale") {
   }
 }
 
+/// A GLB of this JSON alone.
+std::string glb_of(const std::string& json) {
+  const auto word = [](std::size_t n) {
+    const auto value = std::uint32_t(n);
+    return std::string(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  return "glTF" + word(2) + word(20 + json.size()) + word(json.size()) + "JSON" + json;
+}
+
+std::string gltf_chain(std::size_t nodes) {
+  std::string json = R"({"nodes":[{})";
+  for (std::size_t i = 0; i + 1 < nodes; ++i) json += R"(,{"children":[)" + std::to_string(i) + "]}";
+  return json + "]}";
+}
+
+TEST_CASE("OBJ: lines that a backslash continues, comments behind faces, and every way to write a corner") {
+  const Folder folder;
+  const std::string points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvn 0 0 1\n";
+  const Scene plain = load_file(folder.write("plain.obj", points + "f 1 2 3 4\n"));
+  const char* const faces[] = {"f 1 2 \\\n 3 4\n",  "f 1 2 3 4 # and so on\n",      "f 1 2 3 4#\n",  "f \\\r\n1 2 3 4",
+                               "f +1 -3 3/1 4/1/1", "  f\t1// 2//1\t3/ 4\t# 5 6\n", "f 1 2\\\n3 4\n"};
+  for (const char* face : faces) {
+    INFO(face);
+    const Scene scene = load_file(folder.write("face.obj", points + face));
+    CHECK(scene.mesh.triangles == plain.mesh.triangles);
+    CHECK(scene.report.warnings.empty());
+  }
+}
+
 TEST_CASE("bad files: one clear line each, that says what and where") {
   const Folder folder;
   const std::string ply = ply_binary(false, false);
@@ -279,7 +308,8 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
       {"negative.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf -1 -2 -4\n",
        "negative.obj:5: face index -4 is out of range"},
       {"zero.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "zero.obj:4: face index 0 is out of range"},
-      {"wrap.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4294967299\n", "wrap.obj:4: a face index is out of range"},
+      {"wrap.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4294967299\n",
+       "wrap.obj:4: face index 4294967299 is out of range"},
       {"word.obj", "v 0 0 0\nv 1 zero 0\n", "word.obj:2: vertex 2 has no number for y"},
       {"points.obj", "v 0 0 0\nv 1 0 0\n", "no face in it (2 vertices)"},
       {"text.obj", "this is no model\n", "no face in it"},
@@ -309,8 +339,29 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
        "2\n",
        "vertex 1 of 3: '0x' is not a number"},
       {"cut.stl", stl_binary().substr(0, 200), "broken or truncated"},
+      {"decimal.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1.7 2 3\n", "decimal.obj:4: '1.7' is no corner of a face"},
+      {"early.obj", "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",
+       "early.obj:1: face index 1 is out of range: no vertex precedes it"},
+      {"later.obj", "v 0 0 0 \\\n\nv 1 0 \\\r\n0\nv 0 1 0\nf 1 2 \\\n4\n", "later.obj:6: face index 4 is out of range"},
       {"cut.off", off_text().substr(0, 60), "cut.off"},
       {"range.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "range"},
+      {"indices.off", "OFF4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 5\n95\n95\n95\n",
+       "face 0 has 0 corners of the 95 that it promises"},
+      {"few.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 1\n3 0 1 .\n4 0 1 3 2\n", "face 0 has 2 corners of the 3"},
+      {"none.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n0\n3 0 1 2\n", "face 0 does not begin with its number of corners"},
+      {"comment.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n # faces\n3 0 1 2\n", "a comment among the vertices or faces"},
+      {"missing.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "1 faces of the 2 that the header promises"},
+      {"deep.gltf", std::string(200000, '['), "more than 100 brackets in each other"},
+      {"deep.glb", glb_of(std::string(200000, '[')), "more than 100 brackets in each other"},
+      {"extras.gltf", R"({"nodes":[{"extras":)" + std::string(200000, '['), "more than 100 brackets in each other"},
+      {"chain.gltf", gltf_chain(20000), "nodes more than 1000 levels deep"},
+      {"parents.gltf", R"({"nodes":[{"children":[1,1]},{"children":[2]},{}]})",
+       "node 1 is a child of node 0 and again of node 0"},
+      {"cycle.gltf", R"({"nodes":[{},{"children":[2]},{"children":[1]}]})", "node 1 is below itself"},
+      {"child.gltf", R"({"nodes":[{"children":[7]}]})", "node 0 names child 7, and there are 1 nodes"},
+      {"ids.gltf", R"({"nodes":{"a":{"children":["b"]},"b":{"children":["a"]}}})", "is below itself"},
+      {"latin1.gltf", "{\"asset\": \"\xe9\", \"nodes\": [{\"children\": [0]}]}", "node 0 is below itself"},
+      {"cut.gltf", R"({"nodes":[{"children":[)", "broken or truncated"},
       {"cut.glb", glb_bytes().substr(0, 100), "broken or truncated"},
       {"huge.off", "OFF\n999999999 4 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
        "999999999 vertices and 4 faces, more than the file can hold"},

@@ -2,14 +2,21 @@
 // can be saved; and every file that does not fit is refused in one line.
 #include <boost/crc.hpp>
 
+#include <malloc.h>
+#include <tbb/global_control.h>
+
+#include <atomic>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/error.h"
+#include "structures/archive.h"
 #include "structures/statistics.h"
 #include "structures/structure_file.h"
 #include "tests/catch.h"
@@ -149,6 +156,71 @@ TEST_CASE("every structure of the project but Embree can be saved") {
       CHECK_NOTHROW(save_structure(*built, mesh, settings, folder / std::string(entry.info.name).c_str()));
     }
   }
+}
+
+/// What a file holds of a structure, built while fresh memory is full of `filling`.
+std::string saved_bytes(const StructureInfo& info, const TriangleMesh& mesh, BuildSettings settings, int filling,
+                        unsigned threads) {
+  settings.threads = threads;
+  ::mallopt(M_PERTURB, filling);
+  BuildReport report;
+  const auto built = build_structure(info.name, mesh, settings, report);
+  ::mallopt(M_PERTURB, 0);
+  std::ostringstream stream;
+  Archive archive(stream, mesh);
+  built->archive(archive);
+  return stream.str();
+}
+
+TEST_CASE("the same build gives the same bytes, whatever memory held before and for any number of threads") {
+  const tbb::global_control enough(tbb::global_control::max_allowed_parallelism, 8);
+  for (const StructureEntry& entry : all_structures()) {
+    if (entry.info.name == "embree") continue;
+    for (const std::size_t count : {0u, 1u, 300u, 9000u}) {
+      const TriangleMesh mesh = random_triangles(count, 0.05f, 11);
+      for (const std::string_view leaf : entry.info.leaves) {
+        const bool all_threads = count == 9000;
+        if (all_threads && leaf != entry.info.leaves.front()) continue;
+        INFO(entry.info.name << " " << leaf << " " << count);
+        const BuildSettings settings = settings_for(entry.info, leaf);
+        const std::string first = saved_bytes(entry.info, mesh, settings, 0x55, 1);
+        CHECK((saved_bytes(entry.info, mesh, settings, 0x2a, 1) == first));
+        if (!all_threads) continue;
+        for (const unsigned threads : {2u, 3u, 7u}) {
+          INFO(threads << " threads");
+          CHECK((saved_bytes(entry.info, mesh, settings, int(0x10 + threads), threads) == first));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("two threads save to one path at once: both do, and nothing is left beside the file") {
+  const Folder folder;
+  const TriangleMesh mesh = random_triangles(2000, 0.1f, 11);
+  const StructureInfo& info = find_structure("bvh8")->info;
+  const BuildSettings settings = settings_for(info, info.leaves.front());
+  BuildReport report;
+  std::vector<std::unique_ptr<Accel>> built;
+  for (int i = 0; i < 2; ++i) built.push_back(build_structure(info.name, mesh, settings, report));
+  std::atomic<unsigned> failures{0};
+  for (int round = 0; round < 40; ++round) {
+    std::vector<std::thread> threads;
+    for (const auto& one : built) {
+      threads.emplace_back([&] {
+        try {
+          save_structure(*one, mesh, settings, folder / "same");
+        } catch (const UserError&) {
+          ++failures;
+        }
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+  }
+  CHECK(failures == 0);
+  CHECK_NOTHROW(load_structure(info.name, mesh, settings, folder / "same"));
+  const fs::directory_iterator files((folder / "same").parent_path());
+  CHECK(std::distance(begin(files), end(files)) == 1);
 }
 
 TEST_CASE("a file that does not fit is refused, and the message says why") {

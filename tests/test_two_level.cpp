@@ -156,6 +156,61 @@ TEST_CASE("instances in one place: the lowest id wins, in whatever order they ar
   }
 }
 
+TEST_CASE("instances without triangles take no part") {
+  Instancing instancing;
+  instancing.prototypes = {TriangleMesh{}, sphere(4), TriangleMesh{}};
+  const TriangleMesh& ball = instancing.prototypes[1];
+  for (const std::size_t full : {0u, 1u, 6u}) {
+    TriangleMesh mesh;
+    instancing.instances.clear();
+    for (std::size_t i = 0; i < full; ++i) {
+      const AffineMap map = map_of(0.0, 1.0, {3.0f * float(i), 0, 0});
+      const auto first = std::uint32_t(mesh.vertices.size()), triangle = std::uint32_t(mesh.size());
+      for (const std::uint32_t empty : {0u, 2u, 0u}) instancing.instances.push_back({empty, triangle, map});
+      instancing.instances.push_back({1, triangle, map});
+      for (const Vec3f& v : ball.vertices) mesh.vertices.push_back(transform_point(map, v));
+      for (const Triangle& t : ball.triangles) mesh.triangles.push_back({t.a + first, t.b + first, t.c + first});
+    }
+    for (int i = 0; i < 9; ++i)
+      instancing.instances.push_back({0, std::uint32_t(mesh.size()), map_of(0, 1, {1, 1, 1})});
+    mesh.instancing = std::make_shared<const Instancing>(instancing);
+    for (const char* builder : {"binned_sah", "sweep_sah", "morton", "ploc"}) {
+      INFO(builder << " " << full);
+      const auto two = built("two_level", mesh, "triangle4v", "bvh8", builder);
+      CHECK(compute_statistics(*two, mesh, {}, false).references == mesh.size());
+      const KernelRow& row = *find_kernel("two_level", "triangle4v", "watertight", "padded", "single", Isa::sse);
+      for (std::size_t i = 0; i < full; ++i) {
+        const std::vector<Ray> ray{{{3.0f * float(i), 0, -3}, 0, {0.01f, 0.02f, 1}, kInfinity}};
+        const Hit hit = closest_hit(row, *two, ray)[0];
+        REQUIRE(hit.is_hit());
+        CHECK(hit.primitive / ball.size() == i);
+      }
+    }
+  }
+}
+
+TEST_CASE("a map that takes its prototype's box beyond float is refused") {
+  // x' = s x - s y: of vertices with x = y the image is small, of their box it is not.
+  for (const double s : {1e37, 1e39, 1e45, 1e300}) {
+    INFO(s);
+    Instancing instancing;
+    TriangleMesh one, mesh;
+    one.vertices = {{0, 0, 0}, {1, 1, 0}, {0, 0, 1}}, one.triangles = {{0, 1, 2}};
+    instancing.prototypes = {one};
+    for (std::uint32_t i = 0; i < 2; ++i) {
+      instancing.instances.push_back({0, i, {{{s, -s, 0, 0}, {1, 1, 0, double(i)}, {0, 0, 1, 0}}}});
+      for (const Vec3f& v : one.vertices) mesh.vertices.push_back(transform_point(instancing.instances[i].to_world, v));
+      mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    mesh.instancing = std::make_shared<const Instancing>(instancing);
+    if (s < 1e38) {
+      CHECK_NOTHROW(built("two_level", mesh, "triangle4v"));
+    } else {
+      CHECK_THAT(error_of([&] { (void)built("two_level", mesh, "triangle4v"); }), Catch::Contains("is beyond float"));
+    }
+  }
+}
+
 TEST_CASE("closed meshes stay closed under transforms") {
   Layout layout;
   const std::uint32_t ball = layout.add_part(sphere(24));

@@ -12,7 +12,7 @@
 #include "structures/bvh/bvh.h"
 #include "structures/interval_rays.h"
 #include "structures/leaves/leaf_names.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum::bih {
 namespace {
@@ -141,8 +141,8 @@ const StructureInfo& Bih::static_info() {
 
 void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  require_within("max_leaf_blocks", p.max_leaf_blocks, 1, bvh::kMaxLeafBlocks);
-  require_bins(p.bins);
+  require_within("max_leaf_blocks", p.max_leaf_blocks, kBuilderLimits.max_leaf_blocks);
+  require_within("bins", p.bins, kBuilderLimits.bins);
   require_triangles(kName, mesh.size());
   static_cast<void>(require_leaf_form(kName, settings.leaf));
   LeafLists lists;

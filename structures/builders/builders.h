@@ -7,7 +7,7 @@
 #include "core/mesh.h"
 #include "structures/accel.h"
 #include "structures/builders/binary_tree.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum {
 

@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t kChunk = 1u << 12;
 constexpr std::size_t kFew = 1024;       ///< with this many clusters any round is cheap
 constexpr std::size_t kLeastShare = 64;  ///< one cluster in so many has to merge
-constexpr unsigned kMaxRadius = 128;
+constexpr auto kMaxRadius = unsigned(kBuilderLimits.ploc_radius.high);
 /// Triangles that may share the first bits of their codes and stand in order of their ids
 constexpr std::size_t kShortRun = 8;
 
@@ -185,7 +185,7 @@ class Ploc {
 void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
                 BuildReport& report) {
   check_morton_bits(parameters.morton_bits);
-  require_within("ploc_radius", parameters.ploc_radius, 1, kMaxRadius);
+  require_within("ploc_radius", parameters.ploc_radius, kBuilderLimits.ploc_radius);
   if (mesh.size() == 0) return;
   PhaseClock phase(report);
   LinkedTree clusters;

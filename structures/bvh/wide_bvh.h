@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <span>
 #include <utility>
@@ -18,7 +19,7 @@
 #include "structures/bvh/bvh.h"
 #include "structures/bvh/wide_refit.h"
 #include "structures/leaves/leaf_names.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum::bvh {
 
@@ -27,6 +28,15 @@ template <class Format>
 [[nodiscard]] constexpr std::size_t round_up(std::size_t bytes) noexcept {
   static_assert(Format::kGranule % alignof(typename Format::Node) == 0 && Format::kGranule % 32 == 0);
   return (bytes + Format::kGranule - 1) / Format::kGranule * Format::kGranule;
+}
+
+/// A node for Format::write(). Of the bytes that it leaves, all within the last 32, every one is 0.
+template <class Format>
+[[nodiscard]] typename Format::Node* new_node(std::byte* at) noexcept {
+  auto* node = new (at) typename Format::Node;
+  constexpr std::size_t kBytes = round_up<Format>(sizeof(typename Format::Node));
+  std::memset(at + kBytes - 32, 0, 32);
+  return node;
 }
 
 /// Writes the wide tree into the arena: a node, then its leaves, then its inner children's subtrees.
@@ -40,7 +50,7 @@ class Emitter {
 
   /// Returns the depth of the deepest leaf below.
   unsigned subtree(const WideNode& from, std::size_t offset) const {
-    auto* node = new (base_ + offset) Node;
+    auto* node = new_node<Format>(base_ + offset);
     std::size_t next = offset + round_up<Format>(sizeof(Node));
     const std::span<const WideNode> children = tree_.children(from);
     const auto count = unsigned(children.size());
@@ -80,6 +90,8 @@ class Emitter {
                     tree_.primitives.size() - 1);
     LeafPrimitives room;
     form_.fill(base_ + offset, mesh_, tree_.leaf_primitives(from, room));
+    const std::size_t used = from.blocks * form_.bytes;
+    std::memset(base_ + offset + used, 0, from.bytes - used);
   }
 
   [[nodiscard]] static NodeReference reference(const WideNode& node, std::size_t offset) noexcept {
@@ -111,8 +123,8 @@ const StructureInfo& WideBvh<Format>::static_info() {
 template <class Format>
 void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  require_within("max_leaf_blocks", p.max_leaf_blocks, 1, kMaxLeafBlocks);
-  require_bins(p.bins);
+  require_within("max_leaf_blocks", p.max_leaf_blocks, kBuilderLimits.max_leaf_blocks);
+  require_within("bins", p.bins, kBuilderLimits.bins);
   if (p.collapse != "optimal" && p.collapse != "greedy")
     throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
   require_triangles(kName, mesh.size());
@@ -131,7 +143,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   leaf_ = settings.leaf;
   if (mesh.size() == 0) {  // a node without children: every ray misses
     arena_ = Arena(round_up<Format>(sizeof(typename Format::Node)));
-    Format::write(*new (arena_.data()) typename Format::Node, nullptr, nullptr, 0);
+    Format::write(*new_node<Format>(arena_.data()), nullptr, nullptr, 0);
     root_ = 0, stack_entries_ = 2 * kBranching;
     set_scene(mesh, {});
     return;

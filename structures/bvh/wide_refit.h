@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
+#include "core/mesh_check.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
 #include "structures/leaves/leaf_form.h"
@@ -69,7 +70,7 @@ void WideBvh<Format>::refit(const TriangleMesh& mesh) {
     throw UserError(std::string(kName) + " was built from " + std::to_string(triangles_) +
                     " triangles and cannot be refitted to " + std::to_string(mesh.size()) + "; build it anew");
   }
-  require_finite(mesh);
+  check_triangles(mesh);
   set_scene(mesh, Refitter<Format>(mesh, *find_leaf_form(leaf_), arena_.data()).subtree(root_, 0));
 }
 

@@ -17,6 +17,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 
@@ -36,6 +37,9 @@ namespace {
 
 using Block = IndexBlock<4>;
 using bvh::NodeReference;
+
+/// Where a node's unused bytes begin.
+constexpr std::size_t kNodePadding = offsetof(Node, child) + sizeof(Node::child);
 
 constexpr std::size_t round_up(std::size_t bytes) noexcept { return (bytes + 31) / 32 * 32; }
 
@@ -90,6 +94,7 @@ class Converter {
         if (bvh::is_leaf(children[i]) == leaves) written[i] = write(base, children[i], next, child[i]);
     }
     Node& node = *new (base + offset) Node;
+    std::memset(base + offset + kNodePadding, 0, sizeof(Node) - kNodePadding);
     for (unsigned i = 0; i < 4; ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const float lower = child[i].at0.lower[axis], upper = child[i].at0.upper[axis];

@@ -8,7 +8,7 @@
 #include "structures/grid/cell_counts.h"
 #include "structures/grid/grid_builder.h"
 #include "structures/leaves/leaf_names.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum::grid {
 namespace {
@@ -49,7 +49,7 @@ const StructureInfo& Grid::static_info() {
 
 void Grid::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  require_within("grid_density", p.grid_density, 0.01f, 64.0f);
+  require_within("grid_density", p.grid_density, kBuilderLimits.grid_density);
   require_triangles(kName, mesh.size());
   const LeafForm& form = require_leaf_form(kName, settings.leaf);
   if (settings.builder != "two_level" && settings.builder != "uniform") {

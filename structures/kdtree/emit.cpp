@@ -1,6 +1,7 @@
 #include "structures/kdtree/emit.h"
 
 #include <array>
+#include <cstring>
 
 #include "core/error.h"
 
@@ -21,31 +22,42 @@ struct Place {
   }
 };
 
-void count(const Place& node, std::size_t& pairs, std::size_t& leaves, std::size_t& blocks, unsigned width) {
+/// How leaf blocks stand in the arena: a leaf begins on a multiple of `align`.
+struct Blocks {
+  unsigned width;
+  std::size_t bytes, align = bytes % 64 == 0 ? 64 : 32;
+
+  [[nodiscard]] std::uint32_t of(const BuildNode& leaf) const noexcept { return (leaf.count + width - 1) / width; }
+  /// What so many blocks of a leaf take, the gap behind them included.
+  [[nodiscard]] std::size_t room(std::uint32_t blocks) const noexcept {
+    return (blocks * bytes + align - 1) / align * align;
+  }
+};
+
+void count(const Place& node, std::size_t& pairs, std::size_t& leaves, std::size_t& bytes, const Blocks& blocks) {
   if (node.is_leaf()) {
-    ++leaves, blocks += (node.own()->count + width - 1) / width;
+    ++leaves, bytes += blocks.room(blocks.of(*node.own()));
     return;
   }
   ++pairs;
-  count(node.child(0), pairs, leaves, blocks, width), count(node.child(1), pairs, leaves, blocks, width);
+  count(node.child(0), pairs, leaves, bytes, blocks), count(node.child(1), pairs, leaves, bytes, blocks);
 }
 
 /// Places pairs in groups of up to four, a cache line: a pair, its children's pairs, then theirs, breadth first; then
 /// the groups below, depth first. A ray that goes down meets a new line every second level or later.
 class Writer {
  public:
-  Writer(std::byte* base, std::size_t next_leaf, unsigned width, std::size_t block_bytes,
-         MeteredVector<LeafPlan>& leaves)
-      : base_(base), next_leaf_(next_leaf), width_(width), block_bytes_(block_bytes),
-        align_(block_bytes % 64 == 0 ? 64 : 32), leaves_(leaves) {}
+  Writer(std::byte* base, std::size_t next_leaf, const Blocks& blocks, MeteredVector<LeafPlan>& leaves)
+      : base_(base), next_leaf_(next_leaf), blocks_(blocks), leaves_(leaves) {}
 
   Node node(const Place& place, std::size_t pair_offset) {
     if (!place.is_leaf()) return Node::inner(place.plane(), place.axis(), pair_offset);
     const BuildNode& leaf = *place.own();
-    const std::uint32_t blocks = (leaf.count + width_ - 1) / width_;
-    const std::size_t at = next_leaf_;
-    next_leaf_ += (blocks * block_bytes_ + align_ - 1) / align_ * align_;
+    const std::uint32_t blocks = blocks_.of(leaf);
+    const std::size_t at = next_leaf_, used = at + blocks * blocks_.bytes;
+    next_leaf_ += blocks_.room(blocks);
     if (blocks != 0) leaves_.push_back({at, place.part->ids.data() + leaf.first, leaf.count});
+    if (used != next_leaf_) std::memset(base_ + used, 0, next_leaf_ - used);
     return Node::leaf(blocks, at);
   }
 
@@ -92,8 +104,7 @@ class Writer {
  private:
   std::byte* base_;
   std::size_t next_pair_ = 0, next_leaf_;
-  const unsigned width_;
-  const std::size_t block_bytes_, align_;
+  const Blocks blocks_;
   MeteredVector<LeafPlan>& leaves_;
   unsigned depth_ = 0;
 };
@@ -102,13 +113,12 @@ class Writer {
 
 Layout lay_out(const Part& tree, unsigned width, std::size_t block_bytes) {
   const Place root{&tree, 0};
-  std::size_t pairs = 0, leaves = 0, blocks = 0;
-  count(root, pairs, leaves, blocks, width);
-  const std::size_t align = block_bytes % 64 == 0 ? 64 : 32;
+  const Blocks blocks{width, block_bytes};
+  std::size_t pairs = 0, leaves = 0, leaf_bytes = 0;
+  count(root, pairs, leaves, leaf_bytes, blocks);
   // The root stands behind the pairs: the tree keeps a copy of it at hand, its bytes are the arena's.
-  const std::size_t node_bytes = ((pairs * 2 + 1) * sizeof(Node) + 63) / 64 * 64;
-  // A leaf may be followed by a gap of less than `align`.
-  const std::size_t bytes = node_bytes + blocks * block_bytes + (block_bytes % align == 0 ? 0 : leaves * (align - 1));
+  const std::size_t used = (pairs * 2 + 1) * sizeof(Node), node_bytes = (used + 63) / 64 * 64;
+  const std::size_t bytes = node_bytes + leaf_bytes;
   if (bytes > Node::kMostBytes) {
     throw UserError("kdtree would take " + std::to_string(bytes >> 20) +
                     " MiB; its links reach 16 GiB: use leaves of indices or a smaller mesh");
@@ -116,7 +126,8 @@ Layout lay_out(const Part& tree, unsigned width, std::size_t block_bytes) {
   Layout out;
   out.leaves.reserve(leaves);
   out.arena = Arena(bytes);
-  Writer writer(out.arena.data(), node_bytes, width, block_bytes, out.leaves);
+  std::memset(out.arena.data() + used, 0, node_bytes - used);
+  Writer writer(out.arena.data(), node_bytes, blocks, out.leaves);
   out.root = writer.node(root, root.is_leaf() ? 0 : writer.below(root, 0));
   new (out.arena.data() + pairs * 2 * sizeof(Node)) Node(out.root);
   out.depth = writer.depth();

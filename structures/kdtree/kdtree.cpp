@@ -13,8 +13,9 @@
 #include "structures/interval_rays.h"
 #include "structures/kdtree/builders.h"
 #include "structures/kdtree/emit.h"
+#include "structures/leaves/block_padding.h"
 #include "structures/leaves/leaf_names.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum::kdtree {
 namespace {
@@ -28,9 +29,9 @@ constexpr std::size_t kMostTriangles = (std::size_t{1} << 28) - 1;
 }
 
 void check(const BuilderParameters& p, const TriangleMesh& mesh) {
-  require_bins(p.bins);
-  require_within("max_depth", p.max_depth, 0, kDeepest);
-  require_within("empty_bonus", p.empty_bonus, 0.0f, 0.95f);
+  require_within("bins", p.bins, kBuilderLimits.bins);
+  require_within("max_depth", p.max_depth, {0, kDeepest});
+  require_within("empty_bonus", p.empty_bonus, kBuilderLimits.empty_bonus);
   if (p.max_leaf_blocks < 1) throw UserError("max_leaf_blocks: 0 is not at least 1");
   require_triangles("kdtree", mesh.size(), kMostTriangles);
 }
@@ -75,7 +76,9 @@ void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, Buil
     arena_ = std::move(layout.arena), root_ = layout.root, depth_ = layout.depth;
     tbb::parallel_for(std::size_t{0}, layout.leaves.size(), [&](std::size_t i) {
       const LeafPlan& leaf = layout.leaves[i];
-      fill_blocks(reinterpret_cast<Block*>(arena_.data() + leaf.offset), mesh, {leaf.ids, leaf.count});
+      auto* blocks = reinterpret_cast<Block*>(arena_.data() + leaf.offset);
+      fill_blocks(blocks, mesh, {leaf.ids, leaf.count});
+      clear_padding(blocks, (leaf.count + unsigned(Block::kWidth) - 1) / unsigned(Block::kWidth));
     });
     report.phases.emplace_back("leaves", wall_seconds() - start);
   });

@@ -6,6 +6,7 @@
 
 #include "intersectors/blocks.h"
 #include "structures/builders/box4.h"
+#include "structures/leaves/block_padding.h"
 
 namespace arboretum {
 
@@ -85,6 +86,7 @@ void fill_leaf(Block* block, const TriangleMesh& mesh, std::span<const std::uint
     }
   } else {
     fill_blocks(block, mesh, ids);
+    clear_padding(block, (ids.size() + std::size_t(Block::kWidth) - 1) / std::size_t(Block::kWidth));
   }
 }
 

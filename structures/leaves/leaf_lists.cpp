@@ -1,6 +1,7 @@
 #include "structures/leaves/leaf_lists.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
@@ -8,6 +9,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "structures/archive.h"
+#include "structures/leaves/block_padding.h"
 
 namespace arboretum {
 namespace {
@@ -76,10 +78,13 @@ void LeafStore::fill(const TriangleMesh& mesh, const LeafLists& lists, std::stri
       next += blocks;
     }
     blocks_ = Arena(std::max<std::size_t>(next * sizeof(Block), 64));
+    std::memset(blocks_.data() + next * sizeof(Block), 0, blocks_.bytes() - next * sizeof(Block));
     auto* base = reinterpret_cast<Block*>(blocks_.data());
     tbb::parallel_for(std::size_t(0), lists.size(), [&](std::size_t i) {
       if (lists[i].empty() || original(i) != i) return;
-      fill_blocks(base + range(codes[i]).first, mesh, lists[i]);
+      const LongLeaf leaf = range(codes[i]);
+      fill_blocks(base + leaf.first, mesh, lists[i]);
+      clear_padding(base + leaf.first, leaf.blocks);
     });
   });
   if (!known) throw UserError(std::string(structure) + " has no leaf '" + std::string(leaf) + "'");

@@ -10,7 +10,7 @@
 #include "structures/archive.h"
 #include "structures/leaves/leaf_names.h"
 #include "structures/octree/octree_builder.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum::octree {
 
@@ -31,7 +31,7 @@ const StructureInfo& Octree::static_info() {
 
 void Octree::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  require_within("octree: max_depth", p.max_depth, 0, kMostLevels);
+  require_within("octree: max_depth", p.max_depth, {0, kMostLevels});
   require_triangles(kName, mesh.size());
   const LeafForm& form = require_leaf_form(kName, settings.leaf);
   Tree tree;

@@ -21,10 +21,12 @@ bool has(const std::vector<std::string_view>& list, std::string_view name) {
   return std::ranges::find(list, name) != list.end();
 }
 
-/// A mesh without instances is one, where it is.
+/// Those that have triangles: the others take no part. A mesh without instances is one, where it is.
 std::vector<Instance> instances_of(const TriangleMesh& mesh) {
-  if (mesh.instancing) return mesh.instancing->instances;
-  return std::vector<Instance>(mesh.size() > 0 ? 1 : 0);
+  if (!mesh.instancing) return std::vector<Instance>(mesh.size() > 0 ? 1 : 0);
+  std::vector<Instance> instances = mesh.instancing->instances;
+  std::erase_if(instances, [&](const Instance& i) { return mesh.instancing->prototypes[i.prototype].size() == 0; });
+  return instances;
 }
 
 /// Bounds of the box's image, computed in double and rounded outwards.
@@ -113,7 +115,8 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
   const std::string pair = "two_level over " + std::string(below.name) + ": ";
   if (const std::string why = why_not_below(below); !why.empty()) throw UserError(pair + why);
   if (!has(below.builders, settings.builder))
-    throw UserError(pair + std::string(below.name) + " has no builder " + settings.builder);
+    throw UserError(pair + std::string(below.name) + " has no builder " + settings.builder + "; its first is " +
+                    std::string(below.builders.front()));
   if (!has(below.leaves, settings.leaf))
     throw UserError(pair + std::string(below.name) + " has no leaf " + settings.leaf);
 
@@ -174,6 +177,10 @@ void TwoLevel::add_box(const Instance& instance) {
   Bounds3f world = object.bounds();
   if (!is_identity(instance.to_world)) {
     world = image(instance.to_world, world);
+    if (!is_finite(world.lower) || !is_finite(world.upper)) {
+      throw UserError("two_level: the image of a prototype's box, of the instance that begins at triangle " +
+                      std::to_string(instance.first_primitive) + ", is beyond float; give its map smaller numbers");
+    }
     for (std::size_t i = 0; i < object.size(); ++i) world.extend(mesh_->bounds(instance.first_primitive + i));
     float shift = 0.0f;
     for (const auto& row : instance.to_world.m) shift = std::max(shift, float(std::fabs(row[3])));
@@ -208,10 +215,11 @@ void TwoLevel::archive(Archive& archive) {
 bool TwoLevel::visit(StructureVisitor& visitor) const {
   std::set<const Accel*> shown;
   bool seen = true;
+  const std::vector<Instance> instances = instances_of(*mesh_);
   const auto show = [&](std::uint32_t index, unsigned depth) {
     const Placed& p = placed_[index];
-    BelowVisitor below(visitor, p.identity ? nullptr : &mesh_->instancing->instances[index].to_world, p.first_primitive,
-                       depth, shown.insert(p.below).second);
+    BelowVisitor below(visitor, p.identity ? nullptr : &instances[index].to_world, p.first_primitive, depth,
+                       shown.insert(p.below).second);
     seen = p.below->visit(below) && seen;
   };
   TopVisitor top(visitor, show);

@@ -35,7 +35,7 @@ class TwoLevel final : public Accel {
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
   /// The builder axis goes to the structures below; the top takes it too where it builds binary trees, else binned_sah.
   /// Throws UserError for a structure below that there is not, that lacks the builder or leaf, or that cannot stand
-  /// there (why_not_below()).
+  /// there (why_not_below()), and for a map that takes its prototype's box beyond float.
   void build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) override;
   void archive(Archive& archive) override;
   /// The top's nodes, then each instance's nodes and leaves with boxes in world space; bytes of a prototype count where
@@ -44,7 +44,7 @@ class TwoLevel final : public Accel {
   [[nodiscard]] std::size_t bytes() const noexcept override;
 
   [[nodiscard]] const bvh::Bvh4& top() const noexcept { return top_; }
-  /// The instances; the top's leaves name them.
+  /// The instances that have triangles; the top's leaves name them.
   [[nodiscard]] const std::vector<Placed>& placed() const noexcept { return placed_; }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
   [[nodiscard]] const std::string& below() const noexcept { return below_; }

@@ -12,7 +12,7 @@
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
 #include "structures/leaves/leaf_names.h"
-#include "structures/parameter_checks.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum::sorted_boxes {
 namespace {
