@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "experiments/rendered_rays.h"
+#include "intersectors/promises.h"
 #include "rendering/hard_workload.h"
 
 namespace arboretum {
@@ -32,25 +33,6 @@ constexpr Summary kBuilders[] = {
     {"embree_high", "Embree's builder with spatial splits, for our BVHs"},
     {"auto", "the first that the structure takes"},
     {"all", "each that the structure takes, a cell for each"},
-};
-constexpr Summary kIntersectors[] = {
-    {"moller_trumbore", "Moeller and Trumbore 1997, on precomputed edges; may miss along edges"},
-    {"pluecker", "edge functions relative to the ray's origin, edge times sum of vertices"},
-    {"watertight", "Woop, Benthin, Wald 2013: no cracks on closed meshes with padded boxes"},
-    {"baldwin_weber", "Baldwin and Weber 2016: precomputed map to the unit triangle; may miss along edges"},
-    {"havel_herout", "Havel and Herout 2010: three precomputed planes; may miss along edges"},
-    {"wald_projection", "Wald 2004: precomputed projection along an axis; may miss along edges"},
-    {"moller_trumbore_double", "moller_trumbore in double: t to half an ulp, may miss along edges"},
-    {"pluecker_double", "pluecker in double: t to half an ulp, may miss at vertices"},
-    {"watertight_refined", "watertight, and t, u, v of the nearest hit again in double"},
-    {"exact", "filtered, then exact arithmetic: hit or miss, nearest and t proved right"},
-};
-constexpr Summary kBoxes[] = {
-    {"fast", "slab test as rounded: may miss a box that the exact ray touches"},
-    {"ize",
-     "Ize 2013: far planes' reciprocals two ulp larger; misses of the boxes that a ray only touches some in a million"},
-    {"padded", "slab test widened by its error bound: never misses a box that the exact ray touches"},
-    {"auto", "padded for intersectors that promise to lose no hit, fast for moller_trumbore and its like"},
 };
 constexpr Summary kTraversals[] = {
     {"single", "one ray at a time, boxes and triangles in the lanes"},
@@ -214,6 +196,24 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
   return list;
 }
 
+namespace {
+
+std::string_view intersector_summary(std::string_view name) {
+  for (const IntersectorPromise& i : kIntersectorPromises)
+    if (i.intersector == name) return i.summary;
+  return {};
+}
+
+std::string_view box_summary(std::string_view name) {
+  for (const BoxPromise& b : kBoxPromises)
+    if (b.box == name) return b.summary;
+  if (name == "auto")
+    return "padded for intersectors that promise to lose no hit, fast for moller_trumbore and its like";
+  return {};
+}
+
+}  // namespace
+
 std::string summary_of(Axis axis, std::string_view value, const Registry& registry) {
   switch (axis) {
     case Axis::structure:
@@ -221,8 +221,8 @@ std::string summary_of(Axis axis, std::string_view value, const Registry& regist
       return "not in this build: libembree was not found";
     case Axis::builder: return builder_summary(value);
     case Axis::leaf: return leaf_summary(value);
-    case Axis::intersector: return std::string(look_up(kIntersectors, value));
-    case Axis::box: return std::string(look_up(kBoxes, value));
+    case Axis::intersector: return std::string(intersector_summary(value));
+    case Axis::box: return std::string(box_summary(value));
     case Axis::traversal: return traversal_summary(value);
     case Axis::isa: return std::string(look_up(kIsas, value));
     case Axis::workload: return std::string(look_up(kWorkloads, value));

@@ -151,6 +151,8 @@ class CaseReader {
     if (const Json* list = given("nearest_ids", is_list, "a list of whole numbers")) {
       std::set<std::uint64_t> exact;
       for (std::uint32_t i : truth.nearest) exact.insert(c.ids[i]);
+      if (list->get<std::set<std::uint64_t>>().size() != list->size())
+        fail(fmt::format("nearest_ids names an id twice: {}", list->dump()));
       expect("nearest_ids", list->get<std::set<std::uint64_t>>() == exact, fmt::format("[{}]", fmt::join(exact, ",")));
     }
     if (const Json* count = given("closed_hits", is_whole, "a whole number"))
@@ -161,13 +163,21 @@ class CaseReader {
   std::string id_, where_;
 };
 
-/// The file as JSON. A number beyond double ends the parser's work, so that no CaseReader sees it: it is told here,
-/// with the case.
+/// The file as JSON. A number beyond double ends the parser's work, and of doubled keys it keeps the last, so that no
+/// CaseReader sees either: they are told here, with the case.
 Json parse(const std::filesystem::path& file, const std::string& text) {
   constexpr int kInDocument = 1, kEntry = 2, kInEntry = 3;  // the parser's depths
   std::size_t number = 1;
   std::string id, list, key;
+  std::vector<std::set<std::string>> keys;  // of the objects that are open
+  const auto place = [&] {
+    return list == "cases" ? fmt::format(": case {}", id.empty() ? std::to_string(number) : id) : std::string();
+  };
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
+      throw UserError(fmt::format("{}{}: {} is given twice; keep one", file.string(), place(), parsed.dump()));
     if (event == Json::parse_event_t::key && depth == kInDocument) list = parsed;
     if (event == Json::parse_event_t::key && depth == kInEntry) key = parsed;
     if (event == Json::parse_event_t::value && depth == kInEntry && key == "id" && parsed.is_string()) id = parsed;
@@ -177,11 +187,10 @@ Json parse(const std::filesystem::path& file, const std::string& text) {
   try {
     return Json::parse(text, watch);
   } catch (const Json::out_of_range& e) {
-    const std::string what = e.what(),
-                      place = list == "cases" ? fmt::format(": case {}", id.empty() ? std::to_string(number) : id) : "";
+    const std::string what = e.what();
     const std::size_t quote = what.find('\'');
     throw UserError(
-        fmt::format("{}{}: {} is beyond float32", file.string(), place,
+        fmt::format("{}{}: {} is beyond float32", file.string(), place(),
                     quote == std::string::npos ? "a number" : what.substr(quote + 1, what.rfind('\'') - quote - 1)));
   } catch (const Json::parse_error& e) {
     fail_syntax(file, text, e, "mend the line or the one above it");

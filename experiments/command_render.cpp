@@ -61,8 +61,11 @@ std::optional<double> parse_exposure(const std::string& word, Integrator integra
   if (word.empty() || word == "auto") return std::nullopt;
   try {
     std::size_t used = 0;
-    if (const double stops = std::stod(word, &used); used == word.size() && std::isfinite(stops)) return stops;
-  } catch (const std::exception&) {  // std::stod's way to say that it is no number
+    if (const double stops = std::stod(word, &used); used == word.size() && std::isfinite(stops)) {
+      check_exposure(stops);
+      return stops;
+    }
+  } catch (const std::logic_error&) {  // std::stod's way to say that it is no number
   }
   throw UserError(fmt::format("--exposure '{}' is neither 'auto' nor a number of stops", word));
 }

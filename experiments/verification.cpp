@@ -91,7 +91,7 @@ bool is_within(const Promise& promise, const Ray& ray, float largest) noexcept {
   if (promise.exponent == 0) return true;
   const float high = std::ldexp(1.0f, promise.exponent), low = 1.0f / high;
   const float size = std::max(largest, largest_coordinate(ray.origin)), direction = largest_coordinate(ray.direction);
-  // A ray that is none must miss at whatever numbers: NaN and infinity are within.
+  // An invalid ray must miss at whatever numbers: NaN and infinity are within.
   return !is_valid(ray) || (size >= low && size <= high && direction >= low && direction <= high);
 }
 

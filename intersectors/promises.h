@@ -1,5 +1,6 @@
-// What each combination of intersector and box test promises: the one table that `list promises`, `verify` and
-// docs/numerics.md share. A new intersector or box test has a line here; a test holds it.
+// What each combination of intersector and box test promises: the one table that `list`, `list promises`, `verify` and
+// docs/numerics.md share. A new intersector or box test has an entry here, and a row in docs/numerics.md; a test holds
+// both.
 #pragma once
 
 #include <string>
@@ -21,6 +22,7 @@ enum class Coverage : unsigned char {
 /// origin and the largest |direction component| are within 2^-exponent .. 2^exponent; 0: for every finite float32.
 struct IntersectorPromise {
   std::string_view intersector;
+  std::string_view summary;  ///< what `list` says of it
   Coverage coverage;
   double t_ulp;
   int exponent;
@@ -28,35 +30,47 @@ struct IntersectorPromise {
 };
 
 inline constexpr IntersectorPromise kIntersectorPromises[] = {
-    {"moller_trumbore", Coverage::none, 0, 40, "the two sides of an edge compute different sums"},
-    {"moller_trumbore_double", Coverage::none, 0, 40,
-     "as moller_trumbore, with fewer rays lost and t nearly always to the last bit"},
-    {"pluecker", Coverage::edges, 0, 40, "the two sides of an edge compute values of exactly opposite sign"},
-    {"pluecker_double", Coverage::edges, 0, 40, "as pluecker, with t nearly always to the last bit"},
-    {"watertight", Coverage::closed, 0, 40,
+    {"moller_trumbore", "Moeller and Trumbore 1997, on precomputed edges; may miss along edges", Coverage::none, 0, 40,
+     "the two sides of an edge compute different sums"},
+    {"moller_trumbore_double", "moller_trumbore in double: t to half an ulp, may miss along edges", Coverage::none, 0,
+     40, "as moller_trumbore, with fewer rays lost and t nearly always to the last bit"},
+    {"pluecker", "edge functions relative to the ray's origin, edge times sum of vertices", Coverage::edges, 0, 40,
+     "the two sides of an edge compute values of exactly opposite sign"},
+    {"pluecker_double", "pluecker in double: t to half an ulp, may miss at vertices", Coverage::edges, 0, 40,
+     "as pluecker, with t nearly always to the last bit"},
+    {"watertight", "Woop, Benthin, Wald 2013: no cracks on closed meshes with padded boxes", Coverage::closed, 0, 40,
      "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
-    {"watertight_refined", Coverage::closed, 0, 40,
+    {"watertight_refined", "watertight, and t, u, v of the nearest hit again in double", Coverage::closed, 0, 40,
      "as watertight, the nearest hit's t, u, v computed again in double"},
-    {"baldwin_weber", Coverage::none, 0, 40, "stored transformation: accurate near the origin alone"},
-    {"havel_herout", Coverage::none, 0, 40, "stored planes: accurate near the origin alone"},
-    {"wald_projection", Coverage::none, 0, 40, "neighbours are projected along different axes"},
-    {"exact", Coverage::exact, 0.5, 0, "filtered, and exact arithmetic where the filter cannot decide"},
+    {"baldwin_weber", "Baldwin and Weber 2016: precomputed map to the unit triangle; may miss along edges",
+     Coverage::none, 0, 40, "stored transformation: accurate near the origin alone"},
+    {"havel_herout", "Havel and Herout 2010: three precomputed planes; may miss along edges", Coverage::none, 0, 40,
+     "stored planes: accurate near the origin alone"},
+    {"wald_projection", "Wald 2004: precomputed projection along an axis; may miss along edges", Coverage::none, 0, 40,
+     "neighbours are projected along different axes"},
+    {"exact", "filtered, then exact arithmetic: hit or miss, nearest and t proved right", Coverage::exact, 0.5, 0,
+     "filtered, and exact arithmetic where the filter cannot decide"},
 };
 
 /// `loses_nothing`: no box that the exact ray touches is missed, and none whose triangle is an ulp nearer than the best
 /// hit culled.
 struct BoxPromise {
   std::string_view box;
+  std::string_view summary;  ///< what `list` says of it
   bool loses_nothing;
   std::string_view remark;
 };
 
 inline constexpr BoxPromise kBoxPromises[] = {
-    {"fast", false, "rounding can lose a box that the ray touches at a face, edge or corner"},
-    {"ize", false,
+    {"fast", "slab test as rounded: may miss a box that the exact ray touches", false,
+     "rounding can lose a box that the ray touches at a face, edge or corner"},
+    {"ize",
+     "Ize 2013: far planes' reciprocals two ulp larger; misses of the boxes that a ray only touches some in a million",
+     false,
      "meets boxes that the ray is in for 2^-22 of its distance or more; may miss one that it only touches, or as near "
      "as the best hit"},
-    {"padded", true, "never misses a box that the exact ray touches"},
+    {"padded", "slab test widened by its error bound: never misses a box that the exact ray touches", true,
+     "never misses a box that the exact ray touches"},
 };
 
 /// The promise of a cell.

@@ -164,6 +164,8 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
     const char* text;
     const char* error;
   } faults[] = {
+      {R"({"cases": [], "cases": []})", "\"cases\" is given twice; keep one"},
+      {R"({"cases": [{"id": "a", "id": "b"}]})", "case a: \"id\" is given twice; keep one"},
       {"{", ":1: no JSON: unexpected end of input; expected string literal; mend"},
       {"{}", "holds no"},
       {R"({"cases": [3]})", "is no object"},
@@ -211,6 +213,7 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
       {hit, R"("t": null)", "t is null, but exact arithmetic finds 1"},
       {hit, R"("closed_hits": 2)", "exact arithmetic finds 3"},
       {hit, R"("hit": "no")", "hit must be true or false, not \"no\""},
+      {hit, R"("nearest_ids": [1,3,3])", "nearest_ids names an id twice: [1,3,3]"},
       {hit, R"("nearest_ids": 0)", "nearest_ids must be a list of whole numbers, not 0"},
       {hit, R"("nearest_ids": [1,-3])", "nearest_ids must be a list of whole numbers"},
       {hit, R"("t": "inf")", "t must be a number, or null for a miss, not \"inf\""},

@@ -12,7 +12,7 @@ struct LaneRays {
   static constexpr int kMost = PacketRays::kMost;
   PacketRays rays;
   alignas(64) float t[kMost];  ///< beyond which nothing counts: tfar, and what has been met
-  std::uint64_t valid;         ///< rays that are rays (core/ray.h)
+  std::uint64_t valid;         ///< valid rays (core/ray.h)
   std::uint64_t negative[3];   ///< by axis: the direction is negative, or -0
 
  protected:

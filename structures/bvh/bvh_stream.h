@@ -189,7 +189,7 @@ class Stream {
 
   /// One node or leaf; false when nothing waits any more.
   ARBORETUM_INLINE bool step(Group& g) {
-    if (g.visitors == 0) return false;  // none of its rays is one
+    if (g.visitors == 0) return false;  // no valid ray
     if constexpr (kCountsTurns) ++turns_, rays_in_turns_ += unsigned(__builtin_popcountll(g.visitors));
     if (bvh::is_leaf(g.target)) {
       leaf(g, g.target, g.visitors);
