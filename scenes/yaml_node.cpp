@@ -136,10 +136,10 @@ Camera YamlFile::camera(const YAML::Node& node) const {
     *value = float(number(node[key], fmt::format("camera {}", key)));
     if (*value < 0.0f) fail(node[key], fmt::format("camera {} must not be negative", key));
   }
-  if (node["focus_distance"] && camera.focus_distance == 0.0f)
-    fail(node["focus_distance"], "camera focus_distance must be above 0");
-  if (camera.aperture_radius > 0.0f && !node["focus_distance"])
-    fail(node, "a camera with an aperture_radius needs a focus_distance above 0");
+  // A pinhole camera has everything in focus: exporters write 0 for it.
+  if (camera.aperture_radius > 0.0f && camera.focus_distance == 0.0f)
+    fail(node["focus_distance"] ? node["focus_distance"] : node,
+         "a camera with an aperture_radius needs a focus_distance above 0");
   return camera;
 }
 

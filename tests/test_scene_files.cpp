@@ -50,6 +50,16 @@ TEST_CASE("scene files: everything that they may hold") {
   CHECK(scene.report.warnings.empty());
 }
 
+TEST_CASE("scene files: a pinhole camera needs no focus distance, and exporters write 0 for it") {
+  const Folder folder;
+  folder.write("a.obj", obj_text());
+  const Scene scene = load_file(folder.write("s.yaml",
+                                             "meshes: [a.obj]\ncamera: {position: [0, 0, 1], look_at: [0, 0, 0], "
+                                             "aperture_radius: 0, focus_distance: 0}\n"));
+  REQUIRE(scene.camera);
+  CHECK(scene.camera->aperture_radius == 0);
+}
+
 TEST_CASE("scene files: key frames are kept, and must fit together") {
   const Folder folder;
   folder.write("a.obj", obj_text());
@@ -114,8 +124,9 @@ TEST_CASE("bad scene files: file, line, and the nearest key") {
       {"meshes: [a.obj]\nenvironment: {radiance: 1, image: x.hdr}\n", ":2: environment needs either"},
       {"meshes: [a.obj]\nenvironment: {image: x.hdr}\n", "x.hdr: no such file"},
       {"meshes: [a.obj]\nenvironment: {image: a.obj}\n", "a.obj: no image that can be read"},
-      {"meshes: [a.obj]\ncamera:\n  position: [0, 0, 1]\n  look_at: [0, 0, 0]\n  focus_distance: 0\n",
-       ":5: camera focus_distance must be above 0"},
+      {"meshes: [a.obj]\ncamera:\n  position: [0, 0, 1]\n  look_at: [0, 0, 0]\n  aperture_radius: 1\n  focus_distance: "
+       "0\n",
+       ":6: a camera with an aperture_radius needs a focus_distance above 0"},
       {"meshes: [a.obj]\ncamera: {position: [0, 0, 1], look_at: [0, 0, 0], aperture_radius: 1}\n",
        ":2: a camera with an aperture_radius needs a focus_distance above 0"},
       {"meshes: [a.obj]\nshutter: [0, 2]\n", ":2: the shutter [0, 2] must lie within [0, 1]"},
