@@ -52,7 +52,7 @@ std::vector<KernelRow> rows_of_every_mode() {
   std::vector<KernelRow> rows;
   for (const KernelRow& row : kernel_table())
     if ((row.structure == "bvh4" || row.structure == "bvh8") && row.intersector == "exact" && row.box == "padded" &&
-        row.leaf == "triangle4v" && is_available(row.isa))
+        (row.leaf == "triangle4v" || row.leaves_compiled_in) && is_available(row.isa))
       rows.push_back(row);
   return rows;
 }
@@ -315,6 +315,20 @@ TEST_CASE("exact kernels of every mode of the kd-tree where the constants of pla
     }
   }
   check(mesh, rays, Truth::by_oracle(mesh, rays), rows);
+}
+
+TEST_CASE("exact kernels of every mode, packets of rays alike whose products overflow") {
+  const auto rows = rows_of_every_mode();
+  REQUIRE(rows.size() >= 2 * 10);
+  for (const auto& [size, length] : {std::pair{10, 104}, {20, 84}, {41, 45}, {60, 5}, {0, 0}}) {
+    const float s = std::ldexp(1.0f, size), l = std::ldexp(1.0f, length);
+    TriangleMesh mesh;
+    add_triangle(mesh, Vec3f{-3, 3, 1} * s, Vec3f{2, 2, -4} * s, Vec3f{-1, 3, 4} * s);
+    const std::vector<Ray> rays(64, Ray{Vec3f{0, -1, 2} * s, 0.0f, Vec3f{-1, 4, -1} * l, kInfinity});
+    const Truth truth = Truth::by_rationals(mesh, rays);
+    REQUIRE(truth.hits.front().is_hit());
+    check(mesh, rays, truth, rows);
+  }
 }
 
 TEST_CASE("exact kernels on inputs that once failed") {

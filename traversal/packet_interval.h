@@ -69,7 +69,9 @@ template <class Block>
   const F u = xor_sign(dot(A, d), sign) + radius(A, A_half);
   const F v = xor_sign(dot(B, d), sign) + radius(B, B_half);
   const F w = xor_sign(dot(rest, d), sign) + radius(rest, plus(A_half, B_half));
-  const vm<W> facing = abs(det) > det_radius;  // of one sign for all rays
+  // Of one sign for all rays; and only where nothing can have overflowed: sums of products are below 4 size^2 |d|,
+  // which is 2^19 times the slack at most.
+  const vm<W> facing = (abs(det) > det_radius) & (slack < F(0x1p108f));
   const vm<W> out = facing & ((u < F(0.0f)) | (v < F(0.0f)) | (w < F(0.0f)));
   // Comparisons with an empty lane's NaN are false: it must be left out by its id.
   return (~(out | (vi<W>::load(block.id) == vi<W>(-1)))).bits();
