@@ -13,7 +13,7 @@ namespace {
 
 struct Field {
   std::string_view name;
-  double low, high;  ///< inclusive
+  ParameterLimits limits = {};
   unsigned BuilderParameters::*integer = nullptr;
   unsigned TraversalSettings::*setting = nullptr;  ///< of a way of traversal
   float BuilderParameters::*real = nullptr;
@@ -41,68 +41,40 @@ std::span<const std::string_view> structure_names() {
 
 const std::vector<Field>& fields() {
   static const std::vector<Field> table{
-      {.name = "bins",
-       .low = kBuilderLimits.bins.low,
-       .high = kBuilderLimits.bins.high,
-       .integer = &BuilderParameters::bins},
-      {.name = "traversal_cost",
-       .low = kBuilderLimits.traversal_cost.low,
-       .high = kBuilderLimits.traversal_cost.high,
-       .real = &BuilderParameters::traversal_cost},
+      {.name = "bins", .limits = kBuilderLimits.bins, .integer = &BuilderParameters::bins},
+      {.name = "traversal_cost", .limits = kBuilderLimits.traversal_cost, .real = &BuilderParameters::traversal_cost},
       {.name = "intersection_cost",
-       .low = kBuilderLimits.intersection_cost.low,
-       .high = kBuilderLimits.intersection_cost.high,
+       .limits = kBuilderLimits.intersection_cost,
        .real = &BuilderParameters::intersection_cost},
       {.name = "max_leaf_blocks",
-       .low = kBuilderLimits.max_leaf_blocks.low,
-       .high = kBuilderLimits.max_leaf_blocks.high,
+       .limits = kBuilderLimits.max_leaf_blocks,
        .integer = &BuilderParameters::max_leaf_blocks},
       {.name = "morton_bits",
-       .low = kBuilderLimits.morton_bits.low,
-       .high = kBuilderLimits.morton_bits.high,
+       .limits = kBuilderLimits.morton_bits,
        .integer = &BuilderParameters::morton_bits,
        .choices = kMortonBits},
-      {.name = "ploc_radius",
-       .low = kBuilderLimits.ploc_radius.low,
-       .high = kBuilderLimits.ploc_radius.high,
-       .integer = &BuilderParameters::ploc_radius},
+      {.name = "ploc_radius", .limits = kBuilderLimits.ploc_radius, .integer = &BuilderParameters::ploc_radius},
       {.name = "duplication_budget",
-       .low = kBuilderLimits.duplication_budget.low,
-       .high = kBuilderLimits.duplication_budget.high,
+       .limits = kBuilderLimits.duplication_budget,
        .real = &BuilderParameters::duplication_budget},
       {.name = "spatial_overlap",
-       .low = kBuilderLimits.spatial_overlap.low,
-       .high = kBuilderLimits.spatial_overlap.high,
+       .limits = kBuilderLimits.spatial_overlap,
        .real = &BuilderParameters::spatial_overlap},
-      {.name = "spatial_gain",
-       .low = kBuilderLimits.spatial_gain.low,
-       .high = kBuilderLimits.spatial_gain.high,
-       .real = &BuilderParameters::spatial_gain},
+      {.name = "spatial_gain", .limits = kBuilderLimits.spatial_gain, .real = &BuilderParameters::spatial_gain},
       {.name = "reinsertion_rounds",
-       .low = kBuilderLimits.reinsertion_rounds.low,
-       .high = kBuilderLimits.reinsertion_rounds.high,
+       .limits = kBuilderLimits.reinsertion_rounds,
        .integer = &BuilderParameters::reinsertion_rounds},
       {.name = "reinsertion_top",
-       .low = kBuilderLimits.reinsertion_top.low,
-       .high = kBuilderLimits.reinsertion_top.high,
+       .limits = kBuilderLimits.reinsertion_top,
        .integer = &BuilderParameters::reinsertion_top,
        .has_own = true},
-      {.name = "empty_bonus",
-       .low = kBuilderLimits.empty_bonus.low,
-       .high = kBuilderLimits.empty_bonus.high,
-       .real = &BuilderParameters::empty_bonus},
-      {.name = "max_depth",
-       .low = kBuilderLimits.max_depth.low,
-       .high = kBuilderLimits.max_depth.high,
-       .integer = &BuilderParameters::max_depth},
-      {.name = "grid_density",
-       .low = kBuilderLimits.grid_density.low,
-       .high = kBuilderLimits.grid_density.high,
-       .real = &BuilderParameters::grid_density},
-      {.name = "below", .low = 0, .high = 0, .word = &BuilderParameters::below, .words = structure_names()},
-      {.name = "collapse", .low = 0, .high = 0, .word = &BuilderParameters::collapse, .words = kCollapses},
-      {.name = "hybrid_threshold", .low = 0, .high = 16, .setting = &TraversalSettings::hybrid_threshold},
-      {.name = "rays_in_flight", .low = 1, .high = 64, .setting = &TraversalSettings::rays_in_flight},
+      {.name = "empty_bonus", .limits = kBuilderLimits.empty_bonus, .real = &BuilderParameters::empty_bonus},
+      {.name = "max_depth", .limits = kBuilderLimits.max_depth, .integer = &BuilderParameters::max_depth},
+      {.name = "grid_density", .limits = kBuilderLimits.grid_density, .real = &BuilderParameters::grid_density},
+      {.name = "below", .word = &BuilderParameters::below, .words = structure_names()},
+      {.name = "collapse", .word = &BuilderParameters::collapse, .words = kCollapses},
+      {.name = "hybrid_threshold", .limits = {0, 16}, .setting = &TraversalSettings::hybrid_threshold},
+      {.name = "rays_in_flight", .limits = {1, 64}, .setting = &TraversalSettings::rays_in_flight},
   };
   return table;
 }
@@ -114,15 +86,15 @@ const Field& field(std::string_view name) {
 std::string expectation(const Field& f) {
   if (f.word) return fmt::format("one of {}", fmt::join(f.words, ", "));
   if (!f.choices.empty()) return fmt::format("one of {}", fmt::join(f.choices, ", "));
-  if (f.has_own) return fmt::format("{} or an integer from {} to {}", kOwn, f.low, f.high);
-  return fmt::format("{} from {} to {}", f.integer ? "an integer" : "a number", f.low, f.high);
+  if (f.has_own) return fmt::format("{} or an integer from {} to {}", kOwn, f.limits.low, f.limits.high);
+  return fmt::format("{} from {} to {}", f.integer ? "an integer" : "a number", f.limits.low, f.limits.high);
 }
 
 template <class T>
-bool parse_within(const std::string& text, double low, double high, T& out) {
+bool parse_within(const std::string& text, const ParameterLimits& limits, T& out) {
   T value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high)) return false;
+  if (error != std::errc{} || end != text.data() + text.size() || !limits.hold(value)) return false;
   out = value;
   return true;
 }
@@ -149,18 +121,18 @@ std::string set_parameter(Parameters& all, std::string_view name, const std::str
   bool done = false;
   if (f.has_own) {
     unsigned& setting = f.of(all);
-    done = value == kOwn || parse_within(value, f.low, f.high, setting);
+    done = value == kOwn || parse_within(value, f.limits, setting);
     if (value == kOwn) setting = BuilderParameters::kOwn;
   } else if (f.word) {
     done = std::ranges::find(f.words, value) != f.words.end();
     if (done) parameters.*f.word = value;
   } else if (!f.choices.empty()) {
     unsigned chosen = 0;
-    done = parse_within(value, f.low, f.high, chosen) && std::ranges::find(f.choices, chosen) != f.choices.end();
+    done = parse_within(value, f.limits, chosen) && std::ranges::find(f.choices, chosen) != f.choices.end();
     if (done) parameters.*f.integer = chosen;
   } else {
-    done = f.integer ? parse_within(value, f.low, f.high, parameters.*f.integer)
-                     : parse_within(value, f.low, f.high, parameters.*f.real);
+    done = f.integer ? parse_within(value, f.limits, parameters.*f.integer)
+                     : parse_within(value, f.limits, parameters.*f.real);
   }
   return done ? std::string() : expectation(f);
 }

@@ -21,7 +21,7 @@ std::string text_of(T value) {
 
 template <class T>
 void require(std::string_view parameter, T value, const ParameterLimits& limits) {
-  if (value >= T(limits.low) && value <= T(limits.high)) return;
+  if (limits.hold(value)) return;
   throw UserError(std::string(parameter) + ": " + text_of(value) + " is not within " + text_of(limits.low) + " .. " +
                   text_of(limits.high));
 }

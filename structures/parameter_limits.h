@@ -12,6 +12,12 @@ namespace arboretum {
 /// Both ends inclusive.
 struct ParameterLimits {
   double low, high;
+
+  /// Limits are those of the value's type: 0.01 as a float is a little less. NaN is not within.
+  template <class T>
+  [[nodiscard]] constexpr bool hold(T value) const noexcept {
+    return value >= T(low) && value <= T(high);
+  }
 };
 
 struct BuilderLimits {
@@ -33,8 +39,7 @@ inline constexpr std::array<std::string_view, 2> kCollapses{"optimal", "greedy"}
 /// References that a tree of two nodes each can have, numbered in 31 bits.
 inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 30) - 1;
 
-/// Throw UserError unless `value` is within the limits; NaN is not. Limits are those of the value's type: 0.01 as a
-/// float is a little less.
+/// Throw UserError unless the limits hold `value`.
 void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits);
 void require_within(std::string_view parameter, float value, const ParameterLimits& limits);
 /// Throws UserError for more than `most` triangles, which is a power of two less one.

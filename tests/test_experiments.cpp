@@ -2,6 +2,7 @@
 #include "experiments/axis_words.h"
 #include "experiments/config.h"
 #include "experiments/effective.h"
+#include "experiments/parameters.h"
 #include "experiments/plan.h"
 #include "tests/catch.h"
 #include "tests/experiments_on_paper.h"
@@ -274,6 +275,14 @@ TEST_CASE("an include without a structure is of the sweep's structures that take
   const std::vector<std::string> more = added("include: [{isa: scalar}]");
   REQUIRE(more.size() == 4);
   CHECK(more[3].find("/list/none/triangle4/moller_trumbore/fast/single/scalar/") != std::string::npos);
+}
+
+TEST_CASE("a parameter may take the ends of its limits as they are written") {
+  Parameters parameters;
+  CHECK(set_parameter(parameters, "spatial_gain", "0.01").empty());
+  CHECK(parameters.builder.spatial_gain == 0.01f);
+  CHECK(set_parameter(parameters, "empty_bonus", "0.95").empty());
+  CHECK(set_parameter(parameters, "spatial_gain", "0.0099") == "a number from 0.01 to 1");
 }
 
 TEST_CASE(

@@ -89,12 +89,6 @@ bool meets_exactly(const Ray& ray, const Corners& corners, DistanceInterval& t) 
   return true;
 }
 
-DistanceInterval distance_in_double(const Ray& ray, const Corners& corners) noexcept {
-  const DoublePoint p = point_in_double(ray, corners);
-  if (!(p.radius < double(kInfinity))) return {-kInfinity, kInfinity};
-  return {rounded_down(p.t - p.radius), rounded_up(p.t + p.radius)};
-}
-
 int compare_distances_exactly(const Ray& ray, const Corners& first, const Corners& second) noexcept {
   const DoublePoint p = point_in_double(ray, first), q = point_in_double(ray, second);
   // 2^-50 of each t is in its radius, more than what this sum and this difference round by.

@@ -20,10 +20,6 @@ struct DistanceInterval {
 /// valid.
 [[nodiscard]] bool meets_exactly(const Ray& ray, const std::array<Vec3f, 3>& corners, DistanceInterval& t) noexcept;
 
-/// An interval about t for a triangle that the ray's line meets, computed in doubles: an ulp or two wide where the
-/// triangle is not seen edge on, infinite where doubles cannot bound t.
-[[nodiscard]] DistanceInterval distance_in_double(const Ray& ray, const std::array<Vec3f, 3>& corners) noexcept;
-
 /// Sign of t(first) - t(second), exactly. The ray's line must meet both.
 [[nodiscard]] int compare_distances_exactly(const Ray& ray, const std::array<Vec3f, 3>& first,
                                             const std::array<Vec3f, 3>& second) noexcept;

@@ -101,7 +101,6 @@ class Stream {
     std::uint32_t index[kRays];
     alignas(64) std::byte data[kKeepsData ? kRays * sizeof(RayData) : 1];
     unsigned count = 0, octant = 0;
-    std::uint64_t valid = 0;
     std::uint64_t active = 0;  ///< rays whose search is not over
     StreamStack stack;
     unsigned top;                ///< entries of the stack
@@ -158,7 +157,7 @@ class Stream {
     }
     for (int k = 0; k < count; k += kNativeWidth)
       (vf<kNativeWidth>::load(lanes_.t + k) * vf<kNativeWidth>(pad_.beyond())).store(g.t + k);
-    g.count = unsigned(count), g.octant = octant, g.active = g.valid = lanes_.valid;
+    g.count = unsigned(count), g.octant = octant, g.active = lanes_.valid;
     g.stack = stack, g.top = 0;
     g.target = root_, g.visitors = g.active;
     g.depths = typename Counting::Depths(typename Counting::Depth{});
@@ -180,7 +179,7 @@ class Stream {
   void finish(Group& g, const Report& report) {
     if constexpr (!AnyHit) {
       finish_hits(
-          leaves_, g.valid, [&](int i) -> const Ray& { return ray(g, unsigned(i)); },
+          leaves_, ~std::uint64_t{0} >> (kRays - g.count), [&](int i) -> const Ray& { return ray(g, unsigned(i)); },
           [&](int i) -> decltype(auto) { return data(g, unsigned(i)); },
           [&](int i) -> NearestHit& { return g.best[i]; });
     }

@@ -14,10 +14,10 @@ inline constexpr std::size_t kBlockPadding = sizeof(Block) - offsetof(Block, id)
 /// Zeroes what fill_blocks() leaves of `count` blocks.
 template <class Block>
 void clear_padding(Block* blocks, std::size_t count) noexcept {
-  if constexpr (kBlockPadding < Block >> 0) {
+  constexpr std::size_t kBytes = kBlockPadding<Block>;
+  if constexpr (kBytes > 0) {
     for (std::size_t i = 0; i < count; ++i)
-      std::memset(reinterpret_cast<std::byte*>(blocks + i) + sizeof(Block) - kBlockPadding<Block>, 0,
-                  kBlockPadding<Block>);
+      std::memset(reinterpret_cast<std::byte*>(blocks + i + 1) - kBytes, 0, kBytes);
   }
 }
 
