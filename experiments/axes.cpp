@@ -45,8 +45,8 @@ constexpr Summary kTraversals[] = {
     {"stream_incoherent", "Embree's stream of single rays, never with its coherent flag"},
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
     {"auto",
-     "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (single rays where there "
-     "are none)"},
+     "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (rays in flight where they "
+     "share too little on SSE, and in bvh4_aos and the quantised BVHs; single rays where neither pays)"},
 };
 constexpr Summary kIsas[] = {
     {"scalar", "no vector instructions: the reference that every machine runs"},
