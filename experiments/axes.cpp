@@ -39,7 +39,9 @@ constexpr Summary kTraversals[] = {
     {"queued", "32 rays in flight (any hit: 64), their next steps in queues"},
     {"packet", "rays in the lanes, as many as the instruction set has"},
     {"hybrid", "packets that fall apart into single rays, as wide as the instruction set"},
-    {"stream", "groups of up to 64 rays of an octant share nodes, each with a mask of its rays"},
+    {"stream",
+     "groups of up to 64 rays of an octant share nodes, each with a mask of its rays; of embree its own, with its "
+     "coherent flag for primary rays alone"},
     {"stream_sorted", "stream, of rays sorted by octant and origin within the measured time"},
     {"stream_coherent", "Embree's stream of single rays, always with its coherent flag"},
     {"stream_incoherent", "Embree's stream of single rays, never with its coherent flag"},
