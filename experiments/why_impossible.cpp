@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "experiments/call_axis.h"
 #include "traversal/kernel_keys.h"
 
 namespace arboretum {
@@ -50,7 +51,8 @@ std::string why_impossible(Cell& cell, bool moves, const Registry& registry) {
         registry.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
     return why.empty() ? "no such kernel in this build" : why;
   }
-  return why_no_threshold(cell.traversal, cell.settings.hybrid_threshold);
+  const std::string why = why_no_threshold(cell.traversal, cell.settings.hybrid_threshold);
+  return why.empty() ? why_no_call(cell) : why;
 }
 
 }  // namespace arboretum
