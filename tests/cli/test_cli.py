@@ -328,7 +328,7 @@ class CommandLine(CommandLineCase):
 
     def test_lists(self):
         listed = json.loads(self.call("list", "--json").stdout)
-        for title in ("structures", "builders", "leaves", "intersectors", "boxes", "traversals", "isas", "workloads", "scenes"):
+        for title in ("structures", "builders", "leaves", "intersectors", "boxes", "traversals", "calls", "isas", "workloads", "scenes"):
             self.assertTrue(listed[title], title)
             for entry in listed[title]:
                 self.assertTrue(entry["summary"], f"{title}: {entry['name']} has no summary")
