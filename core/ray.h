@@ -45,9 +45,9 @@ static_assert(sizeof(Hit) == 16);
 
 /// What may be chosen of a way of traversal; kOwn: what the way itself has found best. No answer depends on it.
 struct TraversalSettings {
-  static constexpr unsigned kOwn = ~0u;
+  static constexpr unsigned kOwn = ~0u, kWidestHybrid = 16, kMostInFlight = 64;
   unsigned hybrid_threshold = kOwn;  ///< of hybrid4, 8, 16: so many rays in a node, or fewer, go on alone; 0: none ever
-  unsigned rays_in_flight = kOwn;    ///< of queued: 1 to 64
+  unsigned rays_in_flight = kOwn;    ///< of queued: 1 to kMostInFlight
   [[nodiscard]] static constexpr unsigned chosen(unsigned set, unsigned own) noexcept {
     return set == kOwn ? own : set;
   }

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <utility>
 
+#include "experiments/call_axis.h"
 #include "experiments/rendered_rays.h"
 #include "intersectors/promises.h"
 #include "rendering/hard_workload.h"
@@ -39,14 +40,21 @@ constexpr Summary kTraversals[] = {
     {"queued", "32 rays in flight (any hit: 64), their next steps in queues"},
     {"packet", "rays in the lanes, as many as the instruction set has"},
     {"hybrid", "packets that fall apart into single rays, as wide as the instruction set"},
-    {"stream", "groups of up to 64 rays of an octant share nodes, each with a mask of its rays"},
+    {"stream",
+     "groups of up to 64 rays of an octant share nodes, each with a mask of its rays; of embree its own, with its "
+     "coherent flag for primary rays alone"},
     {"stream_sorted", "stream, of rays sorted by octant and origin within the measured time"},
     {"stream_coherent", "Embree's stream of single rays, always with its coherent flag"},
     {"stream_incoherent", "Embree's stream of single rays, never with its coherent flag"},
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
     {"auto",
-     "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (single rays where there "
-     "are none)"},
+     "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (rays in flight where they "
+     "share too little on SSE, and in bvh4_aos and the quantised BVHs; single rays where neither pays)"},
+};
+constexpr Summary kCallSummaries[] = {
+    {"batch", "all rays in one call"},
+    {"packet", "a call for each packet of the traversal's width (packetN, hybridN)"},
+    {"ray", "a call for each ray (single rays, packets, hybrids, auto)"},
 };
 constexpr Summary kIsas[] = {
     {"scalar", "no vector instructions: the reference that every machine runs"},
@@ -182,6 +190,9 @@ std::vector<std::string> known_values(Axis axis, const Registry& registry) {
         }
       }
       break;
+    case Axis::call:
+      for (std::string_view call : kCalls) append_new(list, call);
+      break;
     case Axis::isa:
       for (Isa isa : kAllIsas) append_new(list, to_string(isa));
       break;
@@ -224,6 +235,7 @@ std::string summary_of(Axis axis, std::string_view value, const Registry& regist
     case Axis::intersector: return std::string(intersector_summary(value));
     case Axis::box: return std::string(box_summary(value));
     case Axis::traversal: return traversal_summary(value);
+    case Axis::call: return std::string(look_up(kCallSummaries, value));
     case Axis::isa: return std::string(look_up(kIsas, value));
     case Axis::workload: return std::string(look_up(kWorkloads, value));
     case Axis::threads: return {};

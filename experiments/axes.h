@@ -12,10 +12,10 @@
 
 namespace arboretum {
 
-enum class Axis : unsigned char { structure, builder, leaf, intersector, box, traversal, isa, workload, threads };
-inline constexpr std::size_t kAxisCount = 9;
+enum class Axis : unsigned char { structure, builder, leaf, intersector, box, traversal, call, isa, workload, threads };
+inline constexpr std::size_t kAxisCount = 10;
 inline constexpr std::array<std::string_view, kAxisCount> kAxisNames{
-    "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads"};
+    "structure", "builder", "leaf", "intersector", "box", "traversal", "call", "isa", "workload", "threads"};
 
 /// One list of values an axis.
 using AxisLists = std::array<std::vector<std::string>, kAxisCount>;

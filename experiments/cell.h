@@ -20,14 +20,16 @@ struct Cell {
   BuilderParameters parameters;
   std::string parameter_label;  ///< what of `parameters` is swept: ":bins=16"; part of the name
   TraversalSettings settings;
-  std::string setting_label;          ///< what of `settings` is swept: ":hybrid_threshold=2"; part of the name
+  std::string call = "batch";  ///< how many rays the kernel gets a call (experiments/call_axis.h)
+  /// what of `settings` is swept, and a call other than `batch`: ":hybrid_threshold=2:call=ray"; part of the name
+  std::string setting_label;
   SurfaceStart start;                 ///< of workloads whose rays start on surfaces
   std::string start_label;            ///< where it is swept: ":self_intersection=none"; part of the name
   const KernelRow* kernel = nullptr;  ///< of a trace cell
 
   /// `metric/scene/structure/builder/leaf/intersector/box/traversal/isa/workload/threads:N`; `-` where an
   /// axis does not apply; what is swept follows what it is of: `binned_sah:bins=16`, `hybrid8:hybrid_threshold=2`,
-  /// `diffuse:self_intersection=none`.
+  /// `single:call=ray`, `diffuse:self_intersection=none`.
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::string builder_name() const { return builder + parameter_label; }
   [[nodiscard]] std::string traversal_name() const { return traversal + setting_label; }

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "experiments/axis_words.h"
+#include "experiments/call_axis.h"
 #include "experiments/config_plots.h"
 #include "experiments/config_scenes.h"
 #include "experiments/yaml_reader.h"
@@ -295,6 +296,7 @@ class ConfigReader {
     fill(Axis::intersector, first_known(Axis::intersector, "watertight"));
     fill(Axis::box, std::string(kAuto));
     fill(Axis::traversal, first_known(Axis::traversal, "single"));
+    fill(Axis::call, std::string(kCalls.front()));
     fill(Axis::isa, std::string(to_string(registry_.isas.back())));
     fill(Axis::workload, "primary");
     fill(Axis::threads, threads_);

@@ -15,6 +15,7 @@
 
 #include "core/data_folder.h"
 #include "experiments/build_info.h"
+#include "structures/accel.h"
 
 namespace arboretum {
 namespace {
@@ -111,6 +112,9 @@ Json machine_context(const Experiment& experiment, const std::string& configurat
   context["compiler_flags"] = build_info::kFlags;
   context["build_type"] = build_info::kBuildType;
   context["version"] = build_info::kVersion;
+  if (const StructureEntry* embree = find_structure("embree"))
+    context["embree"] =
+        std::string(embree->info.summary.substr(0, embree->info.summary.find(':')));  // with its version
   const Revision at = revision();
   context["git_revision"] = at.hash.empty() ? "unknown" : at.hash;
   context["git_dirty"] = at.dirty;

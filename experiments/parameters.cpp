@@ -73,8 +73,12 @@ const std::vector<Field>& fields() {
       {.name = "grid_density", .limits = kBuilderLimits.grid_density, .real = &BuilderParameters::grid_density},
       {.name = "below", .word = &BuilderParameters::below, .words = structure_names()},
       {.name = "collapse", .word = &BuilderParameters::collapse, .words = kCollapses},
-      {.name = "hybrid_threshold", .limits = {0, 16}, .setting = &TraversalSettings::hybrid_threshold},
-      {.name = "rays_in_flight", .limits = {1, 64}, .setting = &TraversalSettings::rays_in_flight},
+      {.name = "hybrid_threshold",
+       .limits = kTraversalLimits.hybrid_threshold,
+       .setting = &TraversalSettings::hybrid_threshold},
+      {.name = "rays_in_flight",
+       .limits = kTraversalLimits.rays_in_flight,
+       .setting = &TraversalSettings::rays_in_flight},
   };
   return table;
 }

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/missing_isa.h"
+#include "experiments/call_axis.h"
 #include "experiments/name_filter.h"
 #include "experiments/why_impossible.h"
 #include "rendering/workload.h"
@@ -58,23 +59,24 @@ class Planner {
             for (const std::string& intersector : values(Axis::intersector))
               for (const std::string& box : values(Axis::box))
                 for (const std::string& traversal : values(Axis::traversal))
-                  for (const std::string& isa : values(Axis::isa))
-                    for (const std::string& workload : values(Axis::workload))
-                      for (SelfIntersection start : starts_of(workload))
-                        for (const std::string& threads : values(Axis::threads)) {
-                          Cell cell;
-                          cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
-                          cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
-                          cell.intersector = intersector, cell.box = box, cell.traversal = traversal;
-                          cell.isa = *parse_isa(isa), cell.workload = workload;
-                          cell.threads = static_cast<unsigned>(std::stoul(threads));
-                          cell.parameters = point.parameters.builder, cell.parameter_label = point.label;
-                          cell.settings = point.parameters.traversal, cell.setting_label = point.traversal_label;
-                          cell.start = {start, experiment_.rays.epsilon};
-                          if (starts_of(workload).size() > 1)
-                            cell.start_label = fmt::format(":self_intersection={}", to_string(start));
-                          add(std::move(cell), out);
-                        }
+                  for (const std::string& call : values(Axis::call))
+                    for (const std::string& isa : values(Axis::isa))
+                      for (const std::string& workload : values(Axis::workload))
+                        for (SelfIntersection start : starts_of(workload))
+                          for (const std::string& threads : values(Axis::threads)) {
+                            Cell cell;
+                            cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
+                            cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
+                            cell.intersector = intersector, cell.box = box, cell.traversal = traversal;
+                            cell.call = call, cell.isa = *parse_isa(isa), cell.workload = workload;
+                            cell.threads = static_cast<unsigned>(std::stoul(threads));
+                            cell.parameters = point.parameters.builder, cell.parameter_label = point.label;
+                            cell.settings = point.parameters.traversal, cell.setting_label = point.traversal_label;
+                            cell.start = {start, experiment_.rays.epsilon};
+                            if (starts_of(workload).size() > 1)
+                              cell.start_label = fmt::format(":self_intersection={}", to_string(start));
+                            add(std::move(cell), out);
+                          }
   }
 
   /// The ways of leaving a surface that make cells of the workload; the usual one for rays that start elsewhere.
@@ -100,6 +102,7 @@ class Planner {
   void resolve(Cell& cell, const StructureEntry* entry) {
     cell.traversal = resolve_traversal(cell.traversal, cell.isa);
     keep_settings(cell);
+    if (cell.call != kCalls.front()) cell.setting_label += fmt::format(":call={}", cell.call);
     cell.box = std::string(resolve_box(cell.box, cell.intersector));
     // What stands above another structure takes that one's defaults.
     const StructureEntry* below =
@@ -158,15 +161,11 @@ class Planner {
 
   bool matches(const CellChoice& choice, const Cell& cell) const {
     if (!names_scene(choice, experiment_.scenes[cell.scene_index])) return false;
-    const std::string values[kAxisCount] = {cell.structure,
-                                            cell.builder,
-                                            cell.leaf,
-                                            cell.intersector,
-                                            cell.box,
-                                            cell.traversal,
-                                            std::string(to_string(cell.isa)),
-                                            cell.workload,
-                                            std::to_string(cell.threads)};
+    const std::string values[kAxisCount] = {cell.structure, cell.builder,
+                                            cell.leaf,      cell.intersector,
+                                            cell.box,       cell.traversal,
+                                            cell.call,      std::string(to_string(cell.isa)),
+                                            cell.workload,  std::to_string(cell.threads)};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       if (choice.axes[i].empty() || contains(choice.axes[i], values[i])) continue;
       const bool by_width =
@@ -267,7 +266,7 @@ class Planner {
     cell.kernel = nullptr;
     cell.intersector = cell.box = cell.traversal = cell.workload = kNone;
     cell.start = {}, cell.start_label.clear();
-    cell.settings = {}, cell.setting_label.clear();
+    cell.settings = {}, cell.call = kNone, cell.setting_label.clear();
     return cell;
   }
 

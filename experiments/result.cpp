@@ -176,7 +176,8 @@ std::string seen_points_file(const std::string& scene) { return fmt::format("cam
 void add_axes(Json& json, const Cell& cell) {
   json["metric"] = to_string(cell.metric), json["scene"] = cell.scene, json["structure"] = cell.structure;
   json["builder"] = cell.builder_name(), json["leaf"] = cell.leaf, json["intersector"] = cell.intersector;
-  json["box"] = cell.box, json["traversal"] = cell.traversal_name(), json["isa"] = to_string(cell.isa);
+  json["box"] = cell.box, json["traversal"] = cell.traversal_name(), json["call"] = cell.call,
+  json["isa"] = to_string(cell.isa);
   json["workload"] = cell.workload_name(), json["threads"] = cell.threads;
 }
 

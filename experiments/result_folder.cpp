@@ -176,6 +176,7 @@ Cell cell_of(const Json& entry) {
   cell.intersector = text("intersector"), cell.box = text("box");
   part(text("builder"), cell.builder, cell.parameter_label);
   part(text("traversal"), cell.traversal, cell.setting_label);
+  cell.call = entry.value("call", cell.call);
   part(text("workload"), cell.workload, cell.start_label);
   cell.isa = parse_isa(text("isa")).value_or(Isa::scalar);
   cell.threads = entry.at("threads").get<unsigned>();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/timer.h"
+#include "experiments/call_axis.h"
 #include "experiments/exclusion.h"
 #include "experiments/warm_up.h"
 
@@ -20,29 +21,41 @@ constexpr std::size_t kMostPoints = 4000;  // of a cell's leaks
 }  // namespace
 
 TraceJob::TraceJob(const Cell& cell, const Accel& accel, const Workload& workload, AnswerBuffers& buffers)
-    : cell_(cell), accel_(accel), workload_(workload), buffers_(buffers), arena_(static_cast<int>(cell.threads)) {
+    : cell_(cell), accel_(accel), workload_(workload), buffers_(buffers), arena_(static_cast<int>(cell.threads)),
+      rays_a_call_(rays_a_call(cell)) {
   if (workload.query == Query::closest_hit)
     buffers.hits.resize(std::max(buffers.hits.size(), workload.rays.size()));
   else
     buffers.occluded.resize(std::max(buffers.occluded.size(), workload.rays.size()));
 }
 
+template <class Trace>
+void TraceJob::by_calls(const RayBatch& rays, const Trace& trace) const {
+  if (rays_a_call_ == 0) return trace(rays, 0);
+  for (std::size_t begin = 0; begin < rays.size(); begin += rays_a_call_)
+    trace(rays.part(begin, std::min(rays_a_call_, rays.size() - begin)), begin);
+}
+
 void TraceJob::closest(RayBatch rays, std::size_t first, Counters* counters) const {
-  const auto hits = std::span(buffers_.hits).subspan(first, rays.size());
-  if (workload_.excludes_sources)
-    closest_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), hits,
-                          counters);
-  else
-    cell_.kernel->closest_hit(accel_, rays, hits, counters);
+  by_calls(rays, [&](const RayBatch& part, std::size_t begin) {
+    const auto hits = std::span(buffers_.hits).subspan(first + begin, part.size());
+    if (workload_.excludes_sources)
+      closest_hit_excluding(*cell_.kernel, accel_, part,
+                            std::span(workload_.sources).subspan(first + begin, part.size()), hits, counters);
+    else
+      cell_.kernel->closest_hit(accel_, part, hits, counters);
+  });
 }
 
 void TraceJob::any(RayBatch rays, std::size_t first, Counters* counters) const {
-  const auto occluded = std::span(buffers_.occluded).subspan(first, rays.size());
-  if (workload_.excludes_sources)
-    any_hit_excluding(*cell_.kernel, accel_, rays, std::span(workload_.sources).subspan(first, rays.size()), occluded,
-                      counters);
-  else
-    cell_.kernel->any_hit(accel_, rays, occluded, counters);
+  by_calls(rays, [&](const RayBatch& part, std::size_t begin) {
+    const auto occluded = std::span(buffers_.occluded).subspan(first + begin, part.size());
+    if (workload_.excludes_sources)
+      any_hit_excluding(*cell_.kernel, accel_, part, std::span(workload_.sources).subspan(first + begin, part.size()),
+                        occluded, counters);
+    else
+      cell_.kernel->any_hit(accel_, part, occluded, counters);
+  });
 }
 
 RayBatch TraceJob::batch() const {

@@ -34,9 +34,12 @@ class TraceJob {
  private:
   [[nodiscard]] RayBatch batch() const;
   void trace(std::size_t rays) const;
-  /// Of `rays`, which begin with ray `first` of the workload, into the buffers.
+  /// Of `rays`, which begin with ray `first` of the workload, into the buffers, by calls as the cell has them.
   void closest(RayBatch rays, std::size_t first, Counters* counters) const;
   void any(RayBatch rays, std::size_t first, Counters* counters) const;
+  /// trace(rays of a call, the first one's place) for each call.
+  template <class Trace>
+  void by_calls(const RayBatch& rays, const Trace& trace) const;
   [[nodiscard]] Counters count() const;
 
   const Cell& cell_;
@@ -44,6 +47,7 @@ class TraceJob {
   const Workload& workload_;
   AnswerBuffers& buffers_;
   mutable tbb::task_arena arena_;
+  const std::size_t rays_a_call_;  ///< 0: all
   std::uint64_t passes_ = 1;
 };
 

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "experiments/axis_words.h"
+#include "experiments/call_axis.h"
 
 namespace arboretum {
 namespace {
@@ -36,11 +37,13 @@ Plan make_verify_plan(const VerifyCommand& command, const SceneChoice& scene, bo
     // `all` of any axis; the builder has one of its own.
     const std::size_t equals = word.find('=');
     const auto axis = parse_axis(word.substr(0, equals));
-    if (axis && axis != Axis::builder && equals != std::string::npos && word.substr(equals + 1) == kAll) {
+    if (axis && axis != Axis::builder && axis != Axis::call && equals != std::string::npos &&
+        word.substr(equals + 1) == kAll) {
       experiment.axes[index_of(*axis)] = all_values(*axis, registry, without_brute_force);
       continue;
     }
     AxisWord read = read_axis_word(word, registry, {});
+    if (read.key == "call") throw UserError("command line: verify calls with batches alone and has no call axis");
     if (read.key == "workload" || read.key == "threads")
       throw UserError(
           fmt::format("command line: verify has rays of its own and no {} axis; see --kinds, --threads", read.key));
@@ -51,7 +54,7 @@ Plan make_verify_plan(const VerifyCommand& command, const SceneChoice& scene, bo
   };
   for (Axis a : {Axis::structure, Axis::intersector, Axis::isa}) fill(a, all_values(a, registry, without_brute_force));
   for (Axis a : {Axis::builder, Axis::leaf, Axis::box}) fill(a, {std::string(kAuto)});
-  fill(Axis::traversal, {"single"});
+  fill(Axis::traversal, {"single"}), fill(Axis::call, {std::string(kCalls.front())});
   fill(Axis::workload, {"verify"}), fill(Axis::threads, {"1"});
   Plan plan = make_plan(experiment, registry);
   apply_filter(plan, command.filter, command.skip);

@@ -4,19 +4,13 @@
 
 #include <algorithm>
 
+#include "experiments/call_axis.h"
+#include "traversal/kernel_keys.h"
+
 namespace arboretum {
 namespace {
 
 constexpr std::string_view kEmbreeMissing = "this build has no embree: install libembree-dev and build again";
-
-/// Why the cell's way of traversal cannot be set so; empty where it can.
-std::string impossible_setting(const Cell& cell) {
-  const unsigned threshold = cell.settings.hybrid_threshold;
-  if (threshold == TraversalSettings::kOwn) return {};
-  const auto rays = static_cast<unsigned>(std::stoul(cell.traversal.substr(std::string_view("hybrid").size())));
-  if (threshold <= rays) return {};
-  return fmt::format("{} has packets of {} rays: no threshold of {}", cell.traversal, rays, threshold);
-}
 
 std::string lacks_builder(const StructureEntry& entry, const std::string& builder) {
   const auto& builders = entry.info.builders;
@@ -57,7 +51,8 @@ std::string why_impossible(Cell& cell, bool moves, const Registry& registry) {
         registry.why_no_kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
     return why.empty() ? "no such kernel in this build" : why;
   }
-  return impossible_setting(cell);
+  const std::string why = why_no_threshold(cell.traversal, cell.settings.hybrid_threshold);
+  return why.empty() ? why_no_call(cell) : why;
 }
 
 }  // namespace arboretum

@@ -121,21 +121,21 @@ struct Exact {
     unsigned hit, again;
     alignas(64) float low[W], high[W];
   };
-  /// Lanes are the W rays from k on, of group kz, all against triangle `i` of the block.
+  /// Lanes are the W rays from k on, of group kz, all against triangle `i` of the block; only those of `in` count.
   template <bool AnyHit, int W, class Block>
-  static ARBORETUM_INLINE void filter_rays(const PacketRays& rays, const PacketData& packet, int kz, int k,
+  static ARBORETUM_INLINE void filter_rays(const PacketRays& rays, const PacketData& packet, int kz, int k, unsigned in,
                                            const Block& block, int i, vf<W> tfar, FilteredRays<W>& out) {
     using F = vf<W>;
     const Edges<W> edges(packet.template sheared<W>(rays, kz, k, block, i));
     out.hit = out.again = 0;
-    if (edges.candidates() == 0) return;
+    const unsigned met = in & edges.candidates();
+    if (met == 0) return;
     const Intervals<W> t(edges, F::load(packet.sz + k));
     const F tnear = F::load(rays.tnear + k);
-    const unsigned candidates = edges.candidates() & ~((t.low > tfar) | (t.high < tnear)).bits();
-    vm<W> hit = t.certain & (t.low >= tnear) & (t.high <= tfar);
-    if constexpr (!AnyHit) hit = hit & t.narrow();
-    out.hit = candidates & hit.bits(), out.again = candidates & ~hit.bits();
+    const unsigned within = met & possible(t.low, t.high, tnear, tfar);
     t.low.store(out.low), t.high.store(out.high);
+    out.hit = within & settled<AnyHit>(t.low, t.high, t.certain, tnear, tfar), out.again = within & ~out.hit;
+    if (__builtin_expect(out.again != 0, 0)) narrow_rays<AnyHit>(rays, k, block, i, t.certain.bits(), tnear, tfar, out);
   }
   /// Such a hit becomes a ray's best where it is; false where the filter cannot tell.
   template <class Block>
@@ -176,8 +176,8 @@ struct Exact {
       const auto [bx, by, b] = p.b;
       const auto [cx, cy, c] = p.c;
       u = msub(cx, by, cy * bx), v = msub(ax, cy, ay * cx), w = msub(bx, ay, by * ax);
-      const F width = max_x86(max_x86(max_x86(abs(ax), abs(ay)), max_x86(abs(bx), abs(by))), max_x86(abs(cx), abs(cy)));
-      const F depth = max_x86(max_x86(abs(az), abs(bz)), abs(cz));
+      const F width = max_abs(max_abs(max_abs(ax, ay), max_abs(bx, by)), max_abs(cx, cy));
+      const F depth = largest_component(az, bz, cz);
       error = madd(F(kBound), madd(F(7.0f * 0x1p-24f), depth, width) * (depth + width), F(kLeast));
       lowest = min_x86(min_x86(u, v), w), highest = max_x86(max_x86(u, v), w);
     }
@@ -201,7 +201,7 @@ struct Exact {
     ARBORETUM_INLINE Intervals(const Edges<W>& l, F sz) {
       const F za = sz * l.az, zb = sz * l.bz, zc = sz * l.cz;
       const F nearest = min_x86(min_x86(za, zb), zc), farthest = max_x86(max_x86(za, zb), zc);
-      const F size = max_x86(abs(nearest), abs(farthest));
+      const F size = max_abs(nearest, farthest);
       const F det = l.u + l.v + l.w, inverse = F(1.0f) / det;
       const F t = madd(l.u * inverse, za, madd(l.v * inverse, zb, (l.w * inverse) * zc));
       const F spread =
@@ -212,9 +212,21 @@ struct Exact {
       const F pad = madd(F(8.0f * 0x1p-24f), size, F(kLeast));
       low = select(certain, t - spread, nearest - pad), high = select(certain, t + spread, farthest + pad);
     }
-    /// No box that begins behind the hit is let through by much.
-    ARBORETUM_INLINE vm<W> narrow() const { return high - low <= F(kWide) * abs(high); }
   };
+
+  /// Lanes whose t may be within [tnear, tfar]. Comparisons that a NaN makes false: one without a usable interval may.
+  template <int W>
+  static ARBORETUM_INLINE unsigned possible(vf<W> low, vf<W> high, vf<W> tnear, vf<W> tfar) {
+    return ~((low > tfar) | (high < tnear)).bits();
+  }
+  /// Lanes whose t is, and, where the nearest is looked for, known well: no box that begins behind it is let through by
+  /// much.
+  template <bool AnyHit, int W>
+  static ARBORETUM_INLINE unsigned settled(vf<W> low, vf<W> high, vm<W> certain, vf<W> tnear, vf<W> tfar) {
+    vm<W> all = certain & (low >= tnear) & (high <= tfar);
+    if constexpr (!AnyHit) all = all & (high - low <= vf<W>(kWide) * abs(high));
+    return all.bits();
+  }
 
   /// The candidates within an interval: t of lane i is within [low[i], high[i]] if it is hit; the `certain` lanes are.
   template <int W>
@@ -236,9 +248,9 @@ struct Exact {
       const auto dot = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
       const auto size_of = [](const vd3<D>& p) { return max_x86(max_x86(abs(p.x), abs(p.y)), abs(p.z)); };
       const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
-      const F along = dot(n, towards), t = dot(n, a) / along;
+      const F inverse = F(1.0) / dot(n, towards), t = dot(n, a) * inverse;
       const F scale =
-          abs(F(double_bounds::kDeterminant * double_bounds::kQuotient) / along) * size_of(e1) * size_of(e2);
+          abs(F(double_bounds::kDeterminant * double_bounds::kQuotient) * inverse) * size_of(e1) * size_of(e2);
       const F along_error = scale * size_of(towards),
               radius = scale * size_of(a) + abs(t) * (along_error + F(double_bounds::kRounding));
       low = t - radius, high = t + radius;
@@ -258,39 +270,83 @@ struct Exact {
     const Intervals<W> t(l, F(ray.in_memory().shear[2]));
     t.low.store(d.low), t.high.store(d.high);
     d.certain = t.certain.bits();
-    // Comparisons that a NaN makes false: a lane without a usable interval stays.
-    d.candidates = l.candidates() & ~((t.low > F(tfar)) | (t.high < F(tnear))).bits();
+    d.candidates = l.candidates() & possible(t.low, t.high, F(tnear), F(tfar));
   }
 
-  /// The distances of all candidates again, in doubles: an ulp or two of float wide where a triangle is not seen edge
-  /// on. Of the two intervals what both hold; what is left are the candidates that may be within [tnear, tfar].
+  /// Intervals about t of `lanes`, in doubles: an ulp or two of float wide where a triangle is not seen edge on.
+  template <int W>
+  struct NarrowIntervals {
+    static constexpr int D = kDoubleLanes<W>;
+    vd<D> low[W / D], high[W / D];
+    unsigned usable = 0;
+
+    /// `distances(k)`: the DoubleDistances of the D lanes from k on.
+    template <class Distances>
+    ARBORETUM_INLINE NarrowIntervals(unsigned lanes, const Distances& distances) {
+      for (int k = 0; k < W / D; ++k) {
+        low[k] = high[k] = 0.0;
+        if ((lanes >> k * D & ((1u << D) - 1u)) == 0) continue;
+        const DoubleDistances<D> t = distances(k * D);
+        low[k] = t.low, high[k] = t.high;
+        usable |= t.usable << k * D;
+      }
+    }
+    /// Of these intervals and those given what both hold.
+    ARBORETUM_INLINE void narrow(vf<W>& l, vf<W>& h) const {
+      using F = vf<W>;
+      // Rounding to floats takes at most half of this from either end.
+      const auto ulp = [](F x) { return madd(abs(x), F(0x1p-23f), F(0x1p-149f)); };
+      const vm<W> narrowed = vm<W>::from_bits(usable);
+      const F new_low = to_floats<W>(low), new_high = to_floats<W>(high);
+      l = select(narrowed, max_x86(new_low - ulp(new_low), l), l);
+      h = select(narrowed, min_x86(new_high + ulp(new_high), h), h);
+    }
+  };
+
+  template <int D>
+  static ARBORETUM_INLINE vd3<D> in_doubles(const Vec3f& p) {
+    return {vd<D>(double(p.x)), vd<D>(double(p.y)), vd<D>(double(p.z))};
+  }
+
+  /// The distances of all candidates again, in doubles. What is left are the candidates that may be within [tnear,
+  /// tfar].
   template <class Block>
   static ARBORETUM_INLINE void narrow(const RayData& ray, const Block& block, float tnear, float tfar,
                                       Distances<Block::kWidth>& d) {
     constexpr int W = Block::kWidth, D = kDoubleLanes<W>;
-    using F = vd<D>;
-    const auto widened = [](const Vec3f& p) { return vd3<D>{F(double(p.x)), F(double(p.y)), F(double(p.z))}; };
-    const vd3<D> o = widened(ray.origin), towards = widened(ray.towards);
-    F low[W / D], high[W / D];
-    unsigned usable = 0;
-    for (int k = 0; k < W / D; ++k) {
-      low[k] = high[k] = 0.0;
-      if ((d.candidates >> k * D & ((1u << D) - 1u)) == 0) continue;
-      const auto corner = [&](const float(&p)[3][W]) { return load3<D>(p[0] + k * D, p[1] + k * D, p[2] + k * D); };
+    using F = vf<W>;
+    const vd3<D> o = in_doubles<D>(ray.origin), towards = in_doubles<D>(ray.towards);
+    const NarrowIntervals<W> t(d.candidates, [&](int k) {
+      const auto corner = [k](const float(&p)[3][W]) { return load3<D>(p[0] + k, p[1] + k, p[2] + k); };
       const vd3<D> a = corner(block.v0);
-      const DoubleDistances<D> t(towards, a - o, corner(block.v1) - a, corner(block.v2) - a);
-      low[k] = t.low, high[k] = t.high;
-      usable |= t.usable << k * D;
-    }
-    using L = vf<W>;
-    // Rounding to floats takes at most half of this from either end.
-    const auto ulp = [](L x) { return madd(abs(x), L(0x1p-23f), L(0x1p-149f)); };
-    const vm<W> narrowed = vm<W>::from_bits(usable);
-    const L l = to_floats<W>(low), h = to_floats<W>(high), old_low = L::load(d.low), old_high = L::load(d.high);
-    const L new_low = select(narrowed, max_x86(l - ulp(l), old_low), old_low),
-            new_high = select(narrowed, min_x86(h + ulp(h), old_high), old_high);
-    new_low.store(d.low), new_high.store(d.high);
-    d.candidates &= ~((new_low > L(tfar)) | (new_high < L(tnear))).bits();
+      return DoubleDistances<D>(towards, a - o, corner(block.v1) - a, corner(block.v2) - a);
+    });
+    F low = F::load(d.low), high = F::load(d.high);
+    t.narrow(low, high);
+    low.store(d.low), high.store(d.high);
+    d.candidates &= possible(low, high, F(tnear), F(tfar));
+  }
+
+  /// The same for the rays of `out.again`, W from k on, and triangle `i` of the block.
+  template <bool AnyHit, int W, class Block>
+  static __attribute__((noinline)) void narrow_rays(const PacketRays& rays, int k, const Block& block, int i,
+                                                    unsigned certain, vf<W> tnear, vf<W> tfar, FilteredRays<W>& out) {
+    constexpr int D = kDoubleLanes<W>;
+    using F = vf<W>;
+    const std::array<Vec3f, 3> corner = corners(block, i);
+    const vd3<D> a = in_doubles<D>(corner[0]), e1 = in_doubles<D>(corner[1]) - a, e2 = in_doubles<D>(corner[2]) - a;
+    const NarrowIntervals<W> t(out.again, [&](int at) {
+      const auto of_rays = [first = k + at](const float(&p)[3][PacketRays::kMost]) {
+        return load3<D>(p[0] + first, p[1] + first, p[2] + first);
+      };
+      return DoubleDistances<D>(of_rays(rays.direction), a - of_rays(rays.origin), e1, e2);
+    });
+    F low = F::load(out.low), high = F::load(out.high);
+    t.narrow(low, high);
+    low.store(out.low), high.store(out.high);
+    const unsigned within = out.again & possible(low, high, tnear, tfar),
+                   hit = within & settled<AnyHit>(low, high, vm<W>::from_bits(certain), tnear, tfar);
+    out.hit |= hit, out.again = within & ~hit;
   }
 
   /// The candidate, as a bit, that is certainly hit behind tnear, with a narrow interval before those of all other

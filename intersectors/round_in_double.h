@@ -77,8 +77,9 @@ ARBORETUM_INLINE bool round_in_double(Vec3f origin, Vec3f direction, const Corne
   const Transposed absolute(in_fours::sizes(e1), in_fours::sizes(e2), in_fours::sizes(d), in_fours::sizes(s));
   const __m256d largest = _mm256_max_pd(_mm256_max_pd(absolute.x, absolute.y), absolute.z);
   const __m256d det = _mm256_permute4x64_pd(dots, 0);
-  const __m256d quotients = _mm256_div_pd(
-      _mm256_blend_pd(dots, _mm256_set1_pd(double_bounds::kDeterminant * double_bounds::kQuotient), 1), det);
+  const __m256d quotients =
+      _mm256_mul_pd(_mm256_blend_pd(dots, _mm256_set1_pd(double_bounds::kDeterminant * double_bounds::kQuotient), 1),
+                    _mm256_div_pd(_mm256_set1_pd(1.0), det));
   const __m128d scale_t = _mm256_castpd256_pd128(quotients), uv = _mm256_extractf128_pd(quotients, 1);
   const __m128d size_e = _mm256_castpd256_pd128(largest), size_ds = _mm256_extractf128_pd(largest, 1);
   const double t = high(scale_t), scale = __builtin_fabs(low(scale_t)), size_1 = low(size_e), size_2 = high(size_e),

@@ -14,7 +14,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Hits that wait, a Hit or a NearestHit each. A ray and its hit stay where they are until finish_all().
 template <class H>
 class UnroundedHits {
-  static constexpr int kLanes = kHasFma ? 4 : 2;
+  static constexpr int kLanes = kDoubleLanes<8>;
   using D = vd<kLanes>;
 
  public:
@@ -45,6 +45,18 @@ class UnroundedHits {
   static ARBORETUM_INLINE D dot(vd3<kLanes> a, vd3<kLanes> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
   static ARBORETUM_INLINE D size_of(vd3<kLanes> a) { return max_x86(max_x86(abs(a.x), abs(a.y)), abs(a.z)); }
 
+#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
+  /// The x of four vectors, their y, their z.
+  struct Transposed {
+    __m128 x, y, z;
+    ARBORETUM_INLINE Transposed(const float* a, const float* b, const float* c, const float* d) {
+      const __m128 p = _mm_loadu_ps(a), q = _mm_loadu_ps(b), r = _mm_loadu_ps(c), s = _mm_loadu_ps(d);
+      const __m128 pq = _mm_unpacklo_ps(p, q), rs = _mm_unpacklo_ps(r, s);
+      x = _mm_movelh_ps(pq, rs), y = _mm_movehl_ps(rs, pq),
+      z = _mm_movelh_ps(_mm_unpackhi_ps(p, q), _mm_unpackhi_ps(r, s));
+    }
+  };
+#endif
   /// x, y and z of a vector of each ray, in doubles. `at(i)`: where that of ray i lies.
   template <class At>
   static ARBORETUM_INLINE vd3<kLanes> gather(const At& at) {
@@ -52,10 +64,14 @@ class UnroundedHits {
     const __m128 p = _mm_loadu_ps(at(0)), q = _mm_loadu_ps(at(1)), xy = _mm_unpacklo_ps(p, q);
     return {D(_mm_cvtps_pd(xy)), D(_mm_cvtps_pd(_mm_movehl_ps(xy, xy))), D(_mm_cvtps_pd(_mm_unpackhi_ps(p, q)))};
 #else
-    const __m128 p = _mm_loadu_ps(at(0)), q = _mm_loadu_ps(at(1)), r = _mm_loadu_ps(at(2)), s = _mm_loadu_ps(at(3));
-    const __m128 pq = _mm_unpacklo_ps(p, q), rs = _mm_unpacklo_ps(r, s);
-    return {D(_mm256_cvtps_pd(_mm_movelh_ps(pq, rs))), D(_mm256_cvtps_pd(_mm_movehl_ps(rs, pq))),
-            D(_mm256_cvtps_pd(_mm_movelh_ps(_mm_unpackhi_ps(p, q), _mm_unpackhi_ps(r, s))))};
+    const Transposed first(at(0), at(1), at(2), at(3));
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
+    return {D(_mm256_cvtps_pd(first.x)), D(_mm256_cvtps_pd(first.y)), D(_mm256_cvtps_pd(first.z))};
+#else
+    const Transposed last(at(4), at(5), at(6), at(7));
+    const auto widened = [](__m128 a, __m128 b) { return D(_mm512_cvtps_pd(_mm256_set_m128(b, a))); };
+    return {widened(first.x, last.x), widened(first.y, last.y), widened(first.z, last.z)};
+#endif
 #endif
   }
 
@@ -68,14 +84,15 @@ class UnroundedHits {
     const vd3<kLanes> p = cross(d, e2), q = cross(s, e1);
     const D det = dot(e1, p);
     const D size_1 = size_of(e1), size_2 = size_of(e2), size_d = size_of(d), size_s = size_of(s);
-    const D t = dot(e2, q) / det, scale = abs(D(double_bounds::kDeterminant * double_bounds::kQuotient) / det);
+    const D inverse = D(1.0) / det, t = dot(e2, q) * inverse,
+            scale = abs(D(double_bounds::kDeterminant * double_bounds::kQuotient) * inverse);
     const D det_error = scale * size_1 * size_2 * size_d;
     const D radius = scale * size_1 * size_2 * size_s + abs(t) * (det_error + D(double_bounds::kRounding));
     const D weight_radius = scale * size_d * size_s * max_x86(size_1, size_2) + det_error + D(double_bounds::kRounding);
     const auto weight = [](D w) { return min_x86(max_x86(D(0.0), w), D(1.0)); };
     float low[kLanes], high[kLanes], u[kLanes], v[kLanes];
-    (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) / det).store(u),
-        weight(dot(d, q) / det).store(v);
+    (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) * inverse).store(u),
+        weight(dot(d, q) * inverse).store(v);
     // Comparisons that a NaN makes false.
     const unsigned bounded =
         (det_error < D(double_bounds::kMostOfDivisor)) & (weight_radius < D(double_bounds::kWeight));

@@ -70,16 +70,23 @@ struct Watertight {
     }
   };
 
-  /// Lanes are the W rays from k on, all against triangle `i` of the block: what intersect() computes, bit for bit.
-  /// `again`: rays for which doubles must decide, to be tested one by one.
+  /// Lanes are the W rays from k on, those of `in` against triangle `i` of the block: what intersect() computes, bit
+  /// for bit. `again`: rays for which doubles must decide whether they hit, to be tested one by one.
   template <int W, class Block>
   static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData& shears, int kz, int k,
-                                               const Block& block, int i, TriangleHits<W>& hits, vm<W>& again) {
+                                               vm<W> in, const Block& block, int i, TriangleHits<W>& hits,
+                                               vm<W>& again) {
     using F = vf<W>;
     const Edges<W> e(shears.template sheared<W>(rays, kz, k, block, i));
-    const vm<W> inside = e.inside();
+    const vm<W> inside = in & e.inside();
     again = vm<W>(false);
-    if (any(inside)) again = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits);
+    if (none(inside)) return inside;
+    const vm<W> open = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits);
+    if (__builtin_expect(any(open), 0)) {
+      again = open & e.ties();
+      const unsigned far_off = (open & ~again).bits();
+      hits.t = plane_distances_of_rays(far_off, rays, kz, k, block, i, hits.t);
+    }
     return inside & ~again;
   }
 
@@ -158,38 +165,75 @@ struct Watertight {
     return vm<W>::from_bits(hit);
   }
 
-  /// `distances`, in the lanes that `lanes` names N.(a - o) / N.d, computed in double.
+  /// Where a ray along d meets a triangle's plane, N.a / N.d, but between the nearest and the farthest corner; a: the
+  /// first corner as seen from the ray's origin; e1, e2: edges from it. Axes in the ray's order. `usable`: lanes where
+  /// N.d is not 0.
+  template <int D>
+  static ARBORETUM_INLINE vd<D> plane_distance(const vd3<D>& a, const vd3<D>& e1, const vd3<D>& e2, const vd3<D>& d,
+                                               unsigned& usable) {
+    using F = vd<D>;
+    // Not fused: most of these products are exact, and what is 0 then comes out as 0, as of a ray that starts in the
+    // plane.
+    const auto dot_unfused = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
+    const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
+    const F along = dot_unfused(n, d);
+    usable = along != F(0.0);
+    // Rounded division keeps the order: those of the nearest and the farthest corner are the least and the greatest.
+    const F b = a.z + e1.z, c = a.z + e2.z, low = min_x86(min_x86(a.z, b), c) / d.z,
+            high = max_x86(max_x86(a.z, b), c) / d.z;
+    return max_x86(min_x86(dot_unfused(n, a) / along, max_x86(low, high)), min_x86(low, high));
+  }
+  /// `distances`, those of `lanes` from `distance(first, usable)`, plane_distance() of the D lanes from `first` on.
+  template <int W, class Distance>
+  static ARBORETUM_INLINE vf<W> with_plane_distances(unsigned lanes, const Distance& distance, vf<W> distances) {
+    constexpr int D = kDoubleLanes<W>;
+    vd<D> t[W / D];
+    for (int k = 0; k < W / D; ++k) {
+      t[k] = 0.0;
+      const unsigned asked = lanes >> k * D & ((1u << D) - 1u);
+      if (asked == 0) continue;
+      unsigned usable;
+      t[k] = distance(k * D, usable);
+      lanes &= ~((asked & ~usable) << k * D);
+    }
+    return select(vm<W>::from_bits(lanes), to_floats<W>(t), distances);
+  }
+
+  /// `distances`, in the lanes that `lanes` names computed in double from the triangles' planes.
   template <class Block>
   static __attribute__((noinline)) vf<Block::kWidth> plane_distances_in_double(unsigned lanes, const ShearedRay& ray,
                                                                                const Block& block,
                                                                                vf<Block::kWidth> distances) {
     constexpr int W = Block::kWidth, D = kDoubleLanes<W>;
-    using F = vd<D>;
     const AxisOrder& axes = *ray.order;
     const vd3<D> o{double(ray.from[0]), double(ray.from[1]), double(ray.from[2])},
         d{double(ray.direction[0]), double(ray.direction[1]), double(ray.direction[2])};
-    F t[W / D];
-    for (int k = 0; k < W / D; ++k) {
-      t[k] = 0.0;
-      const unsigned asked = lanes >> k * D & ((1u << D) - 1u);
-      if (asked == 0) continue;
+    const auto distance = [&](int k, unsigned& usable) {
       const auto corner = [&](const float(&p)[3][W]) {
-        return load3<D>(ShearedRay::row(p, axes.x) + k * D, ShearedRay::row(p, axes.y) + k * D,
-                        ShearedRay::row(p, axes.z) + k * D);
+        return load3<D>(ShearedRay::row(p, axes.x) + k, ShearedRay::row(p, axes.y) + k, ShearedRay::row(p, axes.z) + k);
       };
-      const vd3<D> v0 = corner(block.v0), a = v0 - o, e1 = corner(block.v1) - v0, e2 = corner(block.v2) - v0;
-      // Not fused: most of these products are exact, and what is 0 then comes out as 0, as of a ray that starts in the
-      // plane.
-      const auto dot_unfused = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
-      const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
-      const F along = dot_unfused(n, d);
-      // Rounded division keeps the order: those of the nearest and the farthest corner are the least and the greatest.
-      const F b = a.z + e1.z, c = a.z + e2.z, low = min_x86(min_x86(a.z, b), c) / d.z,
-              high = max_x86(max_x86(a.z, b), c) / d.z;
-      t[k] = max_x86(min_x86(dot_unfused(n, a) / along, max_x86(low, high)), min_x86(low, high));
-      lanes &= ~((asked & ~(along != F(0.0))) << k * D);
-    }
-    return select(vm<W>::from_bits(lanes), to_floats<W>(t), distances);
+      const vd3<D> v0 = corner(block.v0);
+      return plane_distance<D>(v0 - o, corner(block.v1) - v0, corner(block.v2) - v0, d, usable);
+    };
+    return with_plane_distances<W>(lanes, distance, distances);
+  }
+  /// The same for the W rays from k on, of group kz, and triangle `i` of the block.
+  template <int W, class Block>
+  static __attribute__((noinline)) vf<W> plane_distances_of_rays(unsigned lanes, const PacketRays& rays, int kz, int k,
+                                                                 const Block& block, int i, vf<W> distances) {
+    constexpr int D = kDoubleLanes<W>;
+    const int kx = kz == 2 ? 0 : kz + 1, ky = kx == 2 ? 0 : kx + 1;
+    const auto corner = [&](const float(&p)[3][Block::kWidth]) {
+      return vd3<D>{double(p[kx][i]), double(p[ky][i]), double(p[kz][i])};
+    };
+    const vd3<D> v0 = corner(block.v0), e1 = corner(block.v1) - v0, e2 = corner(block.v2) - v0;
+    const auto distance = [&](int at, unsigned& usable) {
+      const auto of_rays = [&](const float(&p)[3][PacketRays::kMost]) {
+        return load3<D>(p[kx] + k + at, p[ky] + k + at, p[kz] + k + at);
+      };
+      return plane_distance<D>(v0 - of_rays(rays.origin), e1, e2, of_rays(rays.direction), usable);
+    };
+    return with_plane_distances<W>(lanes, distance, distances);
   }
 };
 

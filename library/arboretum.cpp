@@ -10,6 +10,7 @@
 
 #include "core/mesh_check.h"
 #include "core/names.h"
+#include "structures/parameter_limits.h"
 #include "traversal/kernel_keys.h"
 
 namespace arboretum {
@@ -53,15 +54,6 @@ std::vector<Isa> allowed_isas(const TracerSettings& s) {
 std::string_view default_builder(const StructureInfo& info, const BuilderParameters& parameters) {
   const StructureEntry* below = info.takes_below ? find_structure(parameters.below) : nullptr;
   return below ? below->info.builders.front() : info.builders.front();
-}
-
-void check_sizes(const RayBatch& rays, std::size_t answers) {
-  if (answers != rays.size())
-    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with room for " + std::to_string(answers) +
-                    " answers");
-  if (!rays.times.empty() && rays.times.size() != rays.size())
-    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with " + std::to_string(rays.times.size()) +
-                    " times");
 }
 
 /// The row for batches. Fills in what is left to the others: of the settings that `auto` and the like may stand in, all
@@ -129,8 +121,9 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
     return row ? row : batch_;
   };
   one_ = row_or_batch("single");
+  const std::string together = batch_->traversal.starts_with("hybrid") ? "hybrid" : "packet";
   for (std::size_t i = 0; i < kPacketSizes.size(); ++i)
-    packet_[i] = row_or_batch("packet" + std::to_string(kPacketSizes[i]));
+    packet_[i] = row_or_batch(together + std::to_string(kPacketSizes[i]));
 
   BuildSettings build;
   build.builder = settings_.builder, build.leaf = settings_.leaf, build.isa = batch_->isa,
@@ -139,13 +132,25 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
   accel_ = build_structure(settings_.structure, *mesh_, build, report_);
 }
 
+void Tracer::check(const RayBatch& rays, std::size_t answers) const {
+  if (answers != rays.size())
+    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with room for " + std::to_string(answers) +
+                    " answers");
+  if (!rays.times.empty() && rays.times.size() != rays.size())
+    throw UserError("a batch of " + std::to_string(rays.size()) + " rays with " + std::to_string(rays.times.size()) +
+                    " times");
+  check_settings(rays.settings);
+  if (const std::string why = why_no_threshold(batch_->traversal, rays.settings.hybrid_threshold); !why.empty())
+    throw UserError(why);
+}
+
 void Tracer::closest_hit(RayBatch rays, std::span<Hit> hits) const {
-  check_sizes(rays, hits.size());
+  check(rays, hits.size());
   batch_->closest_hit(*accel_, rays, hits, nullptr);
 }
 
 void Tracer::any_hit(RayBatch rays, std::span<std::uint8_t> occluded) const {
-  check_sizes(rays, occluded.size());
+  check(rays, occluded.size());
   batch_->any_hit(*accel_, rays, occluded, nullptr);
 }
 

@@ -40,7 +40,8 @@ struct TracerSettings {
   std::string intersector = "watertight";
   std::string box = "padded";
   std::string traversal = "single";  ///< of batches, `auto`: the structure's way called so, else single rays; one ray
-                                     ///< goes by `single`, a packet of N by `packetN`, where the structure has them
+                                     ///< goes by `single`, a packet of N by `packetN` (with a hybrid chosen by
+                                     ///< `hybridN`), where the structure has them
   std::string isa = {};              ///< `auto`: the best of this machine for which there is such a kernel
   unsigned threads = 0;              ///< of the build; 0: one a core. The structure is the same for any number.
   BuilderParameters parameters = {};
@@ -76,7 +77,8 @@ class Tracer {
     return occluded != 0;
   }
 
-  /// N rays that go together, answered in order: by the kernel `packetN` where there is one, else as a batch of N.
+  /// N rays that go together, answered in order: by the kernel `packetN` where there is one, with a hybrid chosen by
+  /// `hybridN`; else as a batch of N.
   template <std::size_t N>
   [[nodiscard]] std::array<Hit, N> closest_hit(const std::array<Ray, N>& packet) const {
     std::array<Hit, N> hits;
@@ -90,8 +92,23 @@ class Tracer {
     kernel_of_packet(N).any_hit(*accel_, std::span<const Ray>(packet), occluded, nullptr);
     return occluded;
   }
+  /// As above with some rays switched off: bit i of `active` is ray i's, bits beyond N mean nothing. A ray that is
+  /// switched off is not read, may hold anything, and is answered with a miss.
+  template <std::size_t N>
+  requires(N <= 64)
+      [[nodiscard]] std::array<Hit, N> closest_hit(const std::array<Ray, N>& packet, std::uint64_t active) const {
+    return closest_hit(only(packet, active));
+  }
+  /// As above; 0 for a ray that is switched off.
+  template <std::size_t N>
+  requires(N <= 64)
+      [[nodiscard]] std::array<std::uint8_t, N> any_hit(const std::array<Ray, N>& packet, std::uint64_t active) const {
+    return any_hit(only(packet, active));
+  }
 
-  /// hits[i] answers rays[i]. Throws UserError when the two, or times that are given, are not equally many.
+  /// hits[i] answers rays[i]. Throws UserError when the two, or times that are given, are not equally many, and for
+  /// settings of the batch out of the command line's limits: rays_in_flight from 1 to 64, hybrid_threshold from 0 to 16
+  /// and of a hybridN to N (structures/parameter_limits.h).
   void closest_hit(RayBatch rays, std::span<Hit> hits) const;
   /// occluded[i] becomes 1 when rays[i] meets something, else 0. Throws as above.
   void any_hit(RayBatch rays, std::span<std::uint8_t> occluded) const;
@@ -114,6 +131,16 @@ class Tracer {
 
  private:
   static constexpr std::array<std::size_t, 5> kPacketSizes{4, 8, 16, 32, 64};
+
+  /// The packet with rays in place of those switched off that every kernel leaves out (is_valid() of core/ray.h).
+  template <std::size_t N>
+  [[nodiscard]] static std::array<Ray, N> only(const std::array<Ray, N>& packet, std::uint64_t active) noexcept {
+    std::array<Ray, N> rays;
+    for (std::size_t i = 0; i < N; ++i)
+      if (active >> i & 1) rays[i] = packet[i];
+    return rays;
+  }
+  void check(const RayBatch& rays, std::size_t answers) const;
 
   std::unique_ptr<const TriangleMesh> mesh_;  ///< on the heap: the structure points at it
   TracerSettings settings_;

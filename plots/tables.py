@@ -54,6 +54,23 @@ def embree_rates(results, metric):
     return best
 
 
+ASSERTIONS = "Debian's package keeps its assertions on, which costs it about 12 % on streams: ratios to it have to be read with that in mind."
+BOTH_FLAGS = ("A comparison with its packets and streams needs its cells …_coherent and …_incoherent both: which is faster depends on scene and workload, "
+              "not on the workload's name alone.")
+
+
+def embree_note(results, shown):
+    """What has to be known where cells of embree's are among those `shown`; nothing where there are none."""
+    cells = [c for c in shown if c["structure"] == "embree"]
+    if not cells:
+        return ""
+    version = results.context.get("embree")
+    words = [f"embree: {version}, as it is installed." if version else "embree: as it is installed.", ASSERTIONS]
+    if any(cell["traversal"].startswith(("packet", "stream")) for cell in cells):
+        words.append(BOTH_FLAGS)
+    return f'<p class="soft">{escape(" ".join(words))}</p>'
+
+
 def beside(cell):
     return tuple(cell[a] for a in ("scene", "workload", "isa", "threads"))
 

@@ -10,7 +10,7 @@ namespace arboretum {
 
 RayBatch BatchTracer::batch_of(const TracedRays& rays, std::size_t begin, std::size_t count, RayKind kind) const {
   RayBatch all(rays.rays, rays.times);
-  all.coherent = kind == RayKind::camera || kind == RayKind::shadow_hard;
+  all.coherent = kind == RayKind::camera;  // as Workload::batch()
   all.settings = settings_;
   return all.part(begin, count);
 }

@@ -100,7 +100,7 @@ bool starts_on_surfaces(std::string_view workload) noexcept {
 
 RayBatch Workload::batch() const noexcept {
   RayBatch b(rays, times);
-  b.coherent = name == "primary" || name == "shadow";
+  b.coherent = name == "primary";
   return b;
 }
 

@@ -32,7 +32,8 @@ struct Workload {
   std::vector<std::array<double, 3>> starts{};  ///< the hit point itself, in doubles on the grid of float32
   std::vector<Ray> references{};                ///< the ray as it leaves the hit point itself, its origin rounded
   bool excludes_sources = false;                ///< rays pass through their source: SelfIntersection::exclusion
-  /// `primary` and `shadow` rays are marked coherent.
+  /// `primary` rays are marked coherent. Those towards a light are not: on most scenes that costs Embree more than it
+  /// gives (docs/performance/embree.md).
   [[nodiscard]] RayBatch batch() const noexcept;
 };
 

@@ -65,6 +65,8 @@ struct vf<4> {
   friend ARBORETUM_INLINE vf operator/(vf a, vf b) { return vf(_mm_div_ps(a.v, b.v)); }
   friend ARBORETUM_INLINE vf min_x86(vf a, vf b) { return vf(_mm_min_ps(a.v, b.v)); }
   friend ARBORETUM_INLINE vf max_x86(vf a, vf b) { return vf(_mm_max_ps(a.v, b.v)); }
+  /// max(|a|, |b|).
+  friend ARBORETUM_INLINE vf max_abs_in_one(vf a, vf b) { return vf(_mm_range_ps(a.v, b.v, 0b1011)); }
   friend ARBORETUM_INLINE vf madd(vf a, vf b, vf c) { return vf(_mm_fmadd_ps(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vf msub(vf a, vf b, vf c) { return vf(_mm_fmsub_ps(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vf nmadd(vf a, vf b, vf c) { return vf(_mm_fnmadd_ps(a.v, b.v, c.v)); }
@@ -154,6 +156,8 @@ struct vf<8> {
   friend ARBORETUM_INLINE vf operator/(vf a, vf b) { return vf(_mm256_div_ps(a.v, b.v)); }
   friend ARBORETUM_INLINE vf min_x86(vf a, vf b) { return vf(_mm256_min_ps(a.v, b.v)); }
   friend ARBORETUM_INLINE vf max_x86(vf a, vf b) { return vf(_mm256_max_ps(a.v, b.v)); }
+  /// max(|a|, |b|).
+  friend ARBORETUM_INLINE vf max_abs_in_one(vf a, vf b) { return vf(_mm256_range_ps(a.v, b.v, 0b1011)); }
   friend ARBORETUM_INLINE vf madd(vf a, vf b, vf c) { return vf(_mm256_fmadd_ps(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vf msub(vf a, vf b, vf c) { return vf(_mm256_fmsub_ps(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vf nmadd(vf a, vf b, vf c) { return vf(_mm256_fnmadd_ps(a.v, b.v, c.v)); }
@@ -241,6 +245,8 @@ struct vf<16> {
   friend ARBORETUM_INLINE vf operator/(vf a, vf b) { return vf(_mm512_div_ps(a.v, b.v)); }
   friend ARBORETUM_INLINE vf min_x86(vf a, vf b) { return vf(_mm512_min_ps(a.v, b.v)); }
   friend ARBORETUM_INLINE vf max_x86(vf a, vf b) { return vf(_mm512_max_ps(a.v, b.v)); }
+  /// max(|a|, |b|).
+  friend ARBORETUM_INLINE vf max_abs_in_one(vf a, vf b) { return vf(_mm512_range_ps(a.v, b.v, 0b1011)); }
   friend ARBORETUM_INLINE vf madd(vf a, vf b, vf c) { return vf(_mm512_fmadd_ps(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vf msub(vf a, vf b, vf c) { return vf(_mm512_fmsub_ps(a.v, b.v, c.v)); }
   friend ARBORETUM_INLINE vf nmadd(vf a, vf b, vf c) { return vf(_mm512_fnmadd_ps(a.v, b.v, c.v)); }

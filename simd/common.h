@@ -21,6 +21,15 @@ template <int W>
 ARBORETUM_INLINE vf<W> abs(vf<W> a) {
   return vf<W>::from_int_bits(a.as_int() & vi<W>(0x7fffffff));
 }
+/// max(|a|, |b|); where one is NaN either that or the other's.
+template <int W>
+ARBORETUM_INLINE vf<W> max_abs(vf<W> a, vf<W> b) {
+  if constexpr (requires { max_abs_in_one(a, b); }) {
+    return max_abs_in_one(a, b);
+  } else {
+    return max_x86(abs(a), abs(b));
+  }
+}
 /// The sign bit of each lane, nothing else.
 template <int W>
 ARBORETUM_INLINE vi<W> sign_bits(vf<W> a) {
@@ -43,7 +52,7 @@ template <class Vector>
 }
 template <int W>
 [[nodiscard]] ARBORETUM_INLINE vf<W> largest_component(vf<W> x, vf<W> y, vf<W> z) {
-  return max_x86(max_x86(abs(x), abs(y)), abs(z));
+  return max_abs(max_abs(x, y), z);
 }
 
 /// Lane I of four.

@@ -64,4 +64,12 @@ void check_parameters(const BuilderParameters& p) {
     throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
 }
 
+void check_settings(const TraversalSettings& s) {
+  const auto check = [](std::string_view name, unsigned value, const ParameterLimits& limits) {
+    if (value != TraversalSettings::kOwn) require_within(name, value, limits);
+  };
+  check("hybrid_threshold", s.hybrid_threshold, kTraversalLimits.hybrid_threshold);
+  check("rays_in_flight", s.rays_in_flight, kTraversalLimits.rays_in_flight);
+}
+
 }  // namespace arboretum

@@ -1,10 +1,12 @@
-// The limits of BuilderParameters, for the command line and for programs alike, and of meshes; their checks.
+// The limits of BuilderParameters and TraversalSettings, for the command line and for programs alike, and of meshes;
+// their checks.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <string_view>
 
+#include "core/ray.h"
 #include "structures/accel.h"
 
 namespace arboretum {
@@ -36,6 +38,12 @@ inline constexpr BuilderLimits kBuilderLimits;
 inline constexpr std::array<unsigned, 2> kMortonBits{30, 63};
 inline constexpr std::array<std::string_view, 2> kCollapses{"optimal", "greedy"};
 
+struct TraversalLimits {
+  ParameterLimits hybrid_threshold{0, TraversalSettings::kWidestHybrid};
+  ParameterLimits rays_in_flight{1, TraversalSettings::kMostInFlight};
+};
+inline constexpr TraversalLimits kTraversalLimits;
+
 /// References that a tree of two nodes each can have, numbered in 31 bits.
 inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 30) - 1;
 
@@ -48,5 +56,7 @@ void require_triangles(std::string_view structure, std::size_t triangles, std::s
 /// Throws UserError, which names the first parameter that is out of its limits, whether or not a builder reads it. NaN
 /// is out of any. `below` is two_level's to look at.
 void check_parameters(const BuilderParameters& parameters);
+/// As above of a way of traversal, whether or not it reads the setting; kOwn is within.
+void check_settings(const TraversalSettings& settings);
 
 }  // namespace arboretum

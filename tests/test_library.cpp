@@ -139,6 +139,113 @@ TEST_CASE("keys that stand for others mean what they mean on the command line") 
   if (is_available(Isa::avx2)) CHECK(settled({.isa = "avx"}).isa == "avx2");
 }
 
+namespace {
+
+/// Every other lane, none, all, one and two of them: what is switched off misses whatever it holds, the others have the
+/// answers that they have without a mask.
+template <std::size_t N>
+void check_masks(const Tracer& tracer, std::span<const Ray> rays) {
+  const std::vector<Ray> invalid = invalid_rays();
+  for (const std::uint64_t active : {0x5555555555555555u, 0xaaaaaaaaaaaaaaaau, std::uint64_t{0}, ~std::uint64_t{0},
+                                     std::uint64_t{1}, std::uint64_t{1} << (N - 1)}) {
+    for (std::size_t first = 0; first + N <= rays.size(); first += N) {
+      std::array<Ray, N> packet;
+      std::copy_n(rays.begin() + std::ptrdiff_t(first), N, packet.begin());
+      const std::array<Hit, N> hits = tracer.closest_hit(packet);
+      const std::array<std::uint8_t, N> occluded = tracer.any_hit(packet);
+      for (const bool garbage : {false, true}) {
+        std::array<Ray, N> given = packet;
+        for (std::size_t i = 0; i < N; ++i)
+          if (garbage && !(active >> i & 1)) given[i] = invalid[(first + i) % invalid.size()];
+        const std::array<Hit, N> masked = tracer.closest_hit(given, active);
+        const std::array<std::uint8_t, N> any = tracer.any_hit(given, active);
+        for (std::size_t i = 0; i < N; ++i) {
+          const bool on = (active >> i & 1) != 0;
+          const Hit expected = on ? hits[i] : Hit{};
+          REQUIRE(same_bits({&masked[i], 1}, {&expected, 1}));
+          REQUIRE(any[i] == (on ? occluded[i] : 0));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a packet with a mask: rays that are switched off are not traced") {
+  const TriangleMesh mesh = sphere(12);
+  const std::vector<Ray> rays = test_rays(mesh);
+  for (const char* structure : {"bvh8", "kdtree", "grid"}) {
+    for (const char* traversal : {"single", "auto", "hybrid"}) {
+      TracerSettings settings = with(&TracerSettings::structure, structure);
+      settings.traversal = traversal;
+      if (structure == std::string_view("grid") && traversal == std::string_view("hybrid")) continue;
+      INFO(structure << ", " << traversal);
+      const Tracer tracer(mesh, settings);
+      check_masks<1>(tracer, rays);
+      check_masks<7>(tracer, rays);
+      check_masks<8>(tracer, rays);
+      check_masks<16>(tracer, rays);
+      check_masks<64>(tracer, rays);
+    }
+  }
+}
+
+TEST_CASE("a packet goes by the way of its own number of rays, of the kind that was chosen") {
+  const TriangleMesh mesh = sphere(8);
+  const auto way = [&](const char* structure, const char* traversal, std::size_t rays) {
+    TracerSettings settings = with(&TracerSettings::structure, structure);
+    settings.traversal = traversal;
+    return std::string(Tracer(mesh, settings).kernel_of_packet(rays).traversal);
+  };
+  for (const std::string rays : {"4", "8", "16"}) {
+    CHECK(way("bvh8", "hybrid8", std::stoul(rays)) == "hybrid" + rays);
+    CHECK(way("bvh8", "single", std::stoul(rays)) == "packet" + rays);
+    CHECK(way("bvh8", "queued", std::stoul(rays)) == "packet" + rays);
+  }
+  CHECK(way("bvh8", "hybrid8", 7) == "hybrid8");
+  CHECK(way("bvh8", "hybrid8", 64) == "hybrid8");
+  CHECK(way("bvh8", "packet8", 64) == "packet64");
+  CHECK(way("bvh8", "stream", 7) == "stream");
+  CHECK(way("grid", "single", 8) == "single");
+}
+
+TEST_CASE("settings of a batch have the command line's limits") {
+  const auto message = [](const char* traversal, TraversalSettings settings) -> std::string {
+    const Tracer tracer(sphere(4), with(&TracerSettings::traversal, traversal));
+    const std::vector<Ray> rays(3);
+    std::vector<Hit> hits(3);
+    std::vector<std::uint8_t> occluded(3);
+    RayBatch batch(rays);
+    batch.settings = settings;
+    std::string closest, any;
+    try {
+      tracer.closest_hit(batch, hits);
+    } catch (const UserError& e) {
+      closest = e.what();
+    }
+    try {
+      tracer.any_hit(batch, occluded);
+    } catch (const UserError& e) {
+      any = e.what();
+    }
+    CHECK(closest == any);
+    return closest;
+  };
+  for (const unsigned rays : {0u, 65u, 100000u}) {
+    CHECK(message("queued", {.rays_in_flight = rays}) ==
+          "rays_in_flight: " + std::to_string(rays) + " is not within 1 .. 64");
+    CHECK(message("single", {.rays_in_flight = rays}) != "");  // whether or not the way reads it
+  }
+  CHECK(message("hybrid16", {.hybrid_threshold = 1000}) == "hybrid_threshold: 1000 is not within 0 .. 16");
+  CHECK(message("hybrid4", {.hybrid_threshold = 5}) == "hybrid4 has packets of 4 rays: no threshold of 5");
+  for (const unsigned rays : {1u, 64u, TraversalSettings::kOwn})
+    CHECK(message("queued", {.rays_in_flight = rays}) == "");
+  for (const unsigned threshold : {0u, 4u, TraversalSettings::kOwn})
+    CHECK(message("hybrid4", {.hybrid_threshold = threshold}) == "");
+  CHECK(message("hybrid16", {.hybrid_threshold = 16}) == "");
+}
+
 TEST_CASE("a tracer moves with its mesh") {
   TracerSettings settings;
   settings.leaf = "triangle4i";  // reads the mesh's vertices while it traces

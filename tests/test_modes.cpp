@@ -523,6 +523,65 @@ TEST_CASE("streams and the kd-tree follow their depth too") {
   CHECK(seen > 20);
 }
 
+TEST_CASE("rays that are not valid do not count in what auto sees of a batch") {
+  // So coarse that packets hold together, also where half their rays are missing: what is sampled decides alone.
+  const TriangleMesh mesh = sphere(4);
+  // A camera's rays, tile by tile, then as many that share nothing.
+  std::vector<Ray> together, apart = generic_rays(mesh, 128 * 128, 8);
+  for (unsigned tile = 0; tile < 256; ++tile) {
+    for (unsigned i = 0; i < 64; ++i) {
+      const float x = float(tile % 16 * 8 + i % 8) / 64 - 1, y = float(tile / 16 * 8 + i / 8) / 64 - 1;
+      together.push_back({{0, 0, 4}, 0, {0.3f * x, 0.3f * y, -1}, kInfinity});
+    }
+  }
+  std::vector<Ray> both = together;
+  both.insert(both.end(), apart.begin(), apart.end());
+  const std::vector<Ray> invalid = invalid_rays();
+  Structures structures(mesh);
+  std::size_t seen = 0;
+  for (const KernelRow& row : rows_of("auto")) {
+    if (row.isa == Isa::scalar || row.intersector != "moller_trumbore") continue;
+    INFO(name_of(row));
+    const Accel& accel = structures.get(row);
+    const auto share = [&](std::span<const Ray> rays, bool any) {
+      Counters counters;
+      if (any) {
+        (void)any_hit(row, accel, rays, {}, &counters);
+      } else {
+        (void)closest_hit(row, accel, rays, {}, &counters);
+      }
+      return double(counters.rays_in_packets) / double(rays.size());
+    };
+    for (const bool any : {false, true}) {
+      CHECK(share(together, any) == 1.0);
+      CHECK(share(both, any) < 0.75);
+      for (const std::vector<Ray>* rays : {&together, &both}) {
+        const double of_valid = share(*rays, any);
+        // Percent at random places; 1: at one place of each 64, that of the first ray of a sample. Of every kind; 0:
+        // Ray{} alone.
+        for (const unsigned percent : {1u, 12u, 50u}) {
+          for (const bool every_kind : {false, true}) {
+            std::vector<Ray> some = *rays;
+            for (std::size_t i = 0; i < some.size(); ++i)
+              if (percent == 1 ? i % 64 == 0 : random_bits(21, i, 0) % 100 < percent)
+                some[i] = every_kind ? invalid[random_bits(21, i, 1) % invalid.size()] : Ray{};
+            INFO(percent << " %, of every kind: " << every_kind << ", any hit: " << any
+                         << ", with others: " << (rays == &both));
+            CHECK(share(some, any) == Approx(of_valid).margin(0.01));
+          }
+        }
+      }
+      // Tiles of such rays alone go as those beside them do.
+      std::vector<Ray> gaps = apart;
+      for (std::size_t i = 0; i < gaps.size(); ++i)
+        if (i / 512 % 2 == 0) gaps[i] = Ray{};
+      CHECK(share(gaps, any) == share(apart, any));
+    }
+    ++seen;
+  }
+  CHECK(seen >= 9);
+}
+
 TEST_CASE("auto on SSE leaves streams for rays in flight where rays share little, and only there") {
   if (!is_available(Isa::sse)) return;
   const TriangleMesh fine = random_triangles(60'000, 0.01f, 5), coarse = random_triangles(40, 0.5f, 6);

@@ -399,6 +399,33 @@ TEST_CASE("heat colours: lightness rises evenly") {
   for (int i = 0; i <= 32; ++i) CHECK(lightness(heat_color(i / 32.0)) == Approx(6.0 + 90.0 * i / 32.0).margin(0.5));
 }
 
+TEST_CASE("of a renderer's rays the camera's alone are marked coherent, as those of the workloads") {
+  static std::vector<bool> marked;
+  marked.clear();
+  KernelRow row;
+  row.timed.closest_hit = [](const Accel&, const KernelRow&, RayBatch rays, std::span<Hit>, Counters*) {
+    marked.push_back(rays.coherent);
+  };
+  row.timed.any_hit = [](const Accel&, const KernelRow&, RayBatch rays, std::span<std::uint8_t>, Counters*) {
+    marked.push_back(rays.coherent);
+  };
+  const Scene scene = lone_box();
+  const RenderScene ready(scene, {});
+  BuildReport report;
+  BuildSettings build;
+  build.builder = "morton", build.leaf = "triangle1";
+  const auto accel = build_structure("bvh2", ready.mesh(), build, report);
+  const BatchTracer tracer(ready, *accel, row);
+  TracedRays rays;
+  rays.rays.resize(1);
+  Hit hit;
+  std::uint8_t occluded = 0;
+  RenderStatistics statistics;
+  tracer.closest_hit(rays, 0, {&hit, 1}, RayKind::camera, statistics);
+  tracer.any_hit(rays, 0, {&occluded, 1}, RayKind::shadow_hard, statistics);
+  CHECK(marked == std::vector<bool>{true, false});
+}
+
 TEST_CASE("heat maps: what the counting kernel counts for each pixel's ray, with a bar") {
   Scene scene = lone_box();
   const RenderScene ready(scene, {});

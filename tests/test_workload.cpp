@@ -98,6 +98,7 @@ TEST_CASE("every workload: counts, intervals, unit directions, and the same rays
       CHECK(workload.name == workload_name);
       CHECK(workload.query == query_of(workload_name));
       CHECK(workload.rays.size() == (is_secondary(workload_name) ? hit_count : primary.rays.size()));
+      CHECK(workload.batch().coherent == (workload_name == "primary"));
       for (const Ray& ray : workload.rays) {
         REQUIRE(is_valid(ray));
         REQUIRE(length(Vec3d(ray.direction)) == Approx(1.0).margin(1e-6));

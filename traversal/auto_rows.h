@@ -40,15 +40,23 @@ struct AutoFunctions {
   static constexpr unsigned kSwitch = 4;
   /// Smaller batches are too few to share anything; runs of tiles below the second too few for streams.
   static constexpr std::size_t kFew = 8, kShort = 96;
-  /// Of `count` rays' directions or origins, of which some `samples` are looked at: the largest extent along an axis,
-  /// and the largest |coordinate|.
+  /// Where a ray that would be looked at is not valid (core/ray.h), so many are, from it on: the first valid one
+  /// counts.
+  static constexpr std::size_t kLook = 8;
+  /// Of `count` rays' directions or origins, of which some `samples` are looked at, valid ones alone: the largest
+  /// extent along an axis, negative where there is none, and the largest |coordinate|.
   struct Spread {
     float extent, largest;
   };
   [[nodiscard]] static Spread spread(const Ray* rays, std::size_t count, std::size_t samples, Vec3f Ray::*part) {
     vf<4> low(std::numeric_limits<float>::infinity()), high(-std::numeric_limits<float>::infinity());
-    for (std::size_t i = 0; i < count; i += std::max(count / samples, std::size_t{1})) {
-      const vf<4> v = vf<4>::load(&(rays[i].*part));
+    const std::size_t step = std::max(count / samples, std::size_t{1});
+    for (std::size_t i = 0; i < count; i += step) {
+      const std::size_t end = std::min(i + std::min(step, kLook), count);
+      std::size_t at = i;
+      while (at < end && !is_valid_in_lanes(rays[at])) ++at;
+      if (at == end) continue;
+      const vf<4> v = vf<4>::load(&(rays[at].*part));
       low = min_x86(low, v), high = max_x86(high, v);
     }
     alignas(16) float extent[4], size[4];
@@ -56,12 +64,15 @@ struct AutoFunctions {
     return {std::max({extent[0], extent[1], extent[2]}), std::max({size[0], size[1], size[2]})};
   }
 
-  /// Of a tile: packets are for it.
-  [[nodiscard]] static bool together(const Ray* rays, std::size_t count, float cone, float near) {
-    if (count < kFew) return false;
+  /// What is for a tile; `any`: no ray of its sample is valid.
+  enum class Way { packets, other, any };
+  [[nodiscard]] static Way way(const Ray* rays, std::size_t count, float cone, float near) {
+    if (count < kFew) return Way::other;
     const Spread directions = spread(rays, count, 8, &Ray::direction);
-    if (directions.extent <= 2.0f * cone * directions.largest) return true;
-    return Family::kForNearRays && spread(rays, count, 8, &Ray::origin).extent <= near;
+    if (directions.extent < 0.0f) return Way::any;
+    const bool together = directions.extent <= 2.0f * cone * directions.largest ||
+                          (Family::kForNearRays && spread(rays, count, 8, &Ray::origin).extent <= near);
+    return together ? Way::packets : Way::other;
   }
 
   /// Calls packets(begin, count), which returns how often a ray went on alone, and other(begin, count) for runs of
@@ -69,10 +80,10 @@ struct AutoFunctions {
   template <class Packets, class Other>
   static void runs(RayBatch rays, float cone, const Packets& packets, const Other& other) {
     std::size_t begin = 0, other_way = 0, next_other = kFirstOther, next_packets = kProbe;
-    const auto run = [&](std::size_t end, bool together) {
+    const auto run = [&](std::size_t end, Way kind) {
       while (begin < end) {
         std::size_t count = end - begin;
-        if (!together) {
+        if (kind == Way::other) {
           other(begin, count);
         } else if (other_way != 0) {
           count = std::min(count, other_way);
@@ -91,14 +102,19 @@ struct AutoFunctions {
       }
     };
     const float near = Family::kForNearRays ? kNear * spread(&rays[0], rays.size(), 64, &Ray::origin).extent : 0.0f;
-    bool kind = false;
-    unsigned others = 0;  // tiles of the other kind, one after the other
+    Way kind = Way::any;
+    std::size_t others = 0, change = 0;  // tiles of the other kind, one after the other, and where they begin
     for (std::size_t at = 0; at < rays.size(); at += kTile) {
-      const bool now = together(&rays[at], std::min(kTile, rays.size() - at), cone, near);
-      if (at == 0) kind = now;
-      others = now == kind ? 0 : others + 1;
+      const Way now = way(&rays[at], std::min(kTile, rays.size() - at), cone, near);
+      if (now == Way::any) continue;  // goes as the tiles beside it do
+      if (kind == Way::any) kind = now;
+      if (now == kind) {
+        others = 0;
+        continue;
+      }
+      if (others++ == 0) change = at;
       if (others < kSwitch) continue;
-      run(at - (kSwitch - 1) * kTile, kind);
+      run(change, kind);
       kind = now, others = 0;
     }
     run(rays.size(), kind);

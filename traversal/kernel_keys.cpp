@@ -28,4 +28,13 @@ std::string resolve_traversal(std::string_view traversal, Isa isa) {
   return std::string(traversal) + std::to_string(native_width(isa));
 }
 
+std::string why_no_threshold(std::string_view traversal, unsigned hybrid_threshold) {
+  constexpr std::string_view hybrid = "hybrid";
+  if (hybrid_threshold == TraversalSettings::kOwn || !traversal.starts_with(hybrid)) return {};
+  const std::string rays(traversal.substr(hybrid.size()));
+  if (hybrid_threshold <= std::stoul(rays)) return {};
+  return std::string(traversal) + " has packets of " + rays + " rays: no threshold of " +
+         std::to_string(hybrid_threshold);
+}
+
 }  // namespace arboretum

@@ -282,12 +282,11 @@ class PacketLeaves {
     const auto id = std::int32_t(block.id[triangle]);
     TriangleHits<W> hits;
     vm<W> redo;
-    const vm<W> inside =
-        Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, block, triangle, hits, redo);
-    again |= Mask(redo.bits() & in) << k;
-    if ((inside.bits() & in) == 0) return;
-    unsigned hit =
-        in & (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
+    const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(
+        lanes_.rays, packet_, group, k, vm<W>::from_bits(in), block, triangle, hits, redo);
+    again |= Mask(redo.bits()) << k;
+    if (none(inside)) return;
+    unsigned hit = (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
     if (hit == 0) return;
     alignas(64) float t[W], u[W], v[W], denominator[W];
     hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
@@ -307,10 +306,10 @@ class PacketLeaves {
   template <class Block>
   ARBORETUM_INLINE void filter(const Block& block, int triangle, int group, int k, unsigned in, Mask& again) {
     typename Leaves::Intersector::template FilteredRays<W> rays;
-    Leaves::Intersector::template filter_rays<AnyHit, W>(lanes_.rays, packet_, group, k, block, triangle,
+    Leaves::Intersector::template filter_rays<AnyHit, W>(lanes_.rays, packet_, group, k, in, block, triangle,
                                                          F::load(lanes_.t + k), rays);
-    again |= Mask(rays.again & in) << k;
-    for (unsigned hit = rays.hit & in; hit; hit &= hit - 1) {
+    again |= Mask(rays.again) << k;
+    for (unsigned hit = rays.hit; hit; hit &= hit - 1) {
       const int lane = __builtin_ctz(hit), i = k + lane;
       if constexpr (AnyHit) {
         occluded(i);

@@ -12,7 +12,7 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// Rays in flight at most.
-inline constexpr unsigned kMostInFlight = 64;
+inline constexpr unsigned kMostInFlight = TraversalSettings::kMostInFlight;
 
 /// Entries from one ray's stack to the next: an odd number of cache lines where entries fill lines, and nearly so where
 /// they do not, so that stacks do not share sets of the cache.

@@ -10,7 +10,8 @@ inline constexpr double kDeterminant = 56 * 0x1p-53;
 inline constexpr double kMostOfDivisor = 0x1p-9;
 /// (n + dn) / (d + dd) - n / d is below (dn + |n / d| dd) / |d| times this where dd is at most kMostOfDivisor of |d|.
 inline constexpr double kQuotient = 1 + 0x1p-8;
-/// The share of a quotient that its own rounding and that of its bound's ends take, at most.
+/// The share of a quotient that its own two roundings (a product with a reciprocal) and that of its bound's ends take,
+/// at most.
 inline constexpr double kRounding = 0x1p-50;
 /// Weights of corners are right to this or better.
 inline constexpr double kWeight = 0x1p-30;

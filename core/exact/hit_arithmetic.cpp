@@ -66,9 +66,10 @@ inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
   const __m128d size_e = size_of(e), size_ds = size_of(ds);
   const __m128d det = _mm_unpacklo_pd(det_t, det_t);
   // (n + dn) / (det + dd) - n / det = (dn - (n / det) dd) / (det + dd), and dd is at most 2^-9 |det|.
-  const __m128d scale_t =
-      _mm_div_pd(_mm_shuffle_pd(_mm_set1_pd(double_bounds::kDeterminant * double_bounds::kQuotient), det_t, 2), det);
-  const __m128d uv = _mm_div_pd(weights, det);
+  const __m128d inverse = _mm_div_pd(_mm_set1_pd(1.0), det);
+  const __m128d scale_t = _mm_mul_pd(
+      _mm_shuffle_pd(_mm_set1_pd(double_bounds::kDeterminant * double_bounds::kQuotient), det_t, 2), inverse);
+  const __m128d uv = _mm_mul_pd(weights, inverse);
   const double t = high(scale_t), scale = std::fabs(low(scale_t)), size_1 = low(size_e), size_2 = high(size_e);
   const double size_d = low(size_ds), size_s = high(size_ds), det_error = scale * size_1 * size_2 * size_d;
   if (!(det_error < double_bounds::kMostOfDivisor))

@@ -157,7 +157,9 @@ const StructureInfo& Bvh4Motion::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "4-wide BVH of a moving scene: boxes and triangles interpolated at the ray's time (BVH4MB)";
-    i.only_single_rays = "each ray sees boxes and triangles at its own time, so rays share no node";
+    i.only_single_rays =
+        "not built: each ray has a time of its own, so a packet's rays would share visits, but each lane would "
+        "interpolate boxes and triangles anew";
     i.builders = binary_builder_names();
     i.leaves = {Block::kName};
     i.holds_motion = i.needs_motion = true;

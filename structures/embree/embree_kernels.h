@@ -3,7 +3,7 @@
 // own; which instruction set they use was settled when the scene was built, so these functions are thin and check only
 // that row and scene agree.
 //
-// Packets and streams stand three times: with the coherent flag as the batch says (the workload knows), always and
+// Packets and streams stand three times: with the coherent flag as the batch says (primary rays alone), always and
 // never. Neither is always the faster one (docs/performance.md).
 #pragma once
 

@@ -38,8 +38,8 @@ const StructureInfo& Grid::static_info() {
     i.name = kName;
     i.summary = "grid with 3-D DDA, one or two levels of cells";
     i.only_single_rays =
-        "its rays step from cell to cell each at its own distances: those of a packet are in different cells at any "
-        "step, and nothing of a step can be shared";
+        "not built: each ray steps from cell to cell at distances of its own; what packets share in a grid is another "
+        "walk, that of their frustum through slices of cells";
     i.builders = {"two_level", "uniform"};
     i.leaves = all_leaf_names();
     return i;

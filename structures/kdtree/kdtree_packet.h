@@ -6,7 +6,8 @@
 // masked traversal an octant. A plane is tested in two steps, the first after Reshetov, Soupikov and Hurley
 // ("Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005): where the interval of distances at which any ray of the packet
 // meets it lies before or behind all that is left of the rays, they all go one way, and none of their intervals
-// changes. Else each ray is tested, W at a time. A far side waits on the stack with its rays and their intervals. Where
+// changes. Else each ray is tested, W at a time. A far side (any hit: a near side) waits on the stack with its rays and
+// their intervals. Where
 // no more than `threshold` rays are left they go on alone (kdtree_single.h).
 //
 // A ray's own tests are those of kdtree_single.h, operation by operation, and its cells come in the same order. So it
@@ -98,6 +99,14 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     float first, last;
   };
 
+  /// One side of a plane: its rays, and bounds of where these enter and leave it.
+  struct Side {
+    std::uint64_t node;
+    Mask rays;
+    float first, last;
+    bool exists;
+  };
+
   /// Bounds of a group of rays by axis.
   struct Interval {
     float r0[3], r1[3], low_origin[3], high_origin[3], pad[3];
@@ -149,13 +158,15 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     }
   }
 
-  /// The rays of a cell at a plane: those that are in the near side and in the far side. The cell becomes its far side,
-  /// the one behind it on the stack the near side; a side that is not asked for stays as it is, and the near side alone
-  /// is the cell itself.
+  /// The rays of a cell at a plane: those that are in the near side and in the far side. Where both are asked for, the
+  /// cell becomes the side that waits, the one behind it on the stack the side that is next; one side alone is the cell
+  /// itself.
   template <bool Near, bool Far>
   ARBORETUM_INLINE void divide(Cell* cell, float plane, unsigned axis, Mask mask, Mask& near, Mask& far) const {
     near = far = 0;
-    Cell* const near_cell = Far ? cell + 1 : cell;
+    constexpr bool kBoth = Near && Far;
+    Cell* const near_cell = kBoth && !AnyHit ? cell + 1 : cell;
+    Cell* const far_cell = kBoth && AnyHit ? cell + 1 : cell;
     const F s(plane);
     for (int c = 0; c < chunks_; ++c) {
       const unsigned in = Base::lanes_of(mask, c);
@@ -165,13 +176,14 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
       if constexpr (Near) {
         const F leave = msub(s, r, F::load(lanes_.leave[axis] + k));
         near |= Mask((~(leave < begin)).bits() & in) << k;
-        if constexpr (Far) begin.store(near_cell->begin + k);
+        if constexpr (kBoth && !AnyHit) begin.store(near_cell->begin + k);
         min_x86(leave, end).store(near_cell->end + k);
       }
       if constexpr (Far) {
         const F enter = msub(s, r, F::load(lanes_.enter[axis] + k));
         far |= Mask((~(enter > end)).bits() & in) << k;
-        max_x86(enter, begin).store(cell->begin + k);
+        if constexpr (kBoth && AnyHit) end.store(far_cell->end + k);
+        max_x86(enter, begin).store(far_cell->begin + k);
       }
     }
   }
@@ -226,21 +238,20 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
           divide<false, true>(top, plane, axis, mask, in_near, in_far);
         }
         count(mask, interval.usable ? 2 : 0, unsigned(has_near) + unsigned(has_far), in_near, in_far, depths.current());
-        const float far_first = low > first ? low : first;
-        if (in_near == 0) {
-          if (in_far == 0) goto pop;
-          depths.descend();
-          node = far, mask = in_far, first = far_first;
-        } else {
-          if (has_far) {  // waits, though it be without rays
-            prefetch(far);
-            depths.push(top - stack, top - stack + 1);
-            top->node = far, top->mask = in_far, top->first = far_first, top->last = last;
-            ++top;
-          }
-          depths.descend();
-          node = near, mask = in_near, last = high < last ? high : last;
+        const Side near_part{near, in_near, first, high < last ? high : last, has_near};
+        const Side far_part{far, in_far, low > first ? low : first, last, has_far};
+        const Side &next = AnyHit ? far_part : near_part, &later = AnyHit ? near_part : far_part;
+        const bool skip = next.rays == 0;
+        if (skip && later.rays == 0) goto pop;
+        if (!skip && later.exists) {  // waits, though it be without rays
+          prefetch(later.node);
+          depths.push(top - stack, top - stack + 1);
+          top->node = later.node, top->mask = later.rays, top->first = later.first, top->last = later.last;
+          ++top;
         }
+        depths.descend();
+        const Side& taken = skip ? later : next;
+        node = taken.node, mask = taken.rays, first = taken.first, last = taken.last;
       }
       if (const auto blocks = std::uint32_t(node); blocks != 0) Base::leaf(place_of(node), blocks, mask);
     pop:

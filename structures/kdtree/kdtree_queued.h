@@ -1,10 +1,10 @@
 // Many rays in flight through a kd-tree (traversal/queued_rays.h).
 //
-// A ray's next cell is the top of its stack. A step takes it, writes the far side and on top of it the near side, and
-// moves the top by those that the ray meets, so that it has no branch whatever the ray does: near, far, both or
-// neither. Cells beyond a new hit leave the stack when it is found; what is pushed later begins before it ends, and no
-// cell ends beyond the nearest hit, so the steps compare nothing with it and yet visit just the cells of
-// kdtree_single.h.
+// A ray's next cell is the top of its stack. A step takes it, writes the far side and on top of it the near side (any
+// hit: the other way round), and moves the top by those that the ray meets, so that it has no branch whatever the ray
+// does: near, far, both or neither. Cells beyond a new hit leave the stack when it is found; what is pushed later
+// begins before it ends, and no cell ends beyond the nearest hit, so the steps compare nothing with it and yet visit
+// just the cells of kdtree_single.h.
 #pragma once
 
 #include "structures/kdtree/kdtree_single.h"
@@ -60,10 +60,13 @@ class KdQueuedWalk {
     std::uint64_t near, far;
     std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
     const float leave = s.planes.leaving(plane, axis), enter = s.planes.entering(plane, axis);
-    *top = {far, enter > begin ? enter : begin, end};
-    top += !((enter > end) | (far == kdtree::kEmptyCell));
-    *top = {near, begin, leave < end ? leave : end};
-    top += !((leave < begin) | (near == kdtree::kEmptyCell));
+    const Entry near_part{near, begin, leave < end ? leave : end}, far_part{far, enter > begin ? enter : begin, end};
+    const bool in_near = !((leave < begin) | (near == kdtree::kEmptyCell)),
+               in_far = !((enter > end) | (far == kdtree::kEmptyCell));
+    *top = AnyHit ? near_part : far_part;
+    top += AnyHit ? in_near : in_far;
+    *top = AnyHit ? far_part : near_part;
+    top += AnyHit ? in_far : in_near;
     s.top = top;
     return top[-1].node;
   }

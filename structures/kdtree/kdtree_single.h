@@ -1,4 +1,5 @@
-// One ray through a kd-tree, front to back; closest hit and any hit.
+// One ray through a kd-tree: closest hit front to back, any hit back to front, since what a shadow ray meets stands by
+// its light more often than by its origin (docs/performance/other-structures.md).
 //
 // A cell's interval of t is what its planes leave of the ray. A plane at s on an axis with origin o and direction d is
 // met at t = (s - o) / d, computed as s * r - o * r. Padded, the side that the ray comes from ends at t + e and the
@@ -131,14 +132,25 @@ ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t n
         if (!skip_near && !skip_far) depths.push(top - stack, top - stack + 1);
       }
       depths.descend();
-      const float far_begin = enter > begin ? enter : begin;
-      if (skip_near) {
-        if (skip_far) goto pop;
-        node = far, begin = far_begin;
+      const float far_begin = enter > begin ? enter : begin, near_end = leave < end ? leave : end;
+      if constexpr (AnyHit) {
+        if (skip_far) {
+          if (skip_near) goto pop;
+          node = near, end = near_end;
+        } else {
+          top->node = near, top->begin = begin, top->end = near_end;
+          top += !skip_near;
+          node = far, begin = far_begin;
+        }
       } else {
-        top->node = far, top->begin = far_begin, top->end = end;
-        top += !skip_far;
-        node = near, end = leave < end ? leave : end;
+        if (skip_near) {
+          if (skip_far) goto pop;
+          node = far, begin = far_begin;
+        } else {
+          top->node = far, top->begin = far_begin, top->end = end;
+          top += !skip_far;
+          node = near, end = near_end;
+        }
       }
     }
     if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf

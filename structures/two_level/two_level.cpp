@@ -98,8 +98,8 @@ const StructureInfo& TwoLevel::static_info() {
     i.name = kName;
     i.summary = "a BVH over instances, a structure of another kind (parameter below) for each prototype";
     i.only_single_rays =
-        "each ray enters an instance's own space, where it is another ray: what packets and streams share is lost at "
-        "every instance";
+        "not built: an instance's map takes all rays of a packet alike, but the loop hands one ray at a time to the "
+        "structure below and settles each hit in world space";
     i.builders = binary_builder_names();
     i.takes_below = true;
     i.leaves = all_leaf_names();

@@ -164,6 +164,18 @@ class CommandLine(CommandLineCase):
         self.assertFalse((self.folder / "other").exists())
         self.assertEqual(self.run_small(*few, "--out", "other", env=wrong).returncode, 0)
 
+    def test_embree_comes_with_its_version_and_what_its_package_costs_it(self):
+        if "embree" not in self.call("list", "structures").stdout.split("not available")[0]:
+            self.skipTest("no embree here")
+        for structures, said in (("bvh4", False), ("bvh4,embree", True)):
+            few = (f"structure={structures}", "isa=sse", "workload=primary", "intersector=moller_trumbore", "--out", "out")
+            for metric in ("^build", "^trace"):
+                result = self.run_small(*few, "--skip", metric)
+                self.assertIn(result.returncode, (0, 1), result.stderr)
+                self.assertEqual("keeps its assertions on" in result.stdout, said, (structures, metric))
+        context = json.loads((self.folder / "out/results.json").read_text())["context"]
+        self.assertRegex(context["embree"], r"^Intel Embree \d+\.[\d.]+$")
+
     def test_a_run_leaves_what_the_contract_says(self):
         result = self.run_small()
         self.assertIn(result.returncode, (0, 1), result.stderr)
@@ -316,7 +328,7 @@ class CommandLine(CommandLineCase):
 
     def test_lists(self):
         listed = json.loads(self.call("list", "--json").stdout)
-        for title in ("structures", "builders", "leaves", "intersectors", "boxes", "traversals", "isas", "workloads", "scenes"):
+        for title in ("structures", "builders", "leaves", "intersectors", "boxes", "traversals", "calls", "isas", "workloads", "scenes"):
             self.assertTrue(listed[title], title)
             for entry in listed[title]:
                 self.assertTrue(entry["summary"], f"{title}: {entry['name']} has no summary")

@@ -246,6 +246,24 @@ class Drawing(unittest.TestCase):
         self.assertNotIn("rong answer", report.answers(load(Folder([unchecked, build()]).path)))
         self.assertNotIn("not checked", report.answers(load(Folder([right]).path)))
 
+    def test_report_says_how_embree_was_built(self):
+        stream = trace("embree", traversal="stream_coherent")
+        stream["run_name"] = stream["name"] = stream["name"].replace("/single/", "/stream_coherent/")
+        for rows, context, notes, said, unsaid in (
+                ([trace(), build()], {"embree": "Intel Embree 3.13.5"}, 0, (), ("assertions", "3.13.5, as it is installed")),
+                ([trace(), trace("embree")], {"embree": "Intel Embree 3.13.5"}, 3, ("embree: Intel Embree 3.13.5, as it is installed.", "12 % on streams"), ("_incoherent both",)),
+                ([trace(), build("embree")], {}, 2, ("embree: as it is installed.",), ("_incoherent both",)),
+                ([trace(), stream, build("embree")], {}, 4, ("_incoherent both",), ())):
+            with self.subTest(notes=notes):
+                folder = Folder(rows, context)
+                self.assertEqual(folder.plot().returncode, 0)
+                page = (folder.path / "report.html").read_text(encoding="utf-8")
+                self.assertEqual(page.count("keeps its assertions on"), notes)  # fastest, figures, all cells; structures
+                for words in said:
+                    self.assertIn(words, page)
+                for words in unsaid:
+                    self.assertNotIn(words, page)
+
     def test_only_some(self):
         folder = Folder(whole())
         self.assertEqual(folder.plot("--only", "sah_cost").returncode, 0)
