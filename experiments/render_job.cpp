@@ -19,7 +19,6 @@ void RenderJob::trace_recorded(Counters* counters) const {
   closest.settings = any.settings = cell_.settings;
   cell_.kernel->closest_hit(accel_, closest, std::span(buffers_.hits).first(closest.size()), counters);
   cell_.kernel->any_hit(accel_, any, std::span(buffers_.occluded).first(any.size()), counters);
-  if (counters) counters->rays = closest.size() + any.size();
 }
 
 RenderStatistics RenderJob::render() const {
@@ -44,7 +43,7 @@ void RenderJob::prepare(Json& facts, SceneData& data, const MeasureSettings& mea
   if (cell_.kernel->counts()) {
     Counters counters;
     trace_recorded(&counters);
-    add_facts(facts, counters);
+    add_facts(facts, counters, hits.size() + occluded.size(), cell_.traversal);
   }
   if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";
 

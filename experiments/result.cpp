@@ -92,9 +92,9 @@ void add_facts(Json& facts, const StructureStatistics& s) {
   facts["children_per_node"] = s.children_per_node;
 }
 
-void add_facts(Json& facts, const Counters& c) {
+void add_facts(Json& facts, const Counters& c, std::size_t of_rays, std::string_view traversal) {
   if (c.rays == 0) return;
-  const double rays = static_cast<double>(c.rays);
+  const double rays = static_cast<double>(of_rays);
   facts["nodes_per_ray"] = static_cast<double>(c.nodes) / rays;
   facts["boxes_per_ray"] = static_cast<double>(c.boxes) / rays;
   facts["leaves_per_ray"] = static_cast<double>(c.leaves) / rays;
@@ -116,8 +116,22 @@ void add_facts(Json& facts, const Counters& c) {
       lanes.push_back(d.lanes > 0 ? Json(share(d.lanes_active, d.lanes)) : Json(nullptr));
     }
   }
-  if (c.packets > 0) {
+  const bool chooses = traversal == "auto";
+  const bool packets = chooses || traversal.starts_with("packet") || traversal.starts_with("hybrid");
+  if ((packets || traversal.starts_with("stream")) && c.nodes > 0) {
+    facts["rays_per_node_visit"] = share(c.nodes, c.nodes - c.nodes_shared);
+    if (c.leaves > 0) facts["rays_per_leaf_visit"] = share(c.leaves, c.leaves - c.leaves_shared);
+  }
+  if (packets) {
     facts["packet_share"] = share(c.rays_in_packets, c.rays);
+    facts["interval_tests_per_ray"] = static_cast<double>(c.interval_tests) / rays;
+  }
+  if (chooses) {
+    facts["stream_share"] = share(c.rays_in_streams, c.rays);
+    facts["queued_share"] = share(c.rays_in_flight, c.rays);
+    facts["single_share"] = share(c.rays - c.rays_in_packets - c.rays_in_streams - c.rays_in_flight, c.rays);
+  }
+  if (c.packets > 0) {
     facts["switches_per_packet"] = share(c.switches, c.packets);
     if (c.switches > 0) facts["rays_per_switch"] = share(c.rays_alone, c.switches);
   }

@@ -44,7 +44,9 @@ struct CellResult {
 };
 
 void add_facts(Json& facts, const StructureStatistics& statistics);
-void add_facts(Json& facts, const Counters& counters);
+/// `counters` of the counting pass over `rays` rays of a cell; those that were traced more than once (`exclusion`)
+/// count as often.
+void add_facts(Json& facts, const Counters& counters, std::size_t rays, std::string_view traversal);
 void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit);
 void add_facts(Json& facts, const StartCheck& check, bool closest_hit);
 /// Points of a picture, in tenths of a pixel, at most so many of them, evenly taken; those beside the picture are left

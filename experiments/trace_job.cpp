@@ -88,7 +88,6 @@ Counters TraceJob::count() const {
     closest(rays, 0, &counters);
   else
     any(rays, 0, &counters);
-  counters.rays = rays.size();
   return counters;
 }
 
@@ -112,7 +111,7 @@ void TraceJob::prepare(Json& facts, SceneData& data, const MeasureSettings& meas
     add_facts(facts, closest ? data.check_starts(workload_, hits) : data.check_starts(workload_, occluded), closest);
     facts["start_distance"] = data.start_distance(workload_);
   }
-  add_facts(facts, count());
+  add_facts(facts, count(), rays, cell_.traversal);
   if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";
 
   warm_up(measure.warmup, measure.min_warmup_time, [&] { trace(rays); });

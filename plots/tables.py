@@ -98,8 +98,10 @@ def throughput_table(results):
     counts = [(name, label) for name, label in PER_MILLION if any(c.per_million(name) is not None for c in cells)]
     extra = [(name, label) for name, label in (("nodes_per_ray", "nodes/ray"), ("triangles_per_ray", "tri/ray"),
                                                ("simd_utilization", "lane use"), ("t_error_ulp_p99", "t error p99, ulp"),
-                                               ("packet_share", "rays in packets"), ("switches_per_packet", "switches/packet"),
-                                               ("rays_per_switch", "rays/switch"), ("node_queue_length", "nodes queued"),
+                                               ("interval_tests_per_ray", "interval tests/ray"), ("rays_per_node_visit", "rays/node visit"),
+                                               ("rays_per_leaf_visit", "rays/leaf visit"), ("packet_share", "rays in packets"),
+                                               ("stream_share", "rays in streams"), ("queued_share", "rays in flight"), ("single_share", "rays singly"),
+                                               ("switches_per_packet", "switches/packet"), ("rays_per_switch", "rays/switch"), ("node_queue_length", "nodes queued"),
                                                ("leaf_queue_length", "leaves queued"))
              if any(c.value(name) is not None for c in cells)]
     children = any(cell.series("children_hit") for cell in cells)

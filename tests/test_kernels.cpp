@@ -180,7 +180,8 @@ TEST_CASE("any hit, the counting kernels and batches of any size agree with clos
         REQUIRE(c.triangles >= c.blocks);
         REQUIRE(c.lanes_active == c.boxes + c.triangles);
         REQUIRE(c.lanes >= c.lanes_active);
-        REQUIRE(c.boxes_hit <= c.boxes);
+        // A plane of the kd-tree that is met behind all of a packet leaves its rays one cell without a test of each.
+        REQUIRE(c.boxes_hit <= (row.structure == "kdtree" ? 2 * c.nodes : c.boxes));
       }
       // A ray that meets nothing goes the same way, whatever is asked.
       std::vector<Ray> missing;

@@ -4,11 +4,13 @@
 
 namespace arboretum {
 
-void WithCounters::node(unsigned boxes, unsigned lanes, unsigned hit) const noexcept {
-  ++counters.nodes;
-  counters.boxes += boxes, counters.lanes_active += boxes;
-  counters.boxes_hit += hit, counters.lanes += lanes;
+void WithCounters::met(unsigned hit) const noexcept {
+  ++counters.nodes, counters.boxes_hit += hit;
   ++counters.children_hit[std::min<std::size_t>(hit, counters.children_hit.size() - 1)];
+}
+
+void WithCounters::box_tests(unsigned lanes, unsigned active) const noexcept {
+  counters.boxes += active, counters.lanes_active += active, counters.lanes += lanes;
 }
 
 void WithCounters::at_depth(Depth depth, unsigned lanes, unsigned active) const {
@@ -22,12 +24,11 @@ void WithCounters::Depths::push(std::ptrdiff_t begin, std::ptrdiff_t end) {
   for (std::size_t i = first; i < last; ++i) waiting_[i] = current_ + 1;
 }
 
-void WithCounters::leaf(const LeafForm& form, const std::byte* blocks, unsigned count) const noexcept {
-  ++counters.leaves;
+void WithCounters::blocks(const LeafForm& form, const std::byte* at, unsigned count) const noexcept {
   counters.blocks += count;
   counters.lanes += std::uint64_t(count) * form.width;
   for (unsigned i = 0; i < count; ++i) {
-    const unsigned triangles = form.triangles(blocks + i * form.bytes);
+    const unsigned triangles = form.triangles(at + i * form.bytes);
     counters.triangles += triangles, counters.lanes_active += triangles;
   }
 }

@@ -21,6 +21,7 @@ struct NoCounters {
   void node(unsigned, unsigned, unsigned) const noexcept {}
   void at_depth(Depth, unsigned, unsigned) const noexcept {}
   void leaf(const LeafForm&, const std::byte*, unsigned) const noexcept {}
+  void blocks(const LeafForm&, const std::byte*, unsigned) const noexcept {}
   void node_queue(unsigned) const noexcept {}
   void leaf_queue(unsigned) const noexcept {}
 };
@@ -52,12 +53,24 @@ struct WithCounters {
   Counters& counters;
   explicit WithCounters(Counters* c) noexcept : counters(*c) {}
 
-  /// An inner node of `boxes` child boxes, tested in `lanes` lanes, of which the ray meets `hit`.
-  void node(unsigned boxes, unsigned lanes, unsigned hit) const noexcept;
-  /// That visit, or a packet's: `lanes` lanes, of which `active` held something to test.
+  /// A ray visits an inner node: `boxes` child boxes, tested in `lanes` lanes, of which it meets `hit`.
+  void node(unsigned boxes, unsigned lanes, unsigned hit) const noexcept { box_tests(lanes, boxes), met(hit); }
+  /// The same where its tests are counted with others': of the node's children it meets `hit`.
+  void met(unsigned hit) const noexcept;
+  /// Lanes of ray/box tests, of which `active` held a ray and a box that exists.
+  void box_tests(unsigned lanes, unsigned active) const noexcept;
+  /// Of a visit of one ray, or of those that share it, the same lanes again.
   void at_depth(Depth depth, unsigned lanes, unsigned active) const;
-  /// A whole leaf of `count` blocks; an any hit that ends earlier counts as if it went on.
-  void leaf(const LeafForm& form, const std::byte* blocks, unsigned count) const noexcept;
+  /// So many rays visit a node together, or a leaf.
+  void share_node(unsigned rays) const noexcept { counters.nodes_shared += rays - 1; }
+  void share_leaf(unsigned rays) const noexcept { counters.leaves_shared += rays - 1; }
+  /// Boxes tested against the interval of a packet.
+  void interval(unsigned boxes) const noexcept { counters.interval_tests += boxes; }
+  /// A ray visits a leaf and is tested against `count` blocks of it; then against more.
+  void leaf(const LeafForm& form, const std::byte* at, unsigned count) const noexcept {
+    ++counters.leaves, blocks(form, at, count);
+  }
+  void blocks(const LeafForm& form, const std::byte* at, unsigned count) const noexcept;
   /// The queue of nodes has its turn: a round begins; then that of leaves.
   void node_queue(unsigned length) const noexcept { ++counters.queue_rounds, counters.nodes_queued += length; }
   void leaf_queue(unsigned length) const noexcept { counters.leaves_queued += length; }

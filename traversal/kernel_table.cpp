@@ -109,10 +109,12 @@ template <int W>
 Counters& Counters::operator+=(const Counters& o) noexcept {
   rays += o.rays, nodes += o.nodes, boxes += o.boxes, boxes_hit += o.boxes_hit, leaves += o.leaves, blocks += o.blocks;
   triangles += o.triangles, lanes += o.lanes, lanes_active += o.lanes_active;
+  nodes_shared += o.nodes_shared, leaves_shared += o.leaves_shared, interval_tests += o.interval_tests;
   for (std::size_t i = 0; i < children_hit.size(); ++i) children_hit[i] += o.children_hit[i];
   depths.resize(std::max(depths.size(), o.depths.size()));
   for (std::size_t i = 0; i < o.depths.size(); ++i) depths[i] += o.depths[i];
-  packets += o.packets, rays_in_packets += o.rays_in_packets, switches += o.switches, rays_alone += o.rays_alone;
+  packets += o.packets, rays_in_packets += o.rays_in_packets, rays_in_streams += o.rays_in_streams;
+  rays_in_flight += o.rays_in_flight, switches += o.switches, rays_alone += o.rays_alone;
   queue_rounds += o.queue_rounds, nodes_queued += o.nodes_queued, leaves_queued += o.leaves_queued;
   return *this;
 }

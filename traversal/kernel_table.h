@@ -21,31 +21,35 @@ namespace arboretum {
 class Accel;
 struct LeafTests;
 
-/// Work done by a batch; filled by the counting kernels alone (the timed ones carry no counters). What a packet visits
-/// counts once for each of its rays that are there.
+/// Work done by a batch; filled by the counting kernels alone (the timed ones carry no counters). What rays visit
+/// together, as packets and streams do, counts once for each of them.
 struct Counters {
   std::uint64_t rays = 0;
-  std::uint64_t nodes = 0;  ///< inner nodes visited
-  std::uint64_t boxes = 0;  ///< child boxes tested (those that exist)
-  std::uint64_t boxes_hit = 0;
+  std::uint64_t nodes = 0;         ///< inner nodes visited
+  std::uint64_t boxes = 0;         ///< ray/box tests against children that exist
+  std::uint64_t boxes_hit = 0;     ///< children that rays met, by their own test or by their packet's
   std::uint64_t leaves = 0;        ///< leaves visited
   std::uint64_t blocks = 0;        ///< leaf blocks tested
   std::uint64_t triangles = 0;     ///< ray/triangle tests, empty lanes not counted
-  std::uint64_t lanes = 0;         ///< SIMD lanes spent on boxes and triangles
-  std::uint64_t lanes_active = 0;  ///< of them, those that held a box or triangle that exists
+  std::uint64_t lanes = 0;         ///< SIMD lanes of these tests of rays against boxes and triangles
+  std::uint64_t lanes_active = 0;  ///< of them, those that held a ray and a box or triangle: boxes + triangles
+
+  /// Where n rays of a packet or of a stream's group visit a node together, n - 1: `nodes` less these is how often
+  /// nodes are read. The same of leaves.
+  std::uint64_t nodes_shared = 0, leaves_shared = 0;
+  std::uint64_t interval_tests = 0;  ///< boxes tested against the interval of a packet, once for all of its rays
 
   std::array<std::uint64_t, 5> children_hit{};  ///< node visits in which the ray met 0, 1, 2, 3, 4 or more children
-  /// What nodes at one depth, the root's 0, were tested with: the rays of a packet, or the children that one ray is
-  /// tested against.
+  /// Of nodes at one depth, the root's 0, the ray/box tests: a ray's children in lanes, or a child's rays (packets).
   struct Depth {
-    std::uint64_t visits = 0;  ///< by a packet or by one ray
+    std::uint64_t visits = 0;  ///< that of rays which go together is one
     std::uint64_t lanes = 0, lanes_active = 0;
     Depth& operator+=(const Depth& o) noexcept;
   };
   std::vector<Depth> depths;  ///< of trees whose kernels follow their depth (the BVHs, the kd-tree), else empty
 
   std::uint64_t packets = 0;
-  std::uint64_t rays_in_packets = 0;
+  std::uint64_t rays_in_packets = 0, rays_in_streams = 0, rays_in_flight = 0;  ///< of `rays`; the others went singly
   std::uint64_t switches = 0;      ///< times that a packet had its rays go on alone in a node
   std::uint64_t rays_alone = 0;    ///< the rays that did, at all switches
   std::uint64_t queue_rounds = 0;  ///< of rays in flight: once through the queue of nodes and that of leaves

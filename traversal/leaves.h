@@ -69,6 +69,23 @@ struct CompiledLeaves {
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
 
+/// Of any hit a ray's visit of a leaf: counted up to the block that ends it.
+template <class Leaves, class RayData, class Counting>
+ARBORETUM_INLINE bool any_hit_in_leaf(const Leaves& leaves, RayData& data, [[maybe_unused]] const LeafForm& form,
+                                      [[maybe_unused]] const Counting& counting, const std::byte* blocks,
+                                      unsigned count, float tnear, float tfar) {
+  if constexpr (Counting::kCounting) {
+    counting.leaf(form, blocks, 0);
+    for (const std::byte* const end = blocks + count * form.bytes; blocks != end; blocks += form.bytes) {
+      counting.blocks(form, blocks, 1);
+      if (leaves.any_hit(data, blocks, 1, tnear, tfar)) return true;
+    }
+    return false;
+  } else {
+    return leaves.any_hit(data, blocks, count, tnear, tfar);
+  }
+}
+
 /// Tests a leaf with `rays`, a bit each: one ray after the other, or one block after the other where that is better.
 /// `ray(i)` and `data(i)`: the i-th ray and what the intersector keeps for it. Of any hit `hit(i)` is called once, for
 /// one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
@@ -83,10 +100,10 @@ ARBORETUM_INLINE void test_leaf(const Leaves& leaves, [[maybe_unused]] const Lea
   } else {
     for (; rays; rays &= rays - 1) {
       const int i = __builtin_ctzll(rays);
-      if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
+      if constexpr (Counting::kCounting && !AnyHit) counting.leaf(form, blocks, count);
       const Ray& r = ray(i);
       auto&& of_ray = data(i);
-      if (AnyHit ? leaves.any_hit(of_ray, blocks, count, r.tnear, r.tfar)
+      if (AnyHit ? any_hit_in_leaf(leaves, of_ray, form, counting, blocks, count, r.tnear, r.tfar)
                  : leaves.closest_hit(of_ray, blocks, count, r.tnear, best(i)))
         hit(i);
     }

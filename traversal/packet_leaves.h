@@ -35,7 +35,7 @@ class PacketLeaves {
   ARBORETUM_INLINE void trace(const Ray* rays, int count, int threshold, const Prepare& prepare,
                               const Traverse& traverse) {
     threshold_ = threshold;
-    if constexpr (Counting::kCounting) ++counting_.counters.packets, rays_of_packet_ = unsigned(count);
+    if constexpr (Counting::kCounting) ++counting_.counters.packets;
     load(rays, count, prepare);
     for (unsigned octant = 0; octant < 8; ++octant) {
       Mask mask = lanes_.valid;
@@ -44,6 +44,9 @@ class PacketLeaves {
     }
     finish();
   }
+
+  /// Where lanes are counted: those of a register of the timed kernel, which the counting one may have more of.
+  void set_width(unsigned width) requires Counting::kCounting { width_ = width; }
 
   /// Too few rays for the packet to go on with.
   ARBORETUM_INLINE bool few(Mask mask) const { return __builtin_popcountll(mask) <= threshold_; }
@@ -159,7 +162,19 @@ class PacketLeaves {
     }
   }
 
+  /// The rays of `mask` visit a node together, each tested against `boxes` of its children. Returns the lanes that
+  /// these tests take, those of registers without a ray left out, and of them those with one.
+  std::pair<unsigned, unsigned> count_node(Mask mask, unsigned boxes) const requires Counting::kCounting {
+    const auto rays = unsigned(__builtin_popcountll(mask));
+    unsigned lanes = 0;
+    for (unsigned k = 0; k < unsigned(kMost); k += width_)
+      if ((mask >> k & ((Mask{1} << width_) - 1)) != 0) lanes += width_;
+    counting_.share_node(rays), counting_.box_tests(boxes * lanes, boxes * rays);
+    return {boxes * lanes, boxes * rays};
+  }
+
   void leaf(const std::byte* blocks, unsigned count, Mask mask) {
+    if constexpr (Counting::kCounting) counting_.share_leaf(unsigned(__builtin_popcountll(mask)));
     if constexpr (Leaves::kRaysInLanes) {
       if (__builtin_popcountll(mask) >= kWorthLanes) {
         const auto* block = reinterpret_cast<const typename Leaves::Block*>(blocks);
@@ -311,9 +326,9 @@ class PacketLeaves {
   const LeafForm& form_;
   Counting counting_;
   const Ray* rays_ = nullptr;
-  int chunks_ = 0;               ///< registers that the rays take
-  unsigned rays_of_packet_ = 0;  ///< where they are counted
-  Mask active_ = 0;              ///< rays whose search is not over (any hit)
+  int chunks_ = 0;      ///< registers that the rays take
+  unsigned width_ = 0;  ///< set_width()
+  Mask active_ = 0;     ///< rays whose search is not over (any hit)
   Rays lanes_;
   NearestHit best_[kMost];
 

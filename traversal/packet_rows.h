@@ -7,6 +7,13 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// Lanes of a register of packets of so many rays. `Family::kFewerLanes`: packets of fewer rays than a register holds
+/// have narrower registers.
+template <class Family>
+constexpr int register_lanes(int rays_each) {
+  return Family::kFewerLanes ? std::min(rays_each, kNativeWidth) : kNativeWidth;
+}
+
 /// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone.
 /// `Family::Packets<W, Leaves, AnyHit, Counting>` is the class for packets of W rays a register through a
 /// `Family::Structure`.
@@ -32,6 +39,7 @@ struct PacketBatch {
                                               Counters* counters, int rays_each, int threshold, const Report& report) {
     typename Family::template Packets<W, Leaves, AnyHit, Counting> packet(
         static_cast<const typename Family::Structure&>(accel), row, Counting(counters));
+    if constexpr (Counting::kCounting) packet.set_width(unsigned(register_lanes<Family>(rays_each)));
     for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
       const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
       packet.trace(&rays[begin], count, threshold);
@@ -61,10 +69,10 @@ struct PacketFunctions {
   }
   template <class Leaves, bool>
   static RowFunctions timed() {
-    constexpr int kLanes = Family::kFewerLanes ? std::min(Rays, kNativeWidth) : kNativeWidth;
-    return functions<PacketBatch<Family, kLanes, Leaves, NoCounters>>();
+    return functions<PacketBatch<Family, register_lanes<Family>(Rays), Leaves, NoCounters>>();
   }
-  /// What is visited does not depend on the lanes.
+  /// What is visited does not depend on the lanes of a register. Triangles that no ray of a packet can hit, which are
+  /// left out where leaf tests are compiled in, are counted as if they were tested.
   template <bool>
   static RowFunctions counting() {
     return functions<PacketBatch<Family, kNativeWidth, CalledLeaves, WithCounters>>();
@@ -75,8 +83,7 @@ struct PacketFunctions {
 /// of up to 16 rays stay together to the end, which is what tells them from hybrids.
 inline constexpr int kFewOf32 = 4, kFewOf64 = 6, kFewOfHybrid4 = 1, kFewOfHybrid8 = 2, kFewOfHybrid16 = 3;
 
-/// `Compiled`: what packet32 and packet64 have compiled in. `Family::kFewerLanes`: packets of fewer rays than a
-/// register holds have narrower registers.
+/// `Compiled`: what packet32 and packet64 have compiled in.
 template <class Structure, class Family, class Compiled>
 void add_packet_rows(KernelRows& rows, Compiled compiled) {
   add_rows<Structure, PacketFunctions<Family, 4, 0>>(rows, "packet4", TypeList<>{});

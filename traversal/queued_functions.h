@@ -61,12 +61,14 @@ struct QueuedFunctions {
   static RowFunctions counting() {
     return {[](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
               Single::template counting<Padded>().closest_hit(accel, row, rays, hits, counters);
+              counters->rays_in_flight += rays.size();
               queued_closest_hit<Queue<CalledLeaves, Padded, false>, WithCounters>(
                   accel, row, rays, in_flight(rays, Closest), hits, counters);
             },
             [](const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded,
                Counters* counters) {
               Single::template counting<Padded>().any_hit(accel, row, rays, occluded, counters);
+              counters->rays_in_flight += rays.size();
               queued_any_hit<Queue<CalledLeaves, Padded, true>, WithCounters>(accel, row, rays, in_flight(rays, Any),
                                                                               occluded, counters);
             }};

@@ -22,7 +22,7 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
   using Base = ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRays>;
 
  public:
-  using Base::best, Base::times_alone;
+  using Base::best, Base::set_width, Base::times_alone;
 
   BihPackets(const bih::Bih& tree, const KernelRow& row, Counting counting)
       : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded"), stack_(tree.stack_entries() + 1),
@@ -146,13 +146,14 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
     return top;
   }
 
-  /// A node visit of a packet counts as one of each of its rays.
+  /// The rays of `mask` visit a node, each tested against its `boxes` children.
   void count([[maybe_unused]] Mask mask, [[maybe_unused]] unsigned boxes, [[maybe_unused]] Mask first,
              [[maybe_unused]] Mask second) const {
     if constexpr (Counting::kCounting) {
+      Base::count_node(mask, boxes);
       for (; mask; mask &= mask - 1) {
         const int i = __builtin_ctzll(mask);
-        counting_.node(boxes, boxes, unsigned(first >> i & 1u) + unsigned(second >> i & 1u));
+        counting_.met(unsigned(first >> i & 1u) + unsigned(second >> i & 1u));
       }
     }
   }

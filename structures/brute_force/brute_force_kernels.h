@@ -21,8 +21,8 @@ class BruteForceKernel {
     const unsigned count = accel_.block_count();
     if (count == 0) return false;
     typename Leaves::RayData data = leaves_.prepare(ray);
+    if constexpr (AnyHit) return any_hit_in_leaf(leaves_, data, form_, counting_, blocks, count, ray.tnear, ray.tfar);
     counting_.leaf(form_, blocks, count);
-    if constexpr (AnyHit) return leaves_.any_hit(data, blocks, count, ray.tnear, ray.tfar);
     leaves_.closest_hit(data, blocks, count, ray.tnear, best);
     leaves_.finish(data, best);
     return false;

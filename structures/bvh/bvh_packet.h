@@ -30,7 +30,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   using Base = PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays>;
 
  public:
-  using Base::best, Base::kMost, Base::times_alone;
+  using Base::best, Base::kMost, Base::set_width, Base::times_alone;
 
   BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
       : Base(row, tree.vertices(), counting), base_(tree.base()), root_(tree.root()),
@@ -206,6 +206,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
         entry.store(t);
         Entry* const bottom = top;
         [[maybe_unused]] MetChildren met;
+        [[maybe_unused]] const unsigned tested = hit;
         for (; hit; hit &= hit - 1) {
           const int i = __builtin_ctz(hit);
           const Mask mask = rays_met(interval.near, node, i, e.mask);
@@ -219,7 +220,10 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
           }
           *p = {child, t[i], mask};
         }
-        if constexpr (Counting::kCounting) count(node, e.mask, met, depths.current());
+        if constexpr (Counting::kCounting) {
+          if (interval.usable) counting_.interval(Format::boxes(node));
+          count(e.mask, unsigned(__builtin_popcount(tested)), met, depths.current());
+        }
         if (top == bottom) goto pop;
         depths.push(bottom - stack, top - stack);
         e = *--top;
@@ -266,11 +270,11 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   };
   using MetChildren = std::conditional_t<Counting::kCounting, WithMetChildren, NoMetChildren>;
 
-  /// A node visit of a packet counts as one of each of its rays.
-  void count(const std::byte* node, Mask mask, const MetChildren& met, typename Counting::Depth depth) const {
-    const unsigned boxes = Format::boxes(node);
-    counting_.at_depth(depth, Base::rays_of_packet_, unsigned(__builtin_popcountll(mask)));
-    for (; mask; mask &= mask - 1) counting_.node(boxes, kLanes, met.of_ray[__builtin_ctzll(mask)]);
+  /// The rays of `mask` visit a node, tested against those of its children that the interval test leaves.
+  void count(Mask mask, unsigned tested, const MetChildren& met, typename Counting::Depth depth) const {
+    const auto [lanes, active] = Base::count_node(mask, tested);
+    counting_.at_depth(depth, lanes, active);
+    for (; mask; mask &= mask - 1) counting_.met(met.of_ray[__builtin_ctzll(mask)]);
   }
 
   const std::byte* base_;

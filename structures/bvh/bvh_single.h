@@ -108,8 +108,8 @@ ARBORETUM_INLINE bool search_bvh(const std::byte* base, bvh::NodeReference root,
   const auto leaf = [&](bvh::NodeReference reference) __attribute__((always_inline)) {
     const std::byte* const blocks = base + bvh::offset_of(reference);
     const unsigned count = bvh::block_count(reference);
+    if constexpr (AnyHit) return any_hit_in_leaf(leaves, data, form, counting, blocks, count, ray.tnear, ray.tfar);
     if constexpr (Counting::kCounting) counting.leaf(form, blocks, count);
-    if constexpr (AnyHit) return leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar);
     if (leaves.closest_hit(data, blocks, count, ray.tnear, best)) nodes.shorten(best.t);
     return false;
   };

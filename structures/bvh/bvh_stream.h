@@ -237,10 +237,13 @@ class Stream {
       F entry;
       const vm<W> meets = box.meets([&](unsigned offset) { return planes[offset / kSide]; }, F(c[3]), F(g.t[i]), entry);
       met.add(i, meets, entry);
-      if constexpr (Counting::kCounting) {
+      if constexpr (Counting::kCounting)
         counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(meets.bits() & kChildren)));
-        counting_.at_depth(g.depths.current(), Test::kSlots, Test::boxes(node));
-      }
+    }
+    if constexpr (Counting::kCounting) {
+      const auto count = unsigned(__builtin_popcountll(rays));
+      counting_.share_node(count);
+      counting_.at_depth(g.depths.current(), count * Test::kSlots, count * Test::boxes(node));
     }
     const unsigned first = g.top;
     g.top = met.push(g.stack, first, Test::children(node), rays);
@@ -252,6 +255,7 @@ class Stream {
   [[gnu::noinline]] void leaf(Group& g, bvh::NodeReference target, std::uint64_t rays) {
     const std::byte* const blocks = base_ + bvh::offset_of(target);
     const unsigned count = bvh::block_count(target);
+    if constexpr (Counting::kCounting) counting_.share_leaf(unsigned(__builtin_popcountll(rays)));
     const auto hit = [&g, beyond = pad_.beyond()](int i) {
       if constexpr (AnyHit) {
         g.best[i].primitive = 0, g.active &= ~(std::uint64_t{1} << i);
@@ -320,7 +324,7 @@ struct StreamFunctions {
                                                           Counting(counters));
       stream.run([&](std::size_t i, const NearestHit& best) { report(begin + i, best); });
     }
-    if constexpr (Counting::kCounting) counters->rays += rays.size();
+    if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_streams += rays.size();
   }
 };
 

@@ -159,10 +159,8 @@ class StreamLists {
       F entry;
       unsigned hit = box.test_planes([&](unsigned offset) { return planes[offset / Box::kSide]; }, F(s.first),
                                      F(s.nearest), entry);
-      if constexpr (Counting::kCounting) {
+      if constexpr (Counting::kCounting)
         counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
-        counting_.at_depth(depth, Test::kSlots, Test::boxes(node));
-      }
       entry.store(key);
       // Two without a branch, which most rays need no more than; what is not there goes to the list behind the last.
       const auto append = [&] {
@@ -173,6 +171,10 @@ class StreamLists {
       };
       append(), append();
       while (hit) append();
+    }
+    if constexpr (Counting::kCounting) {
+      counting_.share_node(list.count);
+      counting_.at_depth(depth, list.count * Test::kSlots, list.count * Test::boxes(node));
     }
     push(node, planes, tail, direction, free, top);
   }
@@ -210,6 +212,7 @@ class StreamLists {
   void leaf(const List& list) {
     const std::byte* const blocks = base_ + bvh::offset_of(list.target);
     const unsigned count = bvh::block_count(list.target);
+    if constexpr (Counting::kCounting) counting_.share_leaf(list.count);
     for (unsigned i = 0; i < list.count; ++i) leaf(ray_of(entries_[list.begin + i]), blocks, count);
   }
 
@@ -217,13 +220,13 @@ class StreamLists {
   ARBORETUM_INLINE bool leaf(unsigned ray, const std::byte* blocks, unsigned count) {
     State& s = states_[ray];
     LeafState& l = leaf_states_[ray];
-    if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
     if constexpr (AnyHit) {
-      if (!leaves_.any_hit(l.data, blocks, count, l.tnear, s.nearest)) return false;
+      if (!any_hit_in_leaf(leaves_, l.data, form_, counting_, blocks, count, l.tnear, s.nearest)) return false;
       l.best.primitive = 0;
       s.nearest = -std::numeric_limits<float>::infinity();
       return true;
     } else {
+      if constexpr (Counting::kCounting) counting_.leaf(form_, blocks, count);
       if (!leaves_.closest_hit(l.data, blocks, count, l.tnear, l.best)) return false;
       s.nearest = l.best.t;
       return true;

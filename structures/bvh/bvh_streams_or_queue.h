@@ -82,7 +82,7 @@ class BvhStreamsOrQueue {
     Stream<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row, rays,
                                                        Counting(counters));
     stream.run(report);
-    if constexpr (Counting::kCounting) counters->rays += rays.size();
+    if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_streams += rays.size();
     return stream.rays_a_turn();
   }
 };

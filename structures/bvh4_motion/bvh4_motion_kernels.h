@@ -65,12 +65,13 @@ class MotionKernel {
                                       [&](bvh::NodeReference reference) {
                                         const std::byte* const blocks = base + bvh::offset_of(reference);
                                         const unsigned count = bvh::block_count(reference);
-                                        counting_.leaf(form_, blocks, count);
+                                        counting_.leaf(form_, blocks, AnyHit ? 0 : count);
                                         const auto* block = reinterpret_cast<const IndexBlock<4>*>(blocks);
                                         for (const auto* const end = block + count; block != end; ++block) {
                                           const VertexBlock<4> now = posed(*block, from, to, at.weight);
                                           const auto* bytes = reinterpret_cast<const std::byte*>(&now);
                                           if constexpr (AnyHit) {
+                                            counting_.blocks(form_, reinterpret_cast<const std::byte*>(block), 1);
                                             if (tests_.any_hit(data, bytes, 1, nullptr, ray.tnear, ray.tfar))
                                               return true;
                                           } else {

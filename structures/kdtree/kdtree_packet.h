@@ -67,7 +67,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   using Base = PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes>;
 
  public:
-  using Base::best, Base::times_alone;
+  using Base::best, Base::set_width, Base::times_alone;
 
   KdPackets(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
       : Base(row, tree.vertices(), counting), base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())),
@@ -222,7 +222,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
           interval.distances(plane, axis, low, high);
           if (low > last || high < first) {
             const bool has = low > last ? has_near : has_far;
-            count(mask, has ? mask : 0, 0, depths.current());
+            count(mask, 2, 0, has ? mask : 0, 0, depths.current());
             if (!has) goto pop;
             depths.descend();
             node = low > last ? near : far;
@@ -237,7 +237,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
         } else {
           divide<false, true>(top, plane, axis, mask, in_near, in_far);
         }
-        count(mask, in_near, in_far, depths.current());
+        count(mask, interval.usable ? 2 : 0, unsigned(has_near) + unsigned(has_far), in_near, in_far, depths.current());
         const Side near_part{near, in_near, first, high < last ? high : last, has_near};
         const Side far_part{far, in_far, low > first ? low : first, last, has_far};
         const Side &next = AnyHit ? far_part : near_part, &later = AnyHit ? near_part : far_part;
@@ -306,14 +306,17 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
                                  counting_, depth);
   }
 
-  /// A node visit of a packet counts as one of each of its rays.
-  void count([[maybe_unused]] Mask mask, [[maybe_unused]] Mask near, [[maybe_unused]] Mask far,
+  /// The rays of `mask` visit a node: of its two cells `together` are tested against the interval of all, then `each`
+  /// against each ray.
+  void count([[maybe_unused]] Mask mask, [[maybe_unused]] unsigned together, [[maybe_unused]] unsigned each,
+             [[maybe_unused]] Mask near, [[maybe_unused]] Mask far,
              [[maybe_unused]] typename Counting::Depth depth) const {
     if constexpr (Counting::kCounting) {
-      counting_.at_depth(depth, Base::rays_of_packet_, unsigned(__builtin_popcountll(mask)));
+      const auto [lanes, active] = Base::count_node(mask, each);
+      counting_.interval(together), counting_.at_depth(depth, lanes, active);
       for (; mask; mask &= mask - 1) {
         const int i = __builtin_ctzll(mask);
-        counting_.node(2, 2, unsigned(near >> i & 1u) + unsigned(far >> i & 1u));
+        counting_.met(unsigned(near >> i & 1u) + unsigned(far >> i & 1u));
       }
     }
   }

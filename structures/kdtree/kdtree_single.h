@@ -155,10 +155,10 @@ ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t n
     }
     if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf
       const std::byte* const blocks = base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
-      counting.leaf(form, blocks, count);
       if constexpr (AnyHit) {
-        if (leaves.any_hit(data, blocks, count, ray.tnear, ray.tfar)) return true;
+        if (any_hit_in_leaf(leaves, data, form, counting, blocks, count, ray.tnear, ray.tfar)) return true;
       } else {
+        counting.leaf(form, blocks, count);
         leaves.closest_hit(data, blocks, count, ray.tnear, best);
       }
     }

@@ -24,8 +24,9 @@ class LeafVisits {
     if (__builtin_expect(count == kLongLeaf, 0))
       count = store_.long_leaves()[first].blocks, first = store_.long_leaves()[first].first;
     const std::byte* const blocks = store_.blocks() + first * leaves_.block_bytes();
+    if constexpr (AnyHit)
+      return any_hit_in_leaf(leaves_, data_, form_, counting_, blocks, count, ray_.tnear, ray_.tfar);
     counting_.leaf(form_, blocks, count);
-    if constexpr (AnyHit) return leaves_.any_hit(data_, blocks, count, ray_.tnear, ray_.tfar);
     leaves_.closest_hit(data_, blocks, count, ray_.tnear, best_);
     return false;
   }

@@ -13,7 +13,7 @@ class ListedPacketLeaves : protected PacketLeaves<W, Leaves, AnyHit, Counting, R
   using Base = PacketLeaves<W, Leaves, AnyHit, Counting, Rays>;
 
  public:
-  using Base::best, Base::times_alone;
+  using Base::best, Base::set_width, Base::times_alone;
   using typename Base::Mask;
 
  protected:
@@ -32,8 +32,10 @@ class ListedPacketLeaves : protected PacketLeaves<W, Leaves, AnyHit, Counting, R
       const Ray& r = Base::rays_[i];
       auto visits = [&](LeafCode code) {
         const LongLeaf range = store_.range(code);
+        if constexpr (AnyHit)
+          return any_hit_in_leaf(Base::leaves_, ray, Base::form_, Base::counting_, blocks_of(range), range.blocks,
+                                 r.tnear, r.tfar);
         Base::counting_.leaf(Base::form_, blocks_of(range), range.blocks);
-        if constexpr (AnyHit) return Base::leaves_.any_hit(ray, blocks_of(range), range.blocks, r.tnear, r.tfar);
         Base::leaves_.closest_hit(ray, blocks_of(range), range.blocks, r.tnear, Base::best_[i]);
         return false;
       };

@@ -22,7 +22,7 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
   using Base = ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRays>;
 
  public:
-  using Base::best, Base::times_alone;
+  using Base::best, Base::set_width, Base::times_alone;
 
   OctreePackets(const octree::Octree& tree, const KernelRow& row, Counting counting)
       : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded") {}
@@ -140,13 +140,14 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
     }
   }
 
-  /// A node visit of a packet counts as one of each of its rays.
+  /// The rays of a cell are tested against each of its children.
   void count([[maybe_unused]] const Entry& e, [[maybe_unused]] const Mask (&in)[8]) const {
     if constexpr (Counting::kCounting) {
+      Base::count_node(e.mask, unsigned(__builtin_popcount(e.cell.node.mask)));
       for (Mask rest = e.mask; rest; rest &= rest - 1) {
         unsigned met = 0;
         for (Mask child : in) met += unsigned(child >> __builtin_ctzll(rest) & 1u);
-        counting_.node(unsigned(__builtin_popcount(e.cell.node.mask)), 8, met);
+        counting_.met(met);
       }
     }
   }

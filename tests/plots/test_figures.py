@@ -157,6 +157,17 @@ class Drawing(unittest.TestCase):
         self.assertEqual(few.plot("--no-report").stderr, "")
         self.assertTrue((few.path / "lane_utilization.png").is_file())
 
+    def test_the_report_shows_what_auto_chose_and_what_rays_share(self):
+        shared = {"packet_share": 0.0, "stream_share": 0.75, "queued_share": 0.0, "single_share": 0.25, "rays_per_node_visit": 5.625,
+                  "rays_per_leaf_visit": 3.375, "interval_tests_per_ray": 1.875}
+        folder = Folder([other("diffuse", traversal="auto", **shared), other("primary")], {"plots": []})
+        self.assertEqual(folder.plot().returncode, 0)
+        report = (folder.path / "report.html").read_text()
+        for label in ("rays in packets", "rays in streams", "rays in flight", "rays singly", "rays/node visit", "rays/leaf visit", "interval tests/ray"):
+            self.assertIn(f">{label}<", report)
+        for value in shared.values():
+            self.assertIn(f'data-v="{value!r}"', report)
+
     def test_colours_of_a_figure_are_distinct(self):
         phases = ("outer grid", "inner grids", "planes", "references", "splits", "tree", "layout", "top", "moving boxes", "a new phase")
         for palette, names in ((style.part_colour, phases + tuple(style.PART_COLOURS)), (style.colour, ("ab", "ba", *style.COLOURS)),
