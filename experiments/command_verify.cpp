@@ -32,6 +32,7 @@ constexpr std::size_t kSpreadBatch = std::size_t{1} << 14, kLeastSpreadBatch = 2
 constexpr std::size_t kSubjectRays = 64;            // of one random mesh
 constexpr std::size_t kBruteForceTriangles = 2000;  // left out above it, unless it is asked for
 constexpr std::size_t kMostCases = 20;              // breaches that are told
+constexpr std::size_t kCompany = 64;                // rays that a case is traced among: the largest packets'
 
 enum class Subject { scene, cases, random };
 
@@ -191,7 +192,9 @@ class Verify {
       ray.rays = {c.ray}, ray.kinds = {HardKind::given}, ray.sources = {kNoPrimitive};
       std::vector<std::uint64_t> wrong_before;
       for (const VerifiedCell& v : cells_) wrong_before.push_back(faults(v));
-      small_subject(c.mesh, ray, total_rays_++, c.id);
+      const std::size_t place = (7 * total_rays_ + 3) % kCompany;
+      const Company company{in_company(c.ray, command_.seed, kCompany, place), place};
+      small_subject(c.mesh, ray, total_rays_++, c.id, &company);
       for (std::size_t i = 0; i < cells_.size(); ++i)
         if (faults(cells_[i]) > wrong_before[i]) cells_[i].wrong_cases.push_back(c.id);
     }
@@ -200,8 +203,7 @@ class Verify {
 
   static std::uint64_t faults(const VerifiedCell& cell) {
     if (cell.tallies.empty()) return 0;
-    const VerifyTally& t = cell.tallies[0][static_cast<std::size_t>(HardKind::given)];
-    return t.wrong() + t.wrong_primitive + t.any_missed + t.any_false;
+    return cell.tallies[0][static_cast<std::size_t>(HardKind::given)].faults();
   }
 
   /// Random meshes, or mutations of the cases given that have a triangle.
@@ -232,11 +234,12 @@ class Verify {
     progress.cell_done("random meshes", fmt::format("{} rays", rays));
   }
 
-  void small_subject(const TriangleMesh& mesh, const HardRays& rays, std::uint64_t first, const std::string& name) {
+  void small_subject(const TriangleMesh& mesh, const HardRays& rays, std::uint64_t first, const std::string& name,
+                     const Company* company = nullptr) {
     tbb::task_arena(1).execute([&] {  // too little work to share out
       const Oracle oracle(mesh);
       StructureShelf shelf(mesh, registry_, 1);
-      verify_all(cells_, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch()), first});
+      verify_all(cells_, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch()), first}, company);
     });
     keep_breaches(mesh, name);
   }

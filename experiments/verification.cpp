@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "core/coordinates.h"
+#include "oracle/answer_check.h"
+#include "oracle/sheared.h"
 
 namespace arboretum {
 namespace {
@@ -19,27 +21,23 @@ constexpr Hit kUnwritten{.t = -1.0f, .u = 0.0f, .v = 0.0f, .primitive = 0xdeadbe
 /// Of any hit, likewise.
 enum class AnyAnswer : std::uint8_t { miss = 0, hit = 1, unwritten = 0xee };
 
-/// What of the promise an answer breaks; empty: nothing.
-std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j, bool any_crack, const ExactHit& truth,
-                      const Hit& answer, AnyAnswer any) {
-  const bool is_hit = truth.hit.is_hit(), representable = !is_hit || std::isfinite(truth.hit.t);
-  if (promise.coverage == Coverage::exact && representable) {
-    if (j.missed) return "an exact hit is missed";
-    if (j.false_hit) return "an exact miss is hit";
-    if (is_hit && answer.primitive != truth.hit.primitive) return "not the lowest primitive at the exact nearest t";
-    if (is_hit && answer.t != truth.hit.t) return "t is not the exact t rounded";
-    if (any != AnyAnswer::miss && any != AnyAnswer::hit) return "any hit leaves its answer unwritten";
-    if ((any == AnyAnswer::hit) != is_hit)
-      return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
-  }
-  const bool aimed_at_edges = kind == HardKind::edge || kind == HardKind::border || kind == HardKind::interior;
-  if (promise.coverage == Coverage::closed || (promise.coverage == Coverage::edges && aimed_at_edges)) {
-    if (j.crack) return "lost through a closed surface";
-    if (any_crack) return "any hit: lost through a closed surface";
-  }
-  if (promise.t_ulp > 0 && j.t_error_ulp > promise.t_ulp && !j.wrong_primitive)
-    return "t is off by more than is promised";
-  return {};
+/// In units of the last place: of the exact t, which is itself rounded to double.
+constexpr double kTruthRounding = 0x1p-25;
+/// `exact` gives u and v to an ulp of 1; those that they are compared with are rounded to nearest.
+constexpr double kUvRounding = 0x1p-23 + 0x1p-25;
+
+double length(const Triple<double>& a) { return std::hypot(a[0], a[1], a[2]); }
+
+/// The size that the promise speaks of; infinite where the ray lies in the triangle's plane, as far as doubles tell.
+double conditioning_of(Conditioning kind, const Ray& ray, const std::array<Vec3f, 3>& corners, double t) {
+  if (kind == Conditioning::none) return 0.0;
+  const Triple<double> e1 = difference_from(corners[0], corners[1]), e2 = difference_from(corners[0], corners[2]),
+                       d{ray.direction.x, ray.direction.y, ray.direction.z};
+  double away = 0.0;
+  for (const Vec3f& corner : corners) away = std::max(away, length(difference_from(ray.origin, corner)));
+  const double edges =
+      length(e1) * length(e2) + (kind == Conditioning::vertices ? away * (length(e1) + length(e2)) : 0.0);
+  return edges * (away + t * length(d)) / std::fabs(determinant(e1, e2, d));
 }
 
 class Judge {
@@ -71,8 +69,7 @@ class Judge {
       tally.uv.add(std::max(std::fabs(double(answer.u) - truth.hit.u), std::fabs(double(answer.v) - truth.hit.v)));
 
     if (!promise_.any() || !is_within(promise_, ray, largest_)) return;
-    const bool any_crack = any_missed && batch_.oracle.judge(ray, time, truth, Hit{}).crack;
-    std::string what = breach_of(promise_, kind, j, any_crack, truth, answer, any);
+    std::string what = breach(i, time, j, answer, any);
     if (what.empty()) return;
     ++tally.broken;
     if (!tally.first.what.empty() && tally.first.ray < batch_.first + i) return;
@@ -80,10 +77,61 @@ class Judge {
   }
 
  private:
+  /// What of the promise the answers to ray i break; empty: nothing.
+  [[nodiscard]] std::string breach(std::size_t i, float time, const Judgement& j, const Hit& answer,
+                                   AnyAnswer any) const {
+    const Ray& ray = batch_.rays.rays[i];
+    const ExactHit& truth = batch_.truth[i];
+    const bool is_hit = truth.hit.is_hit(),
+               in_range = !is_hit || promise_.exponent > 0 || truth.t < std::ldexp(1.0, kTExponent);
+    if (promise_.coverage == Coverage::exact && in_range) {
+      if (j.missed) return "an exact hit is missed";
+      if (j.false_hit) return "an exact miss is hit";
+      if (is_hit && answer.primitive != truth.hit.primitive) return "not the lowest primitive at the exact nearest t";
+      if (is_hit && answer.t != truth.hit.t) return "t is not the exact t rounded";
+      if (is_hit && !(std::fabs(double(answer.u) - truth.hit.u) <= kUvRounding &&
+                      std::fabs(double(answer.v) - truth.hit.v) <= kUvRounding))
+        return "u or v is off by more than an ulp of 1";
+      if (any != AnyAnswer::miss && any != AnyAnswer::hit) return "any hit leaves its answer unwritten";
+      if ((any == AnyAnswer::hit) != is_hit)
+        return is_hit ? "any hit misses an exact hit" : "any hit finds an exact miss";
+    }
+    if (promise_.coverage == Coverage::closed || promise_.coverage == Coverage::edges) {
+      const bool any_crack = is_hit && any != AnyAnswer::hit && batch_.oracle.judge(ray, time, truth, Hit{}).crack;
+      if ((j.crack || any_crack) &&
+          (promise_.coverage == Coverage::closed || !batch_.oracle.passes_vertex(ray, time, truth)))
+        return j.crack ? "lost through a closed surface" : "any hit: lost through a closed surface";
+    }
+    if (promise_.t_ulp > 0 && in_range && j.t_error_ulp > promise_.t_ulp + kTruthRounding && !j.wrong_primitive) {
+      const std::array<Vec3f, 3> corners = batch_.mesh.corners(answer.primitive, frame_at(time, batch_.mesh.frames()));
+      const double more = kConditioning * conditioning_of(promise_.conditioning, ray, corners, truth.t);
+      if (!(j.t_error_ulp <= promise_.t_ulp + kTruthRounding + more / ulp_of(truth.hit.t)))
+        return "t is off by more than is promised";
+    }
+    return {};
+  }
+
   const VerifyBatch& batch_;
   Promise promise_;
   float largest_;
 };
+
+/// Adds to the tallies of a ray traced alone what goes wrong with it in company alone.
+void add_company(const Cell& cell, const Accel& accel, const VerifyBatch& batch, const Company& company,
+                 std::vector<VerifyTally>& tallies) {
+  std::vector<Hit> hits(company.rays.size(), kUnwritten);
+  std::vector<std::uint8_t> occluded(company.rays.size(), std::uint8_t(AnyAnswer::unwritten));
+  cell.kernel->closest_hit(accel, RayBatch(company.rays), hits);
+  cell.kernel->any_hit(accel, RayBatch(company.rays), occluded);
+  std::vector<VerifyTally> among(kHardKindNames.size());
+  Judge(cell, batch)(0, hits[company.place], AnyAnswer(occluded[company.place]), nullptr, among);
+  const auto kind = static_cast<std::size_t>(batch.rays.kinds[0]);
+  VerifyTally &alone = tallies[kind], &together = among[kind];
+  alone.in_company += alone.faults() == 0 && together.faults() > 0;
+  if (together.broken == 0 || alone.broken > 0) return;
+  alone.broken = together.broken, alone.first = together.first;
+  alone.first.what += ", among other rays";
+}
 
 }  // namespace
 
@@ -140,14 +188,17 @@ void VerifiedCell::add(std::size_t variant, const std::vector<VerifyTally>& by_k
   for (std::size_t k = 0; k < by_kind.size(); ++k) tallies[variant][k] += by_kind[k];
 }
 
-void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf,
-                const VerifyBatch& batch) {
+void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf, const VerifyBatch& batch,
+                const Company* company) {
   std::map<std::tuple<std::string, std::string, Isa>, std::vector<Hit>> references;
   std::vector<Hit> hits;
   for (VerifiedCell& verified : cells) {
     const Cell& cell = verified.cell;
     auto [reference, fresh] = references.try_emplace({cell.intersector, cell.box, cell.isa});
-    verified.add(variant, verify_cell(cell, shelf.get(cell), batch, hits, reference->second));
+    const Accel& accel = shelf.get(cell);
+    std::vector<VerifyTally> tallies = verify_cell(cell, accel, batch, hits, reference->second);
+    if (company && cell.traversal != "single") add_company(cell, accel, batch, *company, tallies);
+    verified.add(variant, tallies);
     if (fresh) reference->second = hits;
   }
 }

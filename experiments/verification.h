@@ -68,7 +68,16 @@ struct VerifiedCell {
   void add(std::size_t variant, const std::vector<VerifyTally>& by_kind);
 };
 
-/// verify_cell() for all cells, with the first of each intersector, box and ISA as the others' reference.
-void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf, const VerifyBatch& batch);
+/// Rays that are traced together, the one at `place` for its answer.
+struct Company {
+  std::vector<Ray> rays;
+  std::size_t place = 0;
+};
+
+/// verify_cell() for all cells, with the first of each intersector, box and ISA as the others' reference. `company`: of
+/// a batch of one ray, which is then traced among these as well where the traversal takes several at a time, and held
+/// to the same answer.
+void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf, const VerifyBatch& batch,
+                const Company* company = nullptr);
 
 }  // namespace arboretum

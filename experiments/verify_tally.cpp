@@ -47,7 +47,7 @@ VerifyTally& VerifyTally::operator+=(const VerifyTally& o) {
   missed += o.missed, false_hits += o.false_hits, wrong_surface += o.wrong_surface,
       wrong_primitive += o.wrong_primitive;
   cracks += o.cracks, any_missed += o.any_missed, any_false += o.any_false;
-  self_hits += o.self_hits, differs += o.differs, broken += o.broken;
+  self_hits += o.self_hits, differs += o.differs, broken += o.broken, in_company += o.in_company;
   t_ulp += o.t_ulp, uv += o.uv;
   if (!o.first.what.empty() && (first.what.empty() || o.first.ray < first.ray)) first = o.first;
   return *this;

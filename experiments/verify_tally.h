@@ -47,11 +47,16 @@ struct VerifyTally {
   std::uint64_t self_hits = 0;  ///< of the triangle that the ray starts on, where that is not the exact answer
   std::uint64_t differs = 0;    ///< t or primitive is not that of the first cell with the same intersector, box and ISA
   std::uint64_t broken = 0;     ///< rays on which the cell breaks its promise
-  ErrorHistogram t_ulp, uv;     ///< where the primitive or the surface is right; where the primitive is the oracle's
+  std::uint64_t in_company = 0;  ///< of those traced among others as well: answers with a fault there and none alone
+  ErrorHistogram t_ulp, uv;      ///< where the primitive or the surface is right; where the primitive is the oracle's
   Breach first;
 
   VerifyTally& operator+=(const VerifyTally& other);
   [[nodiscard]] std::uint64_t wrong() const noexcept { return missed + false_hits + wrong_surface; }
+  /// Answers that differ from the exact ones in anything.
+  [[nodiscard]] std::uint64_t faults() const noexcept {
+    return wrong() + wrong_primitive + any_missed + any_false + in_company;
+  }
 };
 
 }  // namespace arboretum

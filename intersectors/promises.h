@@ -17,39 +17,55 @@ enum class Coverage : unsigned char {
            ///< arithmetic
 };
 
+/// Of which size t's error is, besides that of its last rounding: what kConditioning is multiplied by. e1, e2: two
+/// edges; N: their cross product; |p|: the distance of the farthest corner from the origin; d: the direction.
+enum class Conditioning : unsigned char {
+  none,      ///< 0
+  edges,     ///< |e1||e2| (|p| + t|d|) / |N.d|: edges are subtracted in double
+  vertices,  ///< (|e1||e2| + |p| (|e1| + |e2|)) (|p| + t|d|) / |N.d|: corners relative to the origin, then edges
+};
+/// A component of N is off by at most 4 * 2^-53 of its two products, N.d and N.p by 4 * 2^-53 more, and the products
+/// of three unit vectors that such a determinant sums are at most 1.16 in all: 1.16 * 2^-50.
+inline constexpr double kConditioning = 0x1p-49;
+
+/// Of intersectors without an `exponent`: the exact t is below 2^kTExponent.
+inline constexpr int kTExponent = 127;
+
 /// `coverage` stands on boxes that lose nothing. `t_ulp`: |t - exact t| at most, in units of the last place, where the
-/// primitive is right; 0: no bound. `exponent`: the promise holds where the largest |coordinate| of scene and ray
-/// origin and the largest |direction component| are within 2^-exponent .. 2^exponent; 0: for every finite float32.
+/// primitive is right, and what `conditioning` adds to it; 0: no bound. `exponent`: the promise holds where the largest
+/// |coordinate| of scene and ray origin and the largest |direction component| are within 2^-exponent .. 2^exponent; 0:
+/// for every finite float32, as long as t is below 2^kTExponent.
 struct IntersectorPromise {
   std::string_view intersector;
   std::string_view summary;  ///< what `list` says of it
   Coverage coverage;
   double t_ulp;
+  Conditioning conditioning;
   int exponent;
   std::string_view remark;
 };
 
 inline constexpr IntersectorPromise kIntersectorPromises[] = {
-    {"moller_trumbore", "Moeller and Trumbore 1997, on precomputed edges; may miss along edges", Coverage::none, 0, 40,
-     "the two sides of an edge compute different sums"},
-    {"moller_trumbore_double", "moller_trumbore in double: t to half an ulp, may miss along edges", Coverage::none, 0,
-     40, "as moller_trumbore, with fewer rays lost and t nearly always to the last bit"},
-    {"pluecker", "edge functions relative to the ray's origin, edge times sum of vertices", Coverage::edges, 0, 40,
-     "the two sides of an edge compute values of exactly opposite sign"},
-    {"pluecker_double", "pluecker in double: t to half an ulp, may miss at vertices", Coverage::edges, 0, 40,
-     "as pluecker, with t nearly always to the last bit"},
-    {"watertight", "Woop, Benthin, Wald 2013: no cracks on closed meshes with padded boxes", Coverage::closed, 0, 40,
-     "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
-    {"watertight_refined", "watertight, and t, u, v of the nearest hit again in double", Coverage::closed, 0, 40,
-     "as watertight, the nearest hit's t, u, v computed again in double"},
+    {"moller_trumbore", "Moeller and Trumbore 1997, on precomputed edges; may miss along edges", Coverage::none, 0,
+     Conditioning::none, 40, "the two sides of an edge compute different sums"},
+    {"moller_trumbore_double", "moller_trumbore in double: t to half an ulp, may miss along edges", Coverage::none, 0.5,
+     Conditioning::edges, 40, "as moller_trumbore, with fewer rays lost and t nearly always to the last bit"},
+    {"pluecker", "edge functions relative to the ray's origin, edge times sum of vertices", Coverage::edges, 0,
+     Conditioning::none, 40, "the two sides of an edge compute values of exactly opposite sign"},
+    {"pluecker_double", "pluecker in double: t to half an ulp, may miss at vertices", Coverage::edges, 0.5,
+     Conditioning::vertices, 40, "as pluecker, with t nearly always to the last bit"},
+    {"watertight", "Woop, Benthin, Wald 2013: no cracks on closed meshes with padded boxes", Coverage::closed, 0,
+     Conditioning::none, 40, "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
+    {"watertight_refined", "watertight, and t, u, v of the nearest hit again in double", Coverage::closed, 0.5,
+     Conditioning::edges, 40, "as watertight, the nearest hit's t, u, v computed again in double"},
     {"baldwin_weber", "Baldwin and Weber 2016: precomputed map to the unit triangle; may miss along edges",
-     Coverage::none, 0, 40, "stored transformation: accurate near the origin alone"},
-    {"havel_herout", "Havel and Herout 2010: three precomputed planes; may miss along edges", Coverage::none, 0, 40,
-     "stored planes: accurate near the origin alone"},
-    {"wald_projection", "Wald 2004: precomputed projection along an axis; may miss along edges", Coverage::none, 0, 40,
-     "neighbours are projected along different axes"},
-    {"exact", "filtered, then exact arithmetic: hit or miss, nearest and t proved right", Coverage::exact, 0.5, 0,
-     "filtered, and exact arithmetic where the filter cannot decide"},
+     Coverage::none, 0, Conditioning::none, 40, "stored transformation: accurate near the origin alone"},
+    {"havel_herout", "Havel and Herout 2010: three precomputed planes; may miss along edges", Coverage::none, 0,
+     Conditioning::none, 40, "stored planes: accurate near the origin alone"},
+    {"wald_projection", "Wald 2004: precomputed projection along an axis; may miss along edges", Coverage::none, 0,
+     Conditioning::none, 40, "neighbours are projected along different axes"},
+    {"exact", "filtered, then exact arithmetic: hit or miss, nearest and t proved right", Coverage::exact, 0.5,
+     Conditioning::none, 0, "filtered, and exact arithmetic where the filter cannot decide"},
 };
 
 /// `loses_nothing`: no box that the exact ray touches is missed, and none whose triangle is an ulp nearer than the best
@@ -77,6 +93,7 @@ inline constexpr BoxPromise kBoxPromises[] = {
 struct Promise {
   Coverage coverage = Coverage::none;
   double t_ulp = 0;
+  Conditioning conditioning = Conditioning::none;
   int exponent = 0;
   [[nodiscard]] bool any() const noexcept { return coverage != Coverage::none || t_ulp > 0; }
 };
@@ -90,7 +107,7 @@ struct Promise {
   for (const IntersectorPromise& i : kIntersectorPromises) {
     if (i.intersector != intersector) continue;
     for (const BoxPromise& b : kBoxPromises)
-      if (b.box == box) return {b.loses_nothing ? i.coverage : Coverage::none, i.t_ulp, i.exponent};
+      if (b.box == box) return {b.loses_nothing ? i.coverage : Coverage::none, i.t_ulp, i.conditioning, i.exponent};
   }
   return {};
 }
@@ -111,8 +128,10 @@ struct Promise {
     const int tenths = static_cast<int>(promise.t_ulp * 10 + 0.5);
     words.append(words.empty() ? "t within " : ", t within ").append(std::to_string(tenths / 10)).append(".");
     words.append(std::to_string(tenths % 10)).append(" ulp");
+    if (promise.conditioning != Conditioning::none) words.append(" and its conditioning");
   }
-  if (promise.exponent == 0) return words.append(", every finite float32");
+  if (promise.exponent == 0)
+    return words.append(", every finite float32 with t below 2^").append(std::to_string(kTExponent));
   const std::string exponent = std::to_string(promise.exponent);
   return words.append(", coordinates within 2^-").append(exponent).append(" .. 2^").append(exponent);
 }

@@ -52,11 +52,6 @@ bool is_behind(const TriangleMesh& mesh, const Ray& ray, FrameTime at, const Exa
   return distance(truth.hit.primitive).upper < distance(answer.primitive).lower;
 }
 
-double ulp_of(float x) {
-  const float next = std::nextafter(x, std::numeric_limits<float>::infinity());
-  return double(next) - double(x);
-}
-
 /// The smallest value that at least a share `p` of them does not exceed.
 double quantile(std::vector<float>& values, double p) {
   const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size())));
@@ -66,6 +61,11 @@ double quantile(std::vector<float>& values, double p) {
 }
 
 }  // namespace
+
+double ulp_of(float x) noexcept {
+  const float next = std::nextafter(x, std::numeric_limits<float>::infinity());
+  return double(next) - double(x);
+}
 
 AnswerCheck& AnswerCheck::operator+=(const AnswerCheck& other) noexcept {
   rays += other.rays, hits += other.hits, missed_hits += other.missed_hits, false_hits += other.false_hits;
@@ -85,7 +85,9 @@ Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time
   if (!answer.is_hit()) {
     j.missed = true;
   } else {
-    const double difference = double(answer.t) - truth.t, tolerance = surface_tolerance(truth.t);
+    // Where the exact t rounds to infinity, that is the right answer.
+    const bool infinite = answer.t == truth.hit.t && std::isinf(answer.t);
+    const double difference = infinite ? 0.0 : double(answer.t) - truth.t, tolerance = surface_tolerance(truth.t);
     j.wrong_surface = !(std::fabs(difference) <= tolerance);  // true for a NaN
     j.wrong_primitive = !is_at_nearest_t(mesh, ray, at, truth, answer.primitive);
     something_behind = difference > tolerance && j.wrong_primitive && is_behind(mesh, ray, at, truth, answer);

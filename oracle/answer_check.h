@@ -18,6 +18,9 @@ namespace arboretum {
   return std::max(0x1p-12 * std::fabs(exact_t), 0x1p-149);
 }
 
+/// The unit of the last place: from x to the next float above it.
+[[nodiscard]] double ulp_of(float x) noexcept;
+
 /// One ray of a batch; `adjacency` as below.
 [[nodiscard]] Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time, const ExactHit& truth,
                                           const Hit& answer, const std::function<const SurfaceAdjacency&()>& adjacency);

@@ -173,6 +173,11 @@ Judgement Oracle::judge(const Ray& ray, float time, const ExactHit& truth, const
                            [this]() -> const SurfaceAdjacency& { return implementation_->surface(); });
 }
 
+bool Oracle::passes_vertex(const Ray& ray, float time, const ExactHit& truth) const {
+  return implementation_->surface().passes_vertex(ray, frame_at(time, implementation_->mesh.frames()),
+                                                  truth.hit.primitive);
+}
+
 AnswerCheck Oracle::check_any_hit(RayBatch rays, std::span<const std::uint8_t> truth,
                                   std::span<const std::uint8_t> answers) const {
   return check_any_hits(rays, truth, answers);

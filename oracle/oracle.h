@@ -35,7 +35,7 @@ struct AnswerCheck {
   std::uint64_t rays = 0, hits = 0;  ///< `hits`: of the answers given
   std::uint64_t missed_hits = 0;     ///< exact hit, reported miss
   std::uint64_t false_hits = 0;      ///< exact miss, reported hit
-  std::uint64_t wrong_surface = 0;   ///< both hit, t apart by more than 2^-12 relative
+  std::uint64_t wrong_surface = 0;  ///< both hit, t apart by more than 2^-12 relative, and not both infinite in float32
   /// Both hit, but the primitive is not one of those at the exact nearest t, be the surface right or wrong;
   /// no part of wrong_answers().
   std::uint64_t wrong_primitive = 0;
@@ -86,6 +86,8 @@ class Oracle {
 
   /// The same for one ray, from any thread.
   [[nodiscard]] Judgement judge(const Ray& ray, float time, const ExactHit& truth, const Hit& answer) const;
+  /// Of a ray that hits: SurfaceAdjacency::passes_vertex() where it does, from any thread.
+  [[nodiscard]] bool passes_vertex(const Ray& ray, float time, const ExactHit& truth) const;
 
  private:
   struct Implementation;

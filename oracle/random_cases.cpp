@@ -202,4 +202,32 @@ RandomSubject mutated_subject(const TriangleMesh& given, const Ray& given_ray, s
   return subject;
 }
 
+std::vector<Ray> in_company(const Ray& ray, std::uint64_t seed, std::size_t count, std::size_t place) {
+  std::vector<Ray> rays(count, ray);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i == place) continue;
+    Dice dice(seed, i);
+    Ray& other = rays[i];
+    for (std::size_t n = 1 + dice.below(3); n > 0; --n) {
+      float& x = (dice.below(3) ? other.direction : other.origin)[dice.below(3)];
+      switch (dice.below(4)) {
+        case 0: x = std::nextafter(x, dice.below(2) ? kInf : -kInf); break;
+        case 1: x = -x; break;
+        case 2: x *= 1 + dice.exponential(-22, -1); break;
+        default: x = dice.below(2) ? 0.0f : -0.0f; break;
+      }
+    }
+    if (dice.below(4) != 0) continue;
+    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+    switch (dice.below(5)) {
+      case 0: other.direction = {0, -0.0f, 0}; break;
+      case 1: other.direction[dice.below(3)] = kInf; break;
+      case 2: other.origin[dice.below(3)] = dice.below(2) ? kNaN : -kInf; break;
+      case 3: other.direction[dice.below(3)] = kNaN; break;
+      default: other.tnear = 1.0f, other.tfar = 0.0f; break;
+    }
+  }
+  return rays;
+}
+
 }  // namespace arboretum

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "core/mesh.h"
 #include "oracle/hard_rays.h"
@@ -23,5 +24,9 @@ struct RandomSubject {
 /// two, or with a vertex left out of its place; the ray itself is the first of the rays.
 [[nodiscard]] RandomSubject mutated_subject(const TriangleMesh& mesh, const Ray& ray, std::uint64_t seed,
                                             std::uint64_t index, std::size_t rays);
+
+/// `count` rays, the given one at `place`: the others are copies with numbers moved by ulps, negated or scaled, one in
+/// four of them invalid, so that it shares a packet with rays of other signs and with no rays at all.
+[[nodiscard]] std::vector<Ray> in_company(const Ray& ray, std::uint64_t seed, std::size_t count, std::size_t place);
 
 }  // namespace arboretum

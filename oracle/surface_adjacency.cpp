@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <tuple>
-#include <unordered_set>
 
 #include "core/random.h"
 #include "oracle/sheared.h"
@@ -29,13 +29,11 @@ double distance(const Seen& a, const Seen& b) {
   return std::hypot(a.x + s * x, a.y + s * y);
 }
 
-struct HashOfCorners {
-  std::size_t operator()(const std::array<std::uint32_t, 3>& c) const noexcept {
-    return std::size_t(random_bits(c[0], c[1], c[2]));
-  }
-};
-
 }  // namespace
+
+std::size_t SurfaceAdjacency::HashOfCorners::operator()(const Corner3& c) const noexcept {
+  return std::size_t(random_bits(c[0], c[1], c[2]));
+}
 
 SurfaceAdjacency::SurfaceAdjacency(const TriangleMesh& mesh) : mesh_(mesh) {
   const std::vector<Vec3f>& points = mesh.vertices;
@@ -108,35 +106,61 @@ SurfaceAdjacency::Corner3 SurfaceAdjacency::corners(std::uint32_t triangle) cons
   return c;
 }
 
-bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle,
-                                      std::uint32_t answer) const {
-  constexpr std::size_t kMostTriangles = 1u << 18;  // a larger patch is taken for one that the ray passes through
-  std::unordered_set<Corner3, HashOfCorners> seen{corners(triangle)};
-  std::vector<Corner3> waiting(seen.begin(), seen.end());
+std::optional<SurfaceAdjacency::Patch> SurfaceAdjacency::patch(const Ray& ray, FrameTime at, std::uint32_t triangle,
+                                                               double edge_rounding) const {
+  constexpr std::size_t kMostTriangles = 1u << 18;
+  Patch patch{{corners(triangle)}};
+  std::vector<Corner3> waiting(patch.triangles.begin(), patch.triangles.end());
+  std::set<std::pair<std::uint32_t, std::uint32_t>> crossed;  // edges, either way
   const Sheared sheared(ray);
   // In the order found: on all sides at once, so that the nearest border ends it
   for (std::size_t turn = 0; turn < waiting.size(); ++turn) {
     const Corner3 c = waiting[turn];
-    if (c[0] == c[1] || c[1] == c[2]) return false;
+    if (c[0] == c[1] || c[1] == c[2]) return std::nullopt;
     const Seen p[3] = {sheared(mesh_.position(c[0], at)), sheared(mesh_.position(c[1], at)),
                        sheared(mesh_.position(c[2], at))};
     const RoundedDistance t = rounded_distance(sheared, p[0], p[1], p[2]);
-    if (t.lower < ray.tnear || t.upper > ray.tfar) return false;
+    if (t.lower < ray.tnear || t.upper > ray.tfar) return std::nullopt;
+    patch.farthest = std::max(patch.farthest, t.upper);
     const double area = std::fabs((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x));
     for (std::size_t k = 0; k < 3; ++k) {
       const Seen &a = p[k], &b = p[(k + 1) % 3];
-      const double width = std::hypot(b.x - a.x, b.y - a.y);
-      const double near = std::max(kRounding * std::max(a.size, b.size), width > 0 ? kNear * area / width : 0.0);
-      if (distance(a, b) > near) continue;
+      const double width = std::hypot(b.x - a.x, b.y - a.y), size = std::max(a.size, b.size);
+      const double of_function =
+          edge_rounding > 0 ? edge_rounding * size * std::hypot(width, (b.t - a.t) * sheared.main()) / width : 0.0;
+      const double near = std::max({kRounding * size, width > 0 ? kNear * area / width : 0.0, of_function});
+      if (distance(a, b) > near) {
+        if (std::fabs(a.x * b.y - a.y * b.x) <= of_function * width) return std::nullopt;
+        continue;
+      }
       const auto other = across(ray, at, c[k], c[(k + 1) % 3], c[(k + 2) % 3]);
-      if (!other) return false;
+      if (!other) return std::nullopt;
       Corner3 next{c[k], c[(k + 1) % 3], *other};
+      crossed.insert(std::minmax(c[k], c[(k + 1) % 3]));
       std::sort(next.begin(), next.end());
-      if (seen.insert(next).second) waiting.push_back(next);
-      if (seen.size() > kMostTriangles) return true;
+      if (patch.triangles.insert(next).second) waiting.push_back(next);
+      if (patch.triangles.size() > kMostTriangles) return patch;
     }
   }
-  return answer >= mesh_.size() || !seen.contains(corners(answer));
+  patch.ring = crossed.size() >= patch.triangles.size();
+  patch.whole = true;
+  return patch;
+}
+
+bool SurfaceAdjacency::passes_through(const Ray& ray, FrameTime at, std::uint32_t triangle,
+                                      std::uint32_t answer) const {
+  const std::optional<Patch> about = patch(ray, at, triangle, 0.0);
+  if (!about) return false;
+  if (!about->whole || answer >= mesh_.size()) return true;
+  if (about->triangles.contains(corners(answer))) return false;
+  const Sheared sheared(ray);
+  const auto c = mesh_.corners(answer, at);
+  return about->farthest < rounded_distance(sheared, sheared(c[0]), sheared(c[1]), sheared(c[2])).lower;
+}
+
+bool SurfaceAdjacency::passes_vertex(const Ray& ray, FrameTime at, std::uint32_t triangle) const {
+  const std::optional<Patch> about = patch(ray, at, triangle, kEdgeRounding);
+  return !about || !about->whole || about->ring;
 }
 
 }  // namespace arboretum

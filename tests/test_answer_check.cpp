@@ -72,6 +72,26 @@ TEST_CASE("a t that is no normal number may be off by its rounding, not by two d
   }
 }
 
+TEST_CASE("where the exact t rounds to infinity, infinity is the right answer") {
+  constexpr float most = std::numeric_limits<float>::max();
+  TriangleMesh mesh;
+  add_triangle(mesh, {-1, -1, 4}, {1, -1, 4}, {0, 1, 4});
+  const Oracle oracle(mesh);
+  const struct {
+    float direction, answer;
+    bool wrong;
+  } cases[] = {{0x1p-126f, kInf, false}, {0x1p-126f, most, false}, {0x1p-127f, kInf, false},
+               {0x1p-127f, most, true},  {0x1p-120f, kInf, true},  {0x1p-120f, 0x1p122f, false}};
+  for (const auto& c : cases) {
+    INFO("direction " << c.direction << ", answer " << c.answer);
+    const std::vector<Ray> rays{{{0, 0, 0}, 0, {0, 0, c.direction}, kInf}};
+    const std::vector<Hit> answers{{c.answer, 0, 0, 0}};
+    const AnswerCheck check = oracle.check_closest_hit(rays, oracle.closest_hit(rays), answers);
+    CHECK(check.wrong_surface == c.wrong);
+    CHECK(check.wrong_primitive == 0);
+  }
+}
+
 TEST_CASE("each wrong answer is counted for what it is") {
   TriangleMesh mesh;
   add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1});
@@ -182,6 +202,37 @@ TEST_CASE("a miss is a crack where the surface is closed and not at its silhouet
     REQUIRE(truth.front().hit.is_hit());
     const Hit miss;
     CHECK(oracle.check_closest_hit({&c.ray, 1}, truth, {&miss, 1}).cracks == (c.crack ? 1u : 0u));
+  }
+}
+
+TEST_CASE("a ray passes a vertex where the edges near it close a ring") {
+  const TriangleMesh ball = sphere(8, 16, true);
+  const Vec3f vertex = ball.vertices[60], other = ball.vertices[61];
+  TriangleMesh needles;  // a strip along x, each triangle narrower than rounding
+  constexpr float kWidth = 0x1p-30f;
+  for (int i = 0; i < 40; ++i)
+    for (const float x : {-1.0f, 1.0f}) needles.vertices.push_back({x, float(i - 20) * kWidth, 1});
+  for (std::uint32_t i = 0; i < 78; ++i) needles.triangles.push_back({i, i + 1, i + 2});
+  for (const float y : {-1.0f, 1.0f})  // and whole ones beside it
+    for (const float x : {-1.0f, 1.0f}) needles.vertices.push_back({x, y, 1});
+  needles.triangles.insert(needles.triangles.end(), {{0, 1, 80}, {1, 80, 81}, {78, 79, 82}, {79, 82, 83}});
+  const struct {
+    const char* name;
+    const TriangleMesh& mesh;
+    Ray ray;
+    bool vertex;
+  } cases[] = {{"vertex of a ball", ball, {{0, 0, 0}, 0, vertex, kInf}, true},
+               {"beside it by less than rounding", ball, {{1e-9f, -1e-9f, 0}, 0, vertex, kInf}, true},
+               {"edge of a ball", ball, {{0, 0, 0}, 0, (vertex + other) * 0.5f, kInf}, false},
+               {"inside a triangle", ball, {{0, 0, 0}, 0, vertex * 0.5f + other * 0.4f, kInf}, false},
+               {"in the middle of needles", needles, {{0.1f, 0, 0}, 0, {0, 0, 1}, kInf}, false}};
+  for (const auto& c : cases) {
+    INFO(c.name);
+    const Oracle oracle(c.mesh);
+    const ExactHit truth = oracle.closest_hit({&c.ray, 1}).front();
+    REQUIRE(truth.hit.is_hit());
+    CHECK(oracle.judge(c.ray, 0, truth, Hit{}).crack);
+    CHECK(oracle.passes_vertex(c.ray, 0, truth) == c.vertex);
   }
 }
 

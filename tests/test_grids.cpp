@@ -5,11 +5,13 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <set>
 #include <vector>
 
 #include "core/error.h"
 #include "core/random.h"
+#include "oracle/oracle.h"
 #include "structures/accel.h"
 #include "structures/end_point_overlap.h"
 #include "structures/grid/cell_counts.h"
@@ -202,6 +204,42 @@ TEST_CASE("memory is bounded whatever the scene, and every triangle stands in a 
       CHECK(seen.references <= most * n);
       CHECK(accel->bytes() <= most * n * 64 + (1u << 16));
       CHECK(report.peak_bytes < 4 * most * n * 64 + (1u << 20));
+    }
+  }
+}
+
+TEST_CASE("scenes as wide as floats go take no more cells than others, and lose no hit") {
+  constexpr float kMost = std::numeric_limits<float>::max();
+  TriangleMesh one;
+  add_triangle(one, {-kMost, -kMost, kMost / 2}, {kMost, -kMost, kMost / 2}, {0, kMost, kMost / 2});
+  TriangleMesh many = random_triangles(300, 0.3f, 21);
+  for (Vec3f& p : many.vertices)
+    for (std::size_t a = 0; a < 3; ++a) p[a] = std::clamp(float(double(p[a]) * 2 * kMost), -kMost, kMost);
+  for (const TriangleMesh& mesh : {one, many}) {
+    std::vector<Ray> rays;
+    for (std::uint64_t i = 0; i < 200; ++i) {
+      const auto c = mesh.corners(i % mesh.size());
+      const Vec3f at = c[0] * 0.25f + c[1] * 0.25f + c[2] * 0.5f;
+      const Vec3f from = i % 2 ? Vec3f{} : uniform_point(5, i, 0, {{-1, -1, -1}, {1, 1, 1}}) * (kMost / 4);
+      rays.push_back({from, 0, at * 0.25f - from * 0.25f, kInfinity});
+    }
+    const Oracle oracle(mesh);
+    const std::vector<ExactHit> truth = oracle.closest_hit(rays);
+    CHECK(std::ranges::any_of(truth, [](const ExactHit& h) { return h.hit.is_hit(); }));
+    for (const char* builder : {"two_level", "uniform"}) {
+      const auto accel = build({"grid", builder}, mesh, "triangle4i");
+      CHECK(accel->bytes() < grid::kMostReferences * mesh.size() * 64 + (1u << 16));
+      for (const KernelRow& row : kernel_table()) {
+        if (row.structure != "grid" || row.leaf != "triangle4i" || !is_available(row.isa)) continue;
+        INFO(builder << ", " << name_of(row));
+        const std::vector<Hit> hits = closest_hit(row, *accel, rays);
+        if (row.intersector != "exact" || row.box != "padded") continue;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+          INFO("ray " << i);
+          CHECK(hits[i].primitive == truth[i].hit.primitive);
+          CHECK((!truth[i].hit.is_hit() || hits[i].t == truth[i].hit.t));
+        }
+      }
     }
   }
 }

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <set>
 #include <sstream>
 
@@ -24,6 +25,7 @@ using namespace arboretum;
 namespace {
 
 const std::filesystem::path kSource = ARBORETUM_SOURCE_DIR;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// Rows of our structures on ISAs that run here, that promise something: single rays, the structures' first builder.
 std::vector<VerifiedCell> promising_cells(const Registry& registry) {
@@ -53,11 +55,11 @@ std::vector<VerifiedCell> only(std::vector<VerifiedCell> cells, std::string_view
 
 /// Fails with a literal case for each cell that breaks its promise.
 void check_promises(std::vector<VerifiedCell>& cells, const Registry& registry, const TriangleMesh& mesh,
-                    const HardRays& rays) {
+                    const HardRays& rays, const Company* company = nullptr) {
   tbb::task_arena(1).execute([&] {  // too little work to share out
     const Oracle oracle(mesh);
     StructureShelf shelf(mesh, registry, 1);
-    verify_all(cells, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch())});
+    verify_all(cells, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch())}, company);
   });
   for (VerifiedCell& c : cells) {
     const VerifyTally sum = c.sum();
@@ -229,7 +231,8 @@ TEST_CASE("what the search once found stays mended") {
     INFO(c.id << ": " << c.why);
     HardRays rays;
     rays.rays = {c.ray}, rays.kinds = {HardKind::given}, rays.sources = {kNoPrimitive};
-    check_promises(cells, registry, c.mesh, rays);
+    const Company company{in_company(c.ray, 1, 64, 11), 11};
+    check_promises(cells, registry, c.mesh, rays, &company);
   }
 }
 
@@ -290,4 +293,132 @@ TEST_CASE("a kernel that writes no answer is wrong on every ray") {
   CHECK(sum.rays == 200);
   CHECK(sum.any_missed + sum.any_false == 200);
   CHECK(sum.broken == 200);
+}
+
+namespace {
+
+/// The kernel that a liar stands for: lambdas without captures call it.
+const KernelRow* honest = nullptr;
+
+/// The first of the cells, with these functions in the place of its own.
+VerifiedCell lying(VerifiedCell cell, KernelRow& row, ClosestHitFunction closest, AnyHitFunction any = nullptr) {
+  honest = cell.cell.kernel;
+  row = *honest;
+  row.timed.closest_hit = closest;
+  if (any) row.timed.any_hit = any;
+  cell.cell.kernel = &row;
+  return cell;
+}
+
+VerifiedCell padded_cell(const Registry& registry, std::string_view intersector, std::string_view traversal) {
+  std::vector<VerifiedCell> cells = only(promising_cells(registry), "bvh8", intersector);
+  std::erase_if(cells, [&](const VerifiedCell& c) { return c.cell.box != "padded" || c.cell.traversal != traversal; });
+  REQUIRE_FALSE(cells.empty());
+  return cells.front();
+}
+
+/// What breaks of the promise on one ray; empty: nothing. `company` as verify_all() has it.
+std::string breach_on(const VerifiedCell& cell, const Registry& registry, const TriangleMesh& mesh, const Ray& ray,
+                      const Company* company = nullptr) {
+  HardRays rays;
+  rays.rays = {ray}, rays.kinds = {HardKind::given}, rays.sources = {kNoPrimitive};
+  const Oracle oracle(mesh);
+  StructureShelf shelf(mesh, registry, 1);
+  std::vector<VerifiedCell> cells{cell};
+  verify_all(cells, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch())}, company);
+  const VerifyTally sum = cells[0].sum();
+  CHECK(sum.rays == 1);
+  CHECK((sum.broken > 0) == !sum.first.what.empty());
+  return sum.first.what;
+}
+
+}  // namespace
+
+TEST_CASE("exact is held to everything where t is below 2^127, u and v among it, and beyond to nothing") {
+  const Registry registry = this_registry();
+  const VerifiedCell exact = padded_cell(registry, "exact", "single");
+  TriangleMesh mesh;
+  add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {0, 1, 1});
+  KernelRow row;
+  const VerifiedCell blind =
+      lying(exact, row, [](const Accel&, const KernelRow&, RayBatch, std::span<Hit> hits, Counters*) { hits[0] = {}; });
+  const auto along = [](float z) { return Ray{{0, 0, 0}, 0, {0, 0, z}, kInfinity}; };
+  for (const float z : {1.0f, 0x1.000004p-127f}) {
+    INFO("direction " << z);
+    CHECK(breach_on(exact, registry, mesh, along(z)).empty());
+    CHECK(breach_on(blind, registry, mesh, along(z)) == "an exact hit is missed");
+  }
+  for (const float z : {0x1p-127f, 0x1p-128f}) {  // t of 2^127, and beyond float
+    INFO("direction " << z);
+    CHECK(breach_on(blind, registry, mesh, along(z)).empty());
+  }
+  KernelRow off;
+  const auto turned =
+      lying(exact, off, [](const Accel& a, const KernelRow&, RayBatch r, std::span<Hit> hits, Counters*) {
+        honest->closest_hit(a, r, hits);
+        hits[0].v += 0x1p-22f;
+      });
+  CHECK(breach_on(turned, registry, mesh, along(1)) == "u or v is off by more than an ulp of 1");
+}
+
+TEST_CASE("tests in double are held to half an ulp of t and its conditioning") {
+  const Registry registry = this_registry();
+  for (const char* intersector : {"moller_trumbore_double", "pluecker_double", "watertight_refined"}) {
+    INFO(intersector);
+    const VerifiedCell cell = padded_cell(registry, intersector, "single");
+    CHECK(cell.promise.t_ulp == 0.5);
+    KernelRow row;
+    const VerifiedCell liar =
+        lying(cell, row, [](const Accel& a, const KernelRow&, RayBatch r, std::span<Hit> hits, Counters*) {
+          honest->closest_hit(a, r, hits);
+          for (Hit& hit : hits) hit.t = std::nextafter(hit.t, 0.0f);
+        });
+    TriangleMesh mesh;
+    add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {0, 1, 1.5f});
+    const Ray plain{{0, 0, 0}, 0, {0.1f, 0.2f, 3}, kInfinity};
+    CHECK(breach_on(cell, registry, mesh, plain).empty());
+    CHECK(breach_on(liar, registry, mesh, plain) == "t is off by more than is promised");
+    // In the plane of the triangle but for 2^-40 of its length: t is not known to an ulp in doubles.
+    TriangleMesh edge_on;
+    add_triangle(edge_on, {1, -0x1p-40f, -1}, {3, 0x1p-40f, -1}, {2, 0, 1});
+    const Ray grazing{{0, 0, 0}, 0, {1, 0, 0}, kInfinity};
+    CHECK(breach_on(liar, registry, edge_on, grazing).empty());
+  }
+}
+
+TEST_CASE("a ray is held to its answer among others, too") {
+  const Registry registry = this_registry();
+  TriangleMesh mesh;
+  add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {0, 1, 1});
+  const Ray ray{{0, 0, 0}, 0, {0.1f, 0.2f, 1}, kInfinity};
+  const Company company{in_company(ray, 1, 64, 37), 37};
+  CHECK(std::memcmp(&company.rays[37], &ray, sizeof ray) == 0);
+  CHECK(std::ranges::count_if(company.rays, [](const Ray& r) { return !is_valid(r); }) > 5);
+  CHECK(std::ranges::count_if(company.rays, [](const Ray& r) { return is_valid(r); }) > 30);
+  CHECK(std::memcmp(in_company(ray, 1, 64, 37).data(), company.rays.data(), 64 * sizeof(Ray)) == 0);
+  const VerifiedCell cell = padded_cell(registry, "exact", "packet64");
+  CHECK(breach_on(cell, registry, mesh, ray, &company).empty());
+  KernelRow row;
+  const VerifiedCell liar =
+      lying(cell, row, [](const Accel& a, const KernelRow&, RayBatch r, std::span<Hit> hits, Counters*) {
+        honest->closest_hit(a, r, hits);
+        if (hits.size() > 1) hits[37].t = 2;
+      });
+  CHECK(breach_on(liar, registry, mesh, ray).empty());
+  CHECK(breach_on(liar, registry, mesh, ray, &company) == "t is not the exact t rounded, among other rays");
+}
+
+TEST_CASE("pluecker keeps its promise far from the origin, where rays aimed at edges pass vertices by chance") {
+  const Registry registry = this_registry();
+  std::vector<VerifiedCell> cells = only(promising_cells(registry), "bvh8", "pluecker");
+  std::erase_if(cells, [](const VerifiedCell& c) { return c.cell.traversal != "single"; });
+  REQUIRE_FALSE(cells.empty());
+  const std::array kinds{HardKind::edge, HardKind::interior, HardKind::axis, HardKind::plane, HardKind::far};
+  for (const double offset : {1e4, 1e5}) {
+    for (const std::uint64_t seed : {2, 3}) {
+      INFO("offset " << offset << ", seed " << seed);
+      const TriangleMesh mesh = moved_and_scaled(generate_sphere(500, 1).mesh, offset, 0);
+      check_promises(cells, registry, mesh, HardRayMaker(mesh).make(seed, 0, 8000, kinds));
+    }
+  }
 }

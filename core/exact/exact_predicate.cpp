@@ -26,6 +26,9 @@ constexpr double kDoubleBound = double_bounds::kDeterminant;
 constexpr double kDoubleDoubleBound = 0x1p-96;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// Rounding may leave -0 of a zero: an answer is 0, as kernels have it.
+float without_sign_of_zero(float x) { return x + 0.0f; }
+
 Triple<double> widen(Vec3f p) { return {p.x, p.y, p.z}; }
 
 Triple<double> operator-(const Triple<double>& a, const Triple<double>& b) {
@@ -231,12 +234,13 @@ RoundedPoint ExactPredicate::round(const Corners& corners) {
     constexpr double kMax = std::numeric_limits<float>::max();
     certain = std::fabs(e.lower) <= kMax && std::fabs(e.upper) <= kMax &&
               static_cast<float>(e.lower) == static_cast<float>(e.upper);
-    rounded[k] = certain ? static_cast<float>(e.lower) : 0.0f;
+    rounded[k] = certain ? without_sign_of_zero(static_cast<float>(e.lower)) : 0.0f;
   }
   if (certain) return ++counts_.in_double_double, RoundedPoint{point[0].value.hi, rounded[0], rounded[1], rounded[2]};
   ++counts_.in_integers;
   const ExactPoint exact = exact_point(line_, corners);
-  return {to_double(exact.t), round_to_float(exact.t), round_to_float(exact.u), round_to_float(exact.v)};
+  return {to_double(exact.t), without_sign_of_zero(round_to_float(exact.t)),
+          without_sign_of_zero(round_to_float(exact.u)), without_sign_of_zero(round_to_float(exact.v))};
 }
 
 }  // namespace arboretum

@@ -1,14 +1,15 @@
 """Leaks of placed scenes against what the placing changes: a panel a scene and workload, a line an intersector and box test."""
 
+import math
+
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-from matplotlib.transforms import ScaledTranslation
 
 from results import HARD_PREFIX, NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_with_zero, panels, plain, short
 
-STEP, MOST_LIFT = 2.2, 14.0  # points
-CAPTION = " Lines that lie on each other are drawn a little above each other: the lowest is at its place."
+CAPTION = (" Lines in the shaded band are at zero, side by side so that all can be seen; above it the scale is logarithmic. Where lines lie on each "
+           "other, those beneath are wider.")
 BOX_LINES = {"fast": (0, (2, 1.2)), "ize": "-."}  # others: drawn through
 
 
@@ -29,16 +30,18 @@ def draw_lines(results, key, value_of, label, why_none):
     figure, axes = panels(len(families), len(workloads), 4.8, 3.4, sharey="row")
     intersectors, embree = set(), False
     for row, family in enumerate(families):
-        largest = [leaks for (f, _), lines in points.items() if f == family for line in lines.values() for leaks in line.values()]
+        scale = LeakScale([leaks for (f, _), lines in points.items() if f == family for line in lines.values() for leaks in line.values()])
         for column, workload in enumerate(workloads):
             axis, lines = axes[row][column], points.get((family, workload), {})
-            for ((intersector, box, is_embree), line), lift in zip(sorted(lines.items()), lifts([line for _, line in sorted(lines.items())])):
+            drawn = sorted(lines.items())
+            zeros = slots([line for _, line in drawn])
+            for ((intersector, box, is_embree), line), zero, beneath in zip(drawn, zeros, wider([line for _, line in drawn])):
                 intersectors.add(intersector)
                 embree = embree or is_embree
-                drawn, = axis.plot(*zip(*sorted(line.items())), color=intersector_colour(intersector), linewidth=2.4 if box == "fast" and not is_embree else 1.3,
-                          alpha=0.55 if box == "fast" and not is_embree else 1.0, linestyle=BOX_LINES.get(box, "-"),
+                fast = box == "fast" and not is_embree
+                axis.plot(list(sorted(line)), [scale(line[x], zero) for x in sorted(line)], color=intersector_colour(intersector), linewidth=(2.4 if fast else 1.3) + min(1.1 * beneath, 3.3),
+                          alpha=0.55 if fast else 1.0, linestyle=BOX_LINES.get(box, "-"),
                           marker="D" if is_embree else "o", markersize=5 if is_embree else 3.5, markerfacecolor="white" if is_embree else None, clip_on=False)
-                drawn.set_transform(axis.transData + ScaledTranslation(0, lift / 72, figure.dpi_scale_trans))  # after plot: limits are those of the data
             xs = sorted({x for line in lines.values() for x in line})
             if xs and xs[0] == 0:
                 log_with_zero(axis, "x", xs)
@@ -48,7 +51,7 @@ def draw_lines(results, key, value_of, label, why_none):
             if all(abs(round(v, 2) - 1) < 1e-9 or v % 10 == 0 for v in xs):
                 axis.xaxis.set_major_locator(FixedLocator(xs))
             axis.xaxis.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
-            log_with_zero(axis, "y", largest)
+            scale.apply(axis)
             axis.set_title(f"{short(family)}, {workload.replace('_', ' ')}")
             axis.set_xlabel(label(family, results))
         axes[row][0].set_ylabel("leaks per million rays")
@@ -58,14 +61,55 @@ def draw_lines(results, key, value_of, label, why_none):
     return figure
 
 
-def lifts(lines):
-    """Points by which each line is drawn above its place, so that all can be seen of those that lie on each other over some stretch: 0 for most."""
-    stretches = [set(zip(sorted(line.items()), sorted(line.items())[1:])) for line in lines]
-    steps = []
-    for i, stretch in enumerate(stretches):
-        taken = {steps[k] for k in range(i) if stretch & stretches[k]}
-        steps.append(next(step for step in range(len(lines)) if step not in taken))
-    return [step * min(STEP, MOST_LIFT / max(1, *steps)) for step in steps]
+class LeakScale:
+    """A logarithmic y axis with a band for zero beneath it, apart from it by a break: places are log10 of what they stand for."""
+
+    BAND, GAP = 0.32, 0.1  # heights, in those of the logarithmic part
+
+    def __init__(self, values):
+        positive = [v for v in values if v > 0]
+        self.first = math.floor(math.log10(min(positive))) if positive else 0
+        self.last = math.log10(2.5 * max(positive)) if positive else self.first
+        height = max(1.0, self.last - self.first)
+        self.has_zero = len(positive) < len(values) or not positive
+        self.band = (self.first - (self.BAND + self.GAP) * height, self.first - self.GAP * height) if positive else (0.0, 1.0)
+
+    def __call__(self, value, slot):
+        """Of `value`; zero in its `slot`, 0 to 1 from the band's lower edge to its upper."""
+        low, high = self.band
+        return math.log10(value) if value > 0 else low + slot * (high - low)
+
+    def apply(self, axis):
+        low, high = self.band
+        decades = range(self.first, math.floor(self.last) + 1)
+        step = max(1, -(-len(decades) // 6))
+        ticks = [float(k) for k in decades[::step]] if self.last > self.first else []
+        axis.yaxis.grid(False)
+        for tick in ticks:
+            axis.axhline(tick, color="#DDDDDD", linewidth=0.7, zorder=0)
+        if self.has_zero:
+            axis.axhspan(low, high, color="#EFEFE6", linewidth=0, zorder=0)
+            if ticks:  # the break: the axis' line left out between band and logarithm
+                lower, upper = (high + k * (self.first - high) for k in (0.3, 0.7))
+                axis.plot([0, 0], [lower, upper], color="white", linewidth=3, clip_on=False, transform=axis.get_yaxis_transform(), zorder=5)
+                for y in (lower, upper):
+                    axis.plot([0], [y], marker=[(-1, -0.6), (1, 0.6)], markersize=9, color="black", linestyle="", clip_on=False, transform=axis.get_yaxis_transform(), zorder=6)
+        axis.set_ylim(low if self.has_zero else self.first, max(high, self.last))
+        axis.yaxis.set_major_locator(FixedLocator(([(low + high) / 2] if self.has_zero else []) + ticks))
+        axis.yaxis.set_minor_locator(NullLocator())
+        axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: "0" if y <= high and self.has_zero else plain(10.0 ** round(y))))
+
+
+def slots(lines):
+    """Where each line is drawn in the band of zero: apart from all others that are zero somewhere."""
+    zero = [i for i, line in enumerate(lines) if 0 in line.values()]
+    return [(zero.index(i) + 0.5) / len(zero) if i in zero else 0.5 for i in range(len(lines))]
+
+
+def wider(lines):
+    """How many of the lines drawn after each lie on it over some stretch above zero."""
+    stretches = [{s for s in zip(sorted(line.items()), sorted(line.items())[1:]) if s[0][1] > 0 and s[1][1] > 0} for line in lines]
+    return [sum(bool(stretch & after) for after in stretches[i + 1:]) for i, stretch in enumerate(stretches)]
 
 
 def without(scene, key):

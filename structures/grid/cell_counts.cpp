@@ -7,6 +7,8 @@
 namespace arboretum::grid {
 namespace {
 
+constexpr double kMostCellSize = std::numeric_limits<float>::max();  // no scene is wider than two such cells
+
 /// Cells on each axis so that there are about `wanted` nearly cubic cells, none narrower than `least`.
 Index3 choose_counts(const Extent& extent, double wanted, double least) {
   double low = 1e-60, high = 1e60;  // the cell's side: more cells than wanted, fewer
@@ -18,8 +20,9 @@ Index3 choose_counts(const Extent& extent, double wanted, double least) {
   }
   Index3 counts;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double most = std::clamp(std::floor(extent[a] / least), 1.0, 65536.0);
-    counts[a] = std::uint32_t(std::clamp(std::round(extent[a] / high), 1.0, most));
+    const double fewest = extent[a] > kMostCellSize ? 2.0 : 1.0;
+    const double most = std::clamp(std::floor(extent[a] / least), fewest, 65536.0);
+    counts[a] = std::uint32_t(std::clamp(std::round(extent[a] / high), fewest, most));
   }
   return counts;
 }

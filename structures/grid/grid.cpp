@@ -18,8 +18,7 @@ Bounds3f cell_bounds(const Level& level, std::uint32_t number) {
   for (std::size_t a = 0; a < 3; ++a) {
     const std::uint32_t i = number % level.cells_on(int(a));
     number /= level.cells_on(int(a));
-    box.lower[a] = float(level.lower[a] + double(level.cell[a]) * i),
-    box.upper[a] = float(level.lower[a] + double(level.cell[a]) * (i + 1));
+    box.lower[a] = face(level, a, i), box.upper[a] = face(level, a, i + 1);
   }
   return box;
 }

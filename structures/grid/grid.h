@@ -25,7 +25,9 @@
 // (grid_far_single.h).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 #include "core/memory_meter.h"
@@ -46,6 +48,12 @@ struct alignas(64) Level {
   [[nodiscard]] std::uint64_t size() const noexcept { return std::uint64_t(cells_on(0)) * cells_on(1) * cells_on(2); }
 };
 static_assert(sizeof(Level) == 64);
+
+/// Where face i of an axis lies; the last may be rounded to beyond what a float holds, and no triangle is there.
+[[nodiscard]] inline float face(const Level& level, std::size_t axis, std::uint32_t i) noexcept {
+  constexpr double largest = std::numeric_limits<float>::max();
+  return float(std::clamp(level.lower[axis] + double(level.cell[axis]) * i, -largest, largest));
+}
 
 /// What a build makes: level 0 is the outer grid; cells are those of level 0, then of the inner grids in the
 /// order of the cells that they fill.

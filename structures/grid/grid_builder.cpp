@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 
 #include <tbb/parallel_for.h>
 
@@ -104,7 +105,7 @@ class InnerBuilder {
     for (std::size_t a = 0; a < 3; ++a) {
       const std::uint32_t i = at % outer_.cells_on(int(a));
       at /= outer_.cells_on(int(a));
-      lower[a] = float(double(outer_.lower[a]) + double(outer_.cell[a]) * i), extent[a] = outer_.cell[a];
+      lower[a] = face(outer_, a, i), extent[a] = outer_.cell[a];
     }
     Sizes sizes;
     for (std::uint32_t id : ids) sizes.add(mesh_.corners(id), extent);
@@ -229,13 +230,15 @@ void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, 
   double reach = 0;
   for (std::size_t a = 0; a < 3; ++a) reach = std::max(reach, double(bounds.upper[a]) - bounds.lower[a]);
   reach = std::max(reach, largest / 64);
-  cells.max_coordinate = float(largest), cells.reach = float(reach);
+  constexpr double finite = std::numeric_limits<float>::max();
+  cells.max_coordinate = float(largest), cells.reach = float(std::min(reach, finite));
   cells.pad = std::max(float(0x1p-20 * largest + 0x1p-16 * reach), 0x1p-100f);
   const double pad = cells.pad;
   Extent extent;
   Vec3f lower;
   for (std::size_t a = 0; a < 3; ++a) {
-    lower[a] = float(bounds.lower[a] - pad), extent[a] = bounds.upper[a] + pad - lower[a];
+    lower[a] = float(std::max(bounds.lower[a] - pad, -finite));
+    extent[a] = std::min(bounds.upper[a] + pad, finite) - lower[a];
   }
   const Sizes sizes = sum_sizes(mesh, extent);
   const double n = double(mesh.size());

@@ -35,8 +35,9 @@ class FarWalk {
     middle[axis] = (low[axis] + high[axis]) / 2, after[axis] = middle[axis] + 1;
     alignas(64) bvh::Node<2> node{};
     for (int a = 0; a < 3; ++a) {
-      node.planes[2 * a][0] = face(level, a, low[a]), node.planes[2 * a + 1][0] = face(level, a, middle[a] + 1);
-      node.planes[2 * a][1] = face(level, a, after[a]), node.planes[2 * a + 1][1] = face(level, a, high[a] + 1);
+      const auto face = [&](std::uint32_t i) { return grid::face(level, std::size_t(a), i); };
+      node.planes[2 * a][0] = face(low[a]), node.planes[2 * a + 1][0] = face(middle[a] + 1);
+      node.planes[2 * a][1] = face(after[a]), node.planes[2 * a + 1][1] = face(high[a] + 1);
     }
     vf<4> entry;
     const unsigned hit = box_.test(reinterpret_cast<const std::byte*>(&node), vf<4>(tnear_), vf<4>(tfar_), entry);
@@ -54,10 +55,6 @@ class FarWalk {
   }
 
  private:
-  static float face(const grid::Level& level, int axis, std::uint32_t i) {
-    return float(level.lower[axis] + double(level.cell[axis]) * i);
-  }
-
   const grid::Grid& grid_;
   BoxLanes<2, true> box_;
   bool negative_[3];

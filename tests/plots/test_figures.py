@@ -1,6 +1,7 @@
 """Tests of plots/: figures from whole, thin and broken results, and a report that escapes what it shows."""
 
 import json
+import math
 import sys
 import unittest
 from html.parser import HTMLParser
@@ -14,7 +15,7 @@ import style  # noqa: E402
 import tables  # noqa: E402
 from figures import ALL, leaks_vs_distance, published_ratios, rays_per_second  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
-from figures.leak_lines import MOST_LIFT, lifts, without  # noqa: E402
+from figures.leak_lines import slots, wider, without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
 from results import load  # noqa: E402
 
@@ -186,17 +187,34 @@ class Drawing(unittest.TestCase):
         self.assertFalse([(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)])
         style.plt.close(figure)
 
-    def test_lines_of_leaks_that_lie_on_each_other_are_drawn_apart(self):
-        self.assertEqual(lifts([{0: 0, 1: 0}, {0: 0, 1: 5}, {1: 0, 2: 0}]), [0, 0, 0])
-        apart = lifts([{0: 0, 1: 0, 2: 3}, {0: 7, 1: 0, 2: 3}, {0: 0, 1: 0, 2: 0}])
-        self.assertEqual((apart[0], apart[1] == apart[2], apart[1] > 0), (0, True, True))
-        many = lifts([{0: 0, 1: 0}] * 20)
-        self.assertEqual((len(set(many)), max(many) <= MOST_LIFT), (20, True))
+    def test_leaks_of_zero_are_drawn_in_a_band_of_their_own_each_line_apart(self):
+        rows = [other("hard_edge", f"ball:offset={x:g}", cracks=cracks if x > 1 else 0, offset=x, radius=1.0, intersector=i)
+                for i, cracks in (("watertight", 0), ("exact", 0), ("pluecker", 3)) for x in (1, 10, 1e4)]
+        results = load(Folder(rows).path)
+        figure = leaks_vs_distance.draw(results)
+        axis = figure.axes[0]
+        figure.draw_without_rendering()
+        leaks = math.log10(max(cell.per_million("cracks") for cell in results.traces))
+        least = math.floor(leaks)
+        lines = sorted(tuple(line.get_ydata()) for line in axis.lines if len(line.get_xdata()) == 3)
+        zeros = [y for line in lines for y in line if y < least]
+        self.assertEqual((len(lines), len(zeros), len(set(zeros))), (3, 7, 3))
+        self.assertTrue(axis.get_ylim()[0] < min(zeros) and max(zeros) < least)
+        labels = dict(zip(axis.get_yticks(), (t.get_text() for t in axis.get_yticklabels())))
+        self.assertEqual([label for y, label in labels.items() if y < least], ["0"])
+        self.assertTrue(all(label != "0" for y, label in labels.items() if y >= least))
+        self.assertAlmostEqual(max(y for line in lines for y in line), leaks)
+        style.plt.close(figure)
+
+    def test_lines_of_leaks_beneath_others_are_wider(self):
+        self.assertEqual(slots([{0: 0, 1: 0}, {0: 2, 1: 5}, {1: 0, 2: 0}]), [0.25, 0.5, 0.75])
+        self.assertEqual(wider([{0: 1, 1: 2, 2: 3}, {0: 7, 1: 2, 2: 3}, {0: 1, 1: 2, 2: 3}, {0: 0, 1: 0}]), [2, 1, 0, 0])
+        self.assertEqual(wider([{0: 0, 1: 0}] * 3), [0, 0, 0])
 
     def test_leaks_of_a_scene_that_stands_at_the_origin_are_drawn(self):
         rows = [other("hard_edge", f"ball:offset={x:g}", cracks=2, offset=x, radius=1.0) for x in (0, 1, 1e4)]
         figure = leaks_vs_distance.draw(load(Folder(rows).path))
-        self.assertEqual([list(line.get_xdata()) for line in figure.axes[0].lines], [[0, 1, 1e4]])
+        self.assertEqual([list(line.get_xdata()) for line in figure.axes[0].lines if len(line.get_xdata()) == 3], [[0, 1, 1e4]])
         self.assertIn(0, figure.axes[0].get_xticks())
         low, high = figure.axes[0].get_xlim()
         self.assertTrue(low < 0 and high > 1e4)
