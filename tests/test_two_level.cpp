@@ -142,6 +142,18 @@ TEST_CASE("a forest: no wrong answer in any workload, and prototypes held once")
   CHECK(statistics.references == scene.mesh.size());
 }
 
+TEST_CASE("a build's report counts the instances: their memory and their time") {
+  const Scene scene = load_scene(parse_scene_word("forest:20000"));
+  BuildSettings settings;
+  BuildReport report;
+  const auto two = build_structure("two_level", scene.mesh, settings, report);
+  CHECK(report.peak_bytes >= two->bytes());
+  std::vector<std::string> last;
+  for (const auto& phase : report.phases) last.push_back(phase.first);
+  REQUIRE(last.size() >= 2);
+  CHECK(std::vector(last.end() - 2, last.end()) == std::vector<std::string>{"instances", "top"});
+}
+
 TEST_CASE("instances in one place: the lowest id wins, in whatever order they are visited") {
   Layout layout;
   const std::uint32_t ball = layout.add_part(sphere(6));

@@ -1,15 +1,17 @@
 #include "structures/two_level/two_level.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "core/coordinates.h"
 #include "core/error.h"
-#include "core/timer.h"
 #include "intersectors/blocks.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
+#include "structures/builders/phase_clock.h"
 #include "structures/leaves/leaf_names.h"
 
 namespace arboretum::two_level {
@@ -45,6 +47,31 @@ Bounds3f image(const AffineMap& map, const Bounds3f& box) {
   }
   return result;
 }
+
+/// One triangle an instance, with the instance's bounds: what the top is built over. Metered.
+class BoxMesh {
+ public:
+  explicit BoxMesh(std::size_t count) {
+    mesh_.vertices.resize(3 * count), mesh_.triangles.resize(count);
+    MemoryMeter::add(bytes());
+  }
+  BoxMesh(const BoxMesh&) = delete;
+  BoxMesh& operator=(const BoxMesh&) = delete;
+  ~BoxMesh() { MemoryMeter::remove(bytes()); }
+
+  void set(std::size_t i, const Bounds3f& box) noexcept {
+    const auto first = std::uint32_t(3 * i);
+    mesh_.vertices[first] = box.lower, mesh_.vertices[first + 1] = box.upper, mesh_.vertices[first + 2] = box.center();
+    mesh_.triangles[i] = {first, first + 1, first + 2};
+  }
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return mesh_; }
+
+ private:
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return mesh_.vertices.size() * sizeof(Vec3f) + mesh_.triangles.size() * sizeof(Triangle);
+  }
+  TriangleMesh mesh_;
+};
 
 /// Hands on what a structure below shows, as part of the whole tree.
 class BelowVisitor final : public StructureVisitor {
@@ -122,8 +149,6 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
 
   mesh_ = &mesh, below_ = settings.parameters.below, leaf_ = settings.leaf;
   prototypes_.clear(), placed_.clear();
-  boxes_ = {};
-  magnification_ = 0.0f, reach_ = scene_size_ = largest_coordinate(mesh.bounds());
 
   const auto add_prototype = [&](const TriangleMesh& prototype) {
     BuildReport one;
@@ -142,59 +167,67 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
   } else if (mesh.size() > 0) {
     add_prototype(mesh);
   }
-  for (const Instance& instance : instances_of(mesh)) {
-    placed_.push_back(placed(instance));
-    add_box(instance);
-  }
 
-  const double start = wall_seconds();
+  PhaseClock clock(report);
+  const std::vector<Instance> instances = instances_of(mesh);
+  BoxMesh boxes(instances.size());
+  place(instances, [&](std::size_t i, const Bounds3f& world) { boxes.set(i, world); });
+  clock.ends("instances");
   BuildSettings top = settings;
   if (!has(binary_builder_names(), top.builder)) top.builder = binary_builder_names().front();
   top.leaf = kTopLeaf, top.parameters.max_leaf_blocks = 1;
   BuildReport top_report;
-  top_.build(boxes_, top, top_report);
-  boxes_.vertices = {}, boxes_.triangles = {};
-  report.phases.emplace_back("top", wall_seconds() - start);
+  top_.build(boxes.mesh(), top, top_report);
+  clock.ends("top");
 }
 
-const TriangleMesh& TwoLevel::prototype(const Instance& instance) const {
-  return mesh_->instancing ? mesh_->instancing->prototypes[instance.prototype] : *mesh_;
+const TriangleMesh& TwoLevel::prototype(std::size_t i) const {
+  return mesh_->instancing ? mesh_->instancing->prototypes[i] : *mesh_;
 }
 
-Placed TwoLevel::placed(const Instance& instance) const {
-  Placed placed;
-  placed.identity = is_identity(instance.to_world);
-  placed.to_object = placed.identity ? AffineMap{} : inverse(instance.to_world);
-  placed.below = prototypes_[instance.prototype].get();
-  placed.first_primitive = instance.first_primitive;
-  placed.max_coordinate = largest_coordinate(prototype(instance).bounds());
-  return placed;
-}
-
-/// For the top: what the flat mesh has, and what the exact map makes of object space.
-void TwoLevel::add_box(const Instance& instance) {
-  const TriangleMesh& object = prototype(instance);
-  Bounds3f world = object.bounds();
-  if (!is_identity(instance.to_world)) {
-    world = image(instance.to_world, world);
+template <class SetBox>
+void TwoLevel::place(const std::vector<Instance>& instances, const SetBox& set_box) {
+  std::vector<Bounds3f> bounds(prototypes_.size());
+  tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t i) { bounds[i] = prototype(i).bounds(); });
+  scene_size_ = largest_coordinate(mesh_->bounds());
+  placed_.resize(instances.size());
+  tbb::parallel_for(std::size_t{0}, instances.size(), [&](std::size_t i) {
+    const Instance& instance = instances[i];
+    const Bounds3f& object = bounds[instance.prototype];
+    Placed& placed = placed_[i];
+    placed = {};
+    placed.identity = is_identity(instance.to_world);
+    placed.to_object = placed.identity ? AffineMap{} : inverse(instance.to_world);
+    placed.below = prototypes_[instance.prototype].get();
+    placed.first_primitive = instance.first_primitive;
+    placed.max_coordinate = largest_coordinate(object);
+    // For the top: what the flat mesh has, and what the exact map makes of object space.
+    Bounds3f world = object;
+    if (!placed.identity) {
+      world = image(instance.to_world, object);
+      for (std::size_t k = 0; k < prototype(instance.prototype).size(); ++k)
+        world.extend(mesh_->bounds(instance.first_primitive + k));
+    }
+    set_box(i, world);
+  });
+  magnification_ = 0.0f, reach_ = scene_size_;
+  for (const Instance& instance : instances) {
+    if (is_identity(instance.to_world)) continue;
+    const Bounds3f world = image(instance.to_world, bounds[instance.prototype]);
     if (!is_finite(world.lower) || !is_finite(world.upper)) {
       throw UserError("two_level: the image of a prototype's box, of the instance that begins at triangle " +
                       std::to_string(instance.first_primitive) + ", is beyond float; give its map smaller numbers");
     }
-    for (std::size_t i = 0; i < object.size(); ++i) world.extend(mesh_->bounds(instance.first_primitive + i));
     float shift = 0.0f;
     for (const auto& row : instance.to_world.m) shift = std::max(shift, float(std::fabs(row[3])));
     magnification_ = std::max(magnification_, float(condition(instance.to_world)));
     reach_ = std::max(reach_, scene_size_ + 2.0f * shift);
   }
-  const auto first = std::uint32_t(boxes_.vertices.size());
-  for (const Vec3f& corner : {world.lower, world.upper, world.center()}) boxes_.vertices.push_back(corner);
-  boxes_.triangles.push_back({first, first + 1, first + 2});
 }
 
 void TwoLevel::archive(Archive& archive) {
   archive.expect(sizeof(Placed));
-  archive(below_, leaf_, magnification_, reach_, scene_size_);
+  archive(below_, leaf_);
   top_.archive(archive);
   mesh_ = &archive.mesh();
   const std::vector<Instance> instances = instances_of(*mesh_);
@@ -205,11 +238,9 @@ void TwoLevel::archive(Archive& archive) {
     for (std::size_t i = 0; i < count; ++i) prototypes_.push_back(entry->create());
   }
   for (std::size_t i = 0; i < prototypes_.size(); ++i) {
-    const TriangleMesh& one = mesh_->instancing ? mesh_->instancing->prototypes[i] : *mesh_;
-    archive.of_mesh(one, [&](Archive& a) { prototypes_[i]->archive(a); });
+    archive.of_mesh(prototype(i), [&](Archive& a) { prototypes_[i]->archive(a); });
   }
-  if (!archive.is_loading()) return;
-  for (const Instance& instance : instances) placed_.push_back(placed(instance));
+  if (archive.is_loading()) place(instances, [](std::size_t, const Bounds3f&) {});
 }
 
 bool TwoLevel::visit(StructureVisitor& visitor) const {

@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/instances.h"
+#include "core/memory_meter.h"
 #include "core/type_list.h"
 #include "structures/accel.h"
 #include "structures/bvh/bvh.h"
@@ -45,7 +46,7 @@ class TwoLevel final : public Accel {
 
   [[nodiscard]] const bvh::Bvh4& top() const noexcept { return top_; }
   /// The instances that have triangles; the top's leaves name them.
-  [[nodiscard]] const std::vector<Placed>& placed() const noexcept { return placed_; }
+  [[nodiscard]] const MeteredVector<Placed>& placed() const noexcept { return placed_; }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
   [[nodiscard]] const std::string& below() const noexcept { return below_; }
   [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }
@@ -55,16 +56,17 @@ class TwoLevel final : public Accel {
   [[nodiscard]] float reach() const noexcept { return reach_; }
 
  private:
-  [[nodiscard]] Placed placed(const Instance& instance) const;
-  [[nodiscard]] const TriangleMesh& prototype(const Instance& instance) const;
-  void add_box(const Instance& instance);
+  /// The mesh that prototypes_[i] is built over.
+  [[nodiscard]] const TriangleMesh& prototype(std::size_t i) const;
+  /// Makes placed_; calls set_box(i, bounds in world space) for instance i, from several threads.
+  template <class SetBox>
+  void place(const std::vector<Instance>& instances, const SetBox& set_box);
 
   const TriangleMesh* mesh_ = nullptr;
   std::string below_, leaf_;
-  TriangleMesh boxes_;  ///< one triangle an instance, with the instance's bounds: what the top is built over
   bvh::Bvh4 top_;
   std::vector<std::unique_ptr<Accel>> prototypes_;
-  std::vector<Placed> placed_;
+  MeteredVector<Placed> placed_;
   float magnification_ = 0.0f, reach_ = 0.0f, scene_size_ = 0.0f;
 };
 
