@@ -45,8 +45,7 @@ std::string breach_of(const Promise& promise, HardKind kind, const Judgement& j,
 class Judge {
  public:
   Judge(const Cell& cell, const VerifyBatch& batch)
-      : batch_(batch),
-        promise_(promise_of(cell.structure, cell.intersector, cell.box, batch.mesh.instancing != nullptr)),
+      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box)),
         largest_(largest_coordinate(batch.mesh.bounds())) {}
 
   void operator()(std::size_t i, const Hit& answer, AnyAnswer any, const Hit* reference,
