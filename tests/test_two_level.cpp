@@ -278,6 +278,8 @@ TEST_CASE("a forest: no wrong answer in any workload, and prototypes held once")
   }
   const auto two = built("two_level", scene.mesh, "triangle4v"), flat = built("bvh8", scene.mesh, "triangle4v");
   CHECK(two->bytes() * 10 < flat->bytes());
+  for (const two_level::Placed& instance : static_cast<const two_level::TwoLevel&>(*two).placed())
+    REQUIRE(instance.laid_out);
   const StructureStatistics statistics = compute_statistics(*two, scene.mesh, {}, false);
   CHECK(statistics.available);
   CHECK(statistics.references == scene.mesh.size());

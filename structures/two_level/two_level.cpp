@@ -90,6 +90,52 @@ struct Residual {
   }
 };
 
+/// What of a prototype all its instances share.
+struct PrototypeFacts {
+  Bounds3f bounds;
+  std::vector<std::uint32_t> vertices;  ///< those that triangles name
+  std::vector<bool> has_no_area;        ///< of its triangles
+
+  explicit PrototypeFacts(const TriangleMesh& mesh) : bounds(mesh.bounds()), has_no_area(mesh.size()) {
+    std::vector<bool> named(mesh.vertices.size());
+    for (std::size_t i = 0; i < mesh.size(); ++i) {
+      const Triangle& t = mesh.triangles[i];
+      named[t.a] = named[t.b] = named[t.c] = true;
+      const std::array<Vec3f, 3> c = mesh.corners(i);
+      has_no_area[i] = has_zero_area(c[0], c[1], c[2]);
+    }
+    for (std::uint32_t v = 0; v < named.size(); ++v)
+      if (named[v]) vertices.push_back(v);
+  }
+};
+
+/// Finds Placed::laid_out, false also where the flat mesh's indices are not the prototype's plus one number, and
+/// returns the instance's bounds in the flat mesh.
+Bounds3f compare_with_flat(const TriangleMesh& object, const PrototypeFacts& facts, const TriangleMesh& mesh,
+                           Placed& placed) {
+  Bounds3f box;
+  const Triangle* const flat = mesh.triangles.data() + placed.first_primitive;
+  const std::uint32_t offset = flat[0].a - object.triangles[0].a;
+  bool same_indices = true, same_areas = true;
+  for (std::size_t k = 0; k < object.size(); ++k) {
+    const Triangle &t = object.triangles[k], &f = flat[k];
+    same_indices &= (f.a - t.a == offset) & (f.b - t.b == offset) & (f.c - t.c == offset);
+    same_areas &= facts.has_no_area[k] == has_zero_area(mesh.vertices[f.a], mesh.vertices[f.b], mesh.vertices[f.c]);
+  }
+  placed.laid_out = same_indices && same_areas;
+  if (!same_indices) {
+    for (std::size_t k = 0; k < object.size(); ++k) box.extend(mesh.bounds(placed.first_primitive + k));
+    return box;
+  }
+  for (const std::uint32_t v : facts.vertices) {
+    const Vec3f at = mesh.vertices[v + offset],
+                image = placed.identity ? object.vertices[v] : transform_point(*placed.to_world, object.vertices[v]);
+    box.extend(at);
+    placed.laid_out &= std::memcmp(&image, &at, sizeof(Vec3f)) == 0;
+  }
+  return box;
+}
+
 float rounded_up(double x) { return std::nextafter(float(x), Bounds3f::kInfinity); }
 
 /// Placed::pad and pad_per_distance, as two_level_kernels.h derives them; `size`: the prototype's largest |coordinate|.
@@ -253,11 +299,11 @@ const TriangleMesh& TwoLevel::prototype(std::size_t i) const {
 
 template <class SetBox>
 void TwoLevel::place(const SetBox& set_box) {
-  std::vector<Bounds3f> bounds(prototypes_.size());
-  tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t i) { bounds[i] = prototype(i).bounds(); });
+  std::vector<PrototypeFacts> facts;
+  for (std::size_t i = 0; i < prototypes_.size(); ++i) facts.emplace_back(prototype(i));
   const std::vector<const Instance*> instances = instances_of(*mesh_);
   for (const Instance* instance : instances) {
-    const Bounds3f box = image(instance->to_world, bounds[instance->prototype]);
+    const Bounds3f box = image(instance->to_world, facts[instance->prototype].bounds);
     if (is_finite(box.lower) && is_finite(box.upper)) continue;
     throw UserError("two_level: the image of a prototype's box, of the instance that begins at triangle " +
                     std::to_string(instance->first_primitive) + ", is beyond float; give its map smaller numbers");
@@ -265,25 +311,15 @@ void TwoLevel::place(const SetBox& set_box) {
   placed_.resize(instances.size());
   tbb::parallel_for(std::size_t{0}, instances.size(), [&](std::size_t i) {
     const Instance& instance = *instances[i];
-    const TriangleMesh& object = prototype(instance.prototype);
     Placed placed;
     placed.identity = is_identity(instance.to_world);
     if (!placed.identity) placed.to_object = inverse(instance.to_world);
     placed.to_world = &instance.to_world;
     placed.below = prototypes_[instance.prototype].get();
     placed.first_primitive = instance.first_primitive;
-    Bounds3f box;
-    placed.laid_out = true;
-    for (std::size_t k = 0; k < object.size(); ++k) {
-      const std::array<Vec3f, 3> from = object.corners(k), flat = mesh_->corners(instance.first_primitive + k);
-      for (std::size_t c = 0; c < 3; ++c) {
-        box.extend(flat[c]);
-        const Vec3f image = placed.identity ? from[c] : transform_point(instance.to_world, from[c]);
-        placed.laid_out &= std::memcmp(&image, &flat[c], sizeof(Vec3f)) == 0;
-      }
-      placed.laid_out &= has_zero_area(from[0], from[1], from[2]) == has_zero_area(flat[0], flat[1], flat[2]);
-    }
-    set_pads(placed, largest_coordinate(bounds[instance.prototype]));
+    const PrototypeFacts& of = facts[instance.prototype];
+    const Bounds3f box = compare_with_flat(prototype(instance.prototype), of, *mesh_, placed);
+    set_pads(placed, largest_coordinate(of.bounds));
     placed_[i] = placed;
     set_box(i, box);
   });

@@ -9,17 +9,18 @@
 // image under A, o', d' that rounded to float. Let a triangle be hit at t.
 // - An intersector that promises something answers t such that o + t d is within 20 u D of a point Q = sum l_k w_k of
 //   the flat triangle, l_k >= 0, sum l_k = 1, D the largest |w_k - o|: it works on corners as seen from the origin, and
-//   rounds shears, weights and t by less (exact.h has 4.5 to 5.5 u D across the ray, 10 u D along it). A takes this to
-//   20 u |R| D, and D <= |L| |A(w_k) - o*| (1 + 2^-9) where |L R - 1| <= 2^-10, so to less than 20.1 u k (M + |o*|) for
-//   k = |R||L|, and what the mismatch below adds times k u.
+//   rounds shears, weights and t by less (exact.h has 4.5 to 5.5 u D across the ray, 10 u D along it). Not so
+//   `watertight` where it sees a triangle edge on, to within its rounding: t is then anywhere between the corners'. Such
+//   hits boxes may lose in any structure, and no promise is about them. A takes this to 20 u |R| D, and
+//   D <= |L| |A(w_k) - o*| (1 + 2^-9) where |L R - 1| <= 2^-10, so to less than 20.1 u k (M + |o*|) for k = |R||L|, and
+//   what the mismatch below adds times k u.
 // - A(w_k) is not the prototype's corner v_k. The flat mesh rounds, by 2^-23 of |L| M + |T| (2^-20 where it is not what
 //   transform_point() makes: check_instances()), and R and c are no exact inverse. So A(w_k) is off by at most
 //     m = |R L - 1| M + |R T + c| + |R| (2^-23 (|L| M + |T|)),
 //   and A(Q) within m of a point of the prototype's triangle, which is in its boxes and cells.
 // - o' and d' are off by u |o'_i|, u |d'_i| and, from doubles, by 2^-51 (|R||o| + |c|), 2^-51 |R||d|; what underflow
-// adds
-//   to d' is below 2^-50 of |d'|, which is at least 2^-100. With t |d'_i| <= M + |o'_i| and t |d| <= D, and all the rest
-//   below, these move the ray's point at t along axis i by less than
+//   adds to d' is below 2^-50 of |d'|, which is at least 2^-100. With t |d'_i| <= M + |o'_i| and t |d| <= D, and all the
+//   rest below, these move the ray's point at t along axis i by less than
 //     1.1 u (M + 2 |o'_i|) + 2^-48 (k (M + |o'|) + |R||T| + |c|).
 // So at t the mapped ray is, along axis i, within 1.1 u (M + 2 |o'_i|) + p of the box, where
 //   p = 32 u k (M + |o'|) + 1.01 m + 2^-45 (|R||T| + |c|).
