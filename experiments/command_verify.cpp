@@ -82,11 +82,11 @@ class Verify {
 
   // Cells.
 
-  void make_cells(const SceneChoice& scene, std::size_t triangles, bool instances = false) {
+  void make_cells(const SceneChoice& scene, std::size_t triangles) {
     plan_ =
         make_verify_plan(command_, scene, subject_ == Subject::scene && triangles > kBruteForceTriangles, registry_);
     for (const Cell& cell : plan_.cells)
-      cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box, instances), {}, {}});
+      cells_.push_back({cell, promise_of(cell.structure, cell.intersector, cell.box), {}, {}});
   }
 
   ExitStatus nothing() const {
@@ -103,7 +103,7 @@ class Verify {
     const SceneChoice choice = scene_of_word(command_.subject);
     const Scene loaded = load_scene(choice.spec);
     const TriangleMesh& mesh = loaded.mesh;
-    make_cells(choice, mesh.size(), mesh.instancing != nullptr);
+    make_cells(choice, mesh.size());
     if (cells_.empty()) return;
     variants_.clear();
     for (double offset : command_.offsets.empty() ? std::vector<double>{0.0} : command_.offsets)

@@ -43,8 +43,7 @@ double conditioning_of(Conditioning kind, const Ray& ray, const std::array<Vec3f
 class Judge {
  public:
   Judge(const Cell& cell, const VerifyBatch& batch)
-      : batch_(batch),
-        promise_(promise_of(cell.structure, cell.intersector, cell.box, batch.mesh.instancing != nullptr)),
+      : batch_(batch), promise_(promise_of(cell.structure, cell.intersector, cell.box)),
         largest_(largest_coordinate(batch.mesh.bounds())) {}
 
   void operator()(std::size_t i, const Hit& answer, AnyAnswer any, const Hit* reference,

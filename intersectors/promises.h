@@ -98,12 +98,10 @@ struct Promise {
   [[nodiscard]] bool any() const noexcept { return coverage != Coverage::none || t_ulp > 0; }
 };
 
-/// Combinations that the tables do not name promise nothing; nor does Embree, whose kernels are not ours, nor
-/// `two_level` over `instances`: it decides in the object space of each, with a ray that is rounded once more, which
-/// triangle of the scene laid out flat is hit.
+/// Combinations that the tables do not name promise nothing; nor does Embree, whose kernels are not ours.
 [[nodiscard]] constexpr Promise promise_of(std::string_view structure, std::string_view intersector,
-                                           std::string_view box, bool instances = false) noexcept {
-  if (structure == "embree" || (instances && structure == "two_level")) return {};
+                                           std::string_view box) noexcept {
+  if (structure == "embree") return {};
   for (const IntersectorPromise& i : kIntersectorPromises) {
     if (i.intersector != intersector) continue;
     for (const BoxPromise& b : kBoxPromises)

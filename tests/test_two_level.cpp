@@ -1,12 +1,16 @@
 // two_level: what stands below answers bit for bit while nothing is transformed; with transforms the answers are those
 // of the flat mesh; prototypes are held once; what cannot stand below is refused in one line.
+#include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 #include "core/instances.h"
+#include "oracle/hard_rays.h"
 #include "oracle/oracle.h"
 #include "rendering/workload.h"
 #include "scenes/layout.h"
 #include "structures/statistics.h"
+#include "structures/two_level/two_level.h"
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
@@ -110,6 +114,141 @@ TEST_CASE("with transforms the answers are those of the flat mesh") {
   }
 }
 
+namespace {
+
+/// A map of each kind, times `scale`: turned about two axes, sheared, mirrored, squashed, the identity.
+std::vector<AffineMap> maps_of(double scale, Vec3f move) {
+  std::vector<AffineMap> maps;
+  for (int i = 0; i < 6; ++i) {
+    AffineMap map = map_of(0.7 * i, 1.0, {move.x + 1.9f * float(scale) * float(i), move.y, move.z});
+    const double c = std::cos(0.4 * i), s = std::sin(0.4 * i);
+    for (int k = 0; k < 3; ++k) {  // about x
+      const double y = map.m[1][k], z = map.m[2][k];
+      map.m[1][k] = c * y - s * z, map.m[2][k] = s * y + c * z;
+    }
+    if (i == 2)
+      for (auto& row : map.m) row[1] += 1.5 * row[0];
+    if (i == 3)
+      for (auto& row : map.m) row[2] *= -1.0;
+    if (i == 4)
+      for (auto& row : map.m) row[0] *= 0.03;
+    for (auto& row : map.m)
+      for (int k = 0; k < 3; ++k) row[k] *= scale;
+    maps.push_back(map);
+  }
+  return maps;
+}
+
+/// Rays aimed at what goes wrong. Of those in a triangle's plane `watertight` without fused multiply-add answers t
+/// anywhere between its corners, so that boxes decide which triangle is found: they are left out for it.
+std::vector<Ray> hard_rays(const TriangleMesh& mesh, std::size_t count, bool grazing) {
+  const HardRayMaker maker(mesh);
+  std::vector<HardKind> kinds;
+  for (std::size_t k = 0; k < kMadeKinds; ++k)
+    if (maker.has(HardKind(k)) && (grazing || HardKind(k) != HardKind::grazing)) kinds.push_back(HardKind(k));
+  return maker.make(3, 0, count, kinds).rays;
+}
+
+/// Every row of two_level over `below` with padded boxes and an intersector that promises something, against bvh8 over
+/// the flat mesh. Returns the hits that were compared.
+std::size_t same_as_flat(const TriangleMesh& mesh, const std::string& below, const std::string& builder,
+                         std::initializer_list<std::string_view> leaves, std::size_t count) {
+  std::size_t found = 0;
+  for (const KernelRow& row : kernel_table()) {
+    if (row.structure != "two_level" || row.box != "padded" || !is_available(row.isa)) continue;
+    if (row.intersector != "exact" && row.intersector != "watertight" && row.intersector != "watertight_refined")
+      continue;
+    if (std::ranges::find(leaves, row.leaf) == leaves.end()) continue;
+    const KernelRow* of_flat = find_kernel("bvh8", row.leaf, row.intersector, row.box, "single", row.isa);
+    if (!of_flat || !find_kernel(below, row.leaf, row.intersector, row.box, "single", row.isa)) continue;
+    const bool fused = row.isa == Isa::avx2 || row.isa == Isa::avx512;
+    const std::vector<Ray> rays = hard_rays(mesh, count, fused || row.intersector == "exact");
+    const auto two = built("two_level", mesh, row.leaf, below, builder), flat = built("bvh8", mesh, row.leaf);
+    const std::vector<Hit> hits = closest_hit(row, *two, rays), want = closest_hit(*of_flat, *flat, rays);
+    const std::vector<std::uint8_t> any = any_hit(row, *two, rays), any_want = any_hit(*of_flat, *flat, rays);
+    std::size_t differ = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      found += want[i].is_hit();
+      if (same_bits({&hits[i], 1}, {&want[i], 1}) && any[i] == any_want[i]) continue;
+      INFO(name_of(row) << " over " << below << ", ray " << i << ": " << text(hits[i]) << ", flat " << text(want[i]));
+      CHECK(++differ == 0);
+      if (differ > 3) break;
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("over instances answers are those of the flat mesh, bit for bit, whatever the maps") {
+  const struct {
+    double scale;
+    Vec3f move;
+  } places[] = {{1.0, {}},
+                {0x1p-20, {}},
+                {0x1p20, {}},
+                {1.0, {1e5f, -3e4f, 2e4f}},
+                {0x1p-8, {300, 200, -100}},
+                {0x1p-20, {1, 2, 3}},
+                {0x1p20, {-1e8f, 0, 1e7f}}};
+  for (const auto& place : places) {
+    INFO("scale " << place.scale << ", moved by " << place.move.x);
+    Layout layout;
+    const std::uint32_t ball = layout.add_part(sphere(8)), soup = layout.add_part(random_triangles(60, 0.4f, 3)),
+                        far = layout.add_part(moved(sphere(6), 1.0f, {40, 0, -9}));
+    for (const AffineMap& map : maps_of(place.scale, place.move))
+      layout.place(ball, map, 0), layout.place(soup, map, 0), layout.place(far, map, 0);
+    const TriangleMesh mesh = layout.take(true);
+    REQUIRE(mesh.instancing);
+    CHECK(same_as_flat(mesh, "bvh8", "binned_sah", {"triangle4v", "triangle4i"}, 3000) > 10000);
+  }
+}
+
+TEST_CASE("over instances answers are those of the flat mesh, bit for bit, whatever stands below") {
+  Layout layout;
+  const std::uint32_t ball = layout.add_part(sphere(8)), soup = layout.add_part(random_triangles(60, 0.4f, 3));
+  for (const double scale : {1.0, 0.01})
+    for (const AffineMap& map : maps_of(scale, {})) layout.place(ball, map, 0), layout.place(soup, map, 0);
+  layout.place(soup, AffineMap{}, 0);
+  const TriangleMesh mesh = layout.take(true);
+  REQUIRE(mesh.instancing);
+  for_each_type(two_level::Searchable{}, [&]<class Below>(std::type_identity<Below>) {
+    const std::string builder(find_structure(Below::kName)->info.builders.front());
+    CHECK(same_as_flat(mesh, std::string(Below::kName), builder, {"triangle1v", "triangle8v"}, 2000) > 3000);
+  });
+}
+
+TEST_CASE(
+    "a mesh that a program laid out in float, with triangles that have an area in one space alone, is answered as it "
+    "is") {
+  Instancing instancing;
+  TriangleMesh part = sphere(6), mesh;
+  // Collinear before the map and hardly after it.
+  const auto first = std::uint32_t(part.vertices.size());
+  part.vertices.insert(part.vertices.end(), {{-2, -2, -2}, {0.1f, 0.1f, 0.1f}, {3, 3, 3}});
+  part.triangles.push_back({first, first + 1, first + 2});
+  instancing.prototypes = {part};
+  for (const bool in_float : {false, true}) {
+    mesh = {}, instancing.instances.clear();
+    for (const AffineMap& map : maps_of(0.7, {5, 6, 7})) {
+      instancing.instances.push_back({0, std::uint32_t(mesh.size()), map});
+      const auto vertex = std::uint32_t(mesh.vertices.size());
+      for (const Vec3f& v : part.vertices) {
+        const auto row = [&](const double(&r)[4]) {
+          return float(r[3]) + (float(r[2]) * v.z + float(r[1]) * v.y) + float(r[0]) * v.x;
+        };
+        mesh.vertices.push_back(in_float ? Vec3f{row(map.m[0]), row(map.m[1]), row(map.m[2])}
+                                         : transform_point(map, v));
+      }
+      for (const Triangle& t : part.triangles) mesh.triangles.push_back({t.a + vertex, t.b + vertex, t.c + vertex});
+    }
+    mesh.instancing = std::make_shared<const Instancing>(instancing);
+    const auto two = built("two_level", mesh, "triangle4v");
+    CHECK_FALSE(static_cast<const two_level::TwoLevel&>(*two).placed()[1].laid_out);
+    CHECK(same_as_flat(mesh, "bvh8", "binned_sah", {"triangle4v"}, 3000) > 3000);
+  }
+}
+
 TEST_CASE("a forest: no wrong answer in any workload, and prototypes held once") {
   const Scene scene = load_scene(parse_scene_word("forest:60000"));
   REQUIRE(scene.mesh.instancing);
@@ -125,7 +264,9 @@ TEST_CASE("a forest: no wrong answer in any workload, and prototypes held once")
     const auto any_truth = any ? oracle.any_hit(workload.rays) : std::vector<std::uint8_t>{};
     const auto truth = any ? std::vector<ExactHit>{} : oracle.closest_hit(workload.rays);
     for (const KernelRow& row : rows_over("bvh8")) {
-      if (row.intersector != "watertight" || row.box != "padded" || row.leaf != "triangle4v") continue;
+      if ((row.intersector != "watertight" && row.intersector != "exact") || row.box != "padded" ||
+          row.leaf != "triangle4v")
+        continue;
       const auto two = built("two_level", scene.mesh, row.leaf);
       const AnswerCheck check =
           any ? oracle.check_any_hit(workload.rays, any_truth, any_hit(row, *two, workload.rays))
@@ -137,9 +278,23 @@ TEST_CASE("a forest: no wrong answer in any workload, and prototypes held once")
   }
   const auto two = built("two_level", scene.mesh, "triangle4v"), flat = built("bvh8", scene.mesh, "triangle4v");
   CHECK(two->bytes() * 10 < flat->bytes());
+  for (const two_level::Placed& instance : static_cast<const two_level::TwoLevel&>(*two).placed())
+    REQUIRE(instance.laid_out);
   const StructureStatistics statistics = compute_statistics(*two, scene.mesh, {}, false);
   CHECK(statistics.available);
   CHECK(statistics.references == scene.mesh.size());
+}
+
+TEST_CASE("a build's report counts the instances: their memory and their time") {
+  const Scene scene = load_scene(parse_scene_word("forest:20000"));
+  BuildSettings settings;
+  BuildReport report;
+  const auto two = build_structure("two_level", scene.mesh, settings, report);
+  CHECK(report.peak_bytes >= two->bytes());
+  std::vector<std::string> last;
+  for (const auto& phase : report.phases) last.push_back(phase.first);
+  REQUIRE(last.size() >= 2);
+  CHECK(std::vector(last.end() - 2, last.end()) == std::vector<std::string>{"instances", "top"});
 }
 
 TEST_CASE("instances in one place: the lowest id wins, in whatever order they are visited") {

@@ -17,11 +17,11 @@ struct IntervalRay {
   unsigned negative[3];
 
   template <bool Padded>
-  ARBORETUM_INLINE explicit IntervalRay(const BoxRay<2, Padded>& b) : IntervalRay(b.r, b.near_offset, b.far_offset) {}
-  ARBORETUM_INLINE IntervalRay(Vec3f known_r, Vec3f f, Vec3f g)
-      : r{known_r.x, known_r.y, known_r.z}, begin{f.x, f.y, f.z}, end{g.x, g.y, g.z} {
-    for (int a = 0; a < 3; ++a) negative[a] = unsigned(__builtin_signbit(r[a]) != 0);
-  }
+  ARBORETUM_INLINE explicit IntervalRay(const BoxRay<2, Padded>& b)
+      : r{b.r.x, b.r.y, b.r.z}, begin{b.near_offset.x, b.near_offset.y, b.near_offset.z},
+        end{b.far_offset.x, b.far_offset.y, b.far_offset.z}, negative{b.octant & 1u, b.octant >> 1 & 1u,
+                                                                      b.octant >> 2} {}
+  ARBORETUM_INLINE IntervalRay(Vec3f known_r, Vec3f f, Vec3f g) : IntervalRay(BoxRay<2, true>(known_r, f, g)) {}
   /// Where an interval begins that a plane begins.
   ARBORETUM_INLINE float at_begin(float plane, unsigned a) const {
     return kHasFma ? __builtin_fmaf(plane, r[a], -begin[a]) : (plane - begin[a]) * r[a];

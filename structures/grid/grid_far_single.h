@@ -10,12 +10,12 @@ namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
 /// Calls leaf(code) for the leaves that the padded ray meets, near to far; leaf returns true to end the
-/// search. `tfar` is read anew before each cell, so that it may shrink.
+/// search. `tfar` is read anew before each cell, so that it may shrink. `max_coordinate`: what boxes are padded for.
 template <class Leaf>
 class FarWalk {
  public:
-  FarWalk(const grid::Grid& grid, const Ray& ray, const float& tfar, Leaf& leaf)
-      : grid_(grid), box_(BoxRay<2, true>(ray, grid.max_coordinate())), tnear_(ray.tnear), tfar_(tfar), leaf_(leaf) {
+  FarWalk(const grid::Grid& grid, const Ray& ray, float max_coordinate, const float& tfar, Leaf& leaf)
+      : grid_(grid), box_(BoxRay<2, true>(ray, max_coordinate)), tnear_(ray.tnear), tfar_(tfar), leaf_(leaf) {
     for (int a = 0; a < 3; ++a) negative_[a] = __builtin_signbit(ray.direction[std::size_t(a)]);
   }
 

@@ -65,7 +65,7 @@ struct GridSingle {
   static __attribute__((noinline)) bool far(const grid::Grid& grid, const Ray& ray, const NearestHit& best,
                                             Visits& visits) {
     auto leaf = [&](LeafCode code) { return visits(code); };
-    return FarWalk(grid, ray, best.t, leaf).search(grid.levels()[0]);
+    return FarWalk(grid, ray, grid.max_coordinate(), best.t, leaf).search(grid.levels()[0]);
   }
   static ARBORETUM_INLINE void count_grid(const Counting& counting) {
     if constexpr (Counting::kCounting) ++counting.counters.nodes;

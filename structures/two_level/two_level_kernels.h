@@ -1,23 +1,37 @@
-// One ray through two levels: the top's boxes in world space, then for each instance the ray in object space, by the
-// kernel of the structure below: one indirect call an instance. The direction is mapped without being normalised, so t
-// keeps its meaning.
+// One ray through two levels: the top's boxes in world space, then for each instance the boxes of the structure below
+// in object space, with the ray mapped there, and the triangles in its leaves in world space again, as the flat mesh
+// has them (placed_leaves_single.h). The direction is mapped without being normalised, so t keeps its meaning. What is
+// hit, and where, is thus decided as in a structure over the flat mesh, by the same operations on the same numbers, bit
+// for bit; only which boxes are visited is decided in object space, and there padded boxes lose nothing:
 //
-// Object space rounds: the mapped ray is off by 2^-24 of its own numbers. Three things come of it.
-// - The top's boxes are padded for it. A hit's point p lies on the object-space triangle; in world space it is off the
-//   exact ray by |L| |eta + t zeta|, where eta and zeta are the roundings of origin and direction: at most
-//     u (2|o'| + |p'|) for u = 2^-24, and so
-//     u k (2|o| + |p| + 3|T|) with k = || |L||L^-1| || and T the translation.
-//   The pad of box_test.h for a largest coordinate of
-//     reach + k (|o| + reach), reach = M + 2|T|,
-//   is more than its own need and this together (8 u of it against 4 u of M + |o|, and 3 u at most of k (...)).
-// - t, u and v of the winner are computed again from the flat mesh's vertices with the same test, so that they are
-//   those of a structure over the flat mesh, bit for bit, wherever both find the same triangle. Where the test misses
-//   the flat triangle (the ray meets its edge) t is that of its plane, in double.
-// - A t close to an end of the interval may lie on the other side of it in world space, as on the surface that a
-//   secondary ray starts from. There the t in world space decides, and the search goes on behind a hit that is refused.
+// u = 2^-24. An instance maps x to L x + T, its stored inverse w to A(w) = R w + c; |.| is the largest |component|, of
+// a linear part the largest row sum; M the prototype's largest |coordinate|, o, d the world-space ray, o*, d* its exact
+// image under A, o', d' that rounded to float. Let a triangle be hit at t.
+// - An intersector that promises something answers t such that o + t d is within 20 u D of a point Q = sum l_k w_k of
+//   the flat triangle, l_k >= 0, sum l_k = 1, D the largest |w_k - o|: it works on corners as seen from the origin, and
+//   rounds shears, weights and t by less (exact.h has 4.5 to 5.5 u D across the ray, 10 u D along it). Not so
+//   `watertight` where it sees a triangle edge on, to within its rounding: t is then anywhere between the corners'. Such
+//   hits boxes may lose in any structure, and no promise is about them. A takes this to 20 u |R| D, and
+//   D <= |L| |A(w_k) - o*| (1 + 2^-9) where |L R - 1| <= 2^-10, so to less than 20.1 u k (M + |o*|) for k = |R||L|, and
+//   what the mismatch below adds times k u.
+// - A(w_k) is not the prototype's corner v_k. The flat mesh rounds, by 2^-23 of |L| M + |T| (2^-20 where it is not what
+//   transform_point() makes: check_instances()), and R and c are no exact inverse. So A(w_k) is off by at most
+//     m = |R L - 1| M + |R T + c| + |R| (2^-23 (|L| M + |T|)),
+//   and A(Q) within m of a point of the prototype's triangle, which is in its boxes and cells.
+// - o' and d' are off by u |o'_i|, u |d'_i| and, from doubles, by 2^-51 (|R||o| + |c|), 2^-51 |R||d|; what underflow
+//   adds to d' is below 2^-50 of |d'|, which is at least 2^-100. With t |d'_i| <= M + |o'_i| and t |d| <= D, and all the
+//   rest below, these move the ray's point at t along axis i by less than
+//     1.1 u (M + 2 |o'_i|) + 2^-48 (k (M + |o'|) + |R||T| + |c|).
+// So at t the mapped ray is, along axis i, within 1.1 u (M + 2 |o'_i|) + p of the box, where
+//   p = 32 u k (M + |o'|) + 1.01 m + 2^-45 (|R||T| + |c|).
+// A box test's own roundings are 5.1 u (M + |o'_i|) at most (box_test.h, bvh_quantised_kernels.h, kdtree_single.h), its
+// pad for a largest coordinate of M + P is 8 u (M + P + |o'_i|), and so with P = p / 8 u
+//   5.1 u (M + |o'_i|) + 1.1 u (M + 2 |o'_i|) + p < 8 u (M + P + |o'_i|):
+// the box is met, within any interval that holds t. P is Placed::pad + Placed::pad_per_distance |o'|, both rounded up,
+// pad_per_distance = 4.01 k. The top's boxes hold the flat mesh's corners, and the ray is itself there.
 #pragma once
 
-#include "structures/bvh/bvh_single.h"
+#include "structures/two_level/placed_search_single.h"
 #include "traversal/kernel_rows.h"
 
 namespace arboretum {
@@ -33,166 +47,73 @@ namespace ARBORETUM_ISA_NAMESPACE {
   return *row;
 }
 
-/// The structure below knows its leaves, and the row there its box test.
-template <class, bool, class Counting>
+/// The structure below knows its leaves.
+template <class, bool Padded, class Counting>
 class TwoLevelKernel {
  public:
   TwoLevelKernel(const Accel& accel, const KernelRow& row, Counting counting)
       : accel_(static_cast<const two_level::TwoLevel&>(accel)), row_(row_below(accel_, row)), counting_(counting),
-        stack_(accel_.top().stack_entries()) {
-    const LeafTests* alone = find_leaf_tests(VertexBlock<1>::kName, row.intersector, kIsa);
-    tests_ = alone ? alone : row.tests;
-  }
+        stack_(accel_.top().stack_entries()), leaves_(*row_.tests, accel_.mesh()),
+        closest_(find_search<false, Padded, Counting>(accel_.below())),
+        any_(find_search<true, Padded, Counting>(accel_.below())) {}
 
   template <bool AnyHit>
-  bool trace(const Ray& ray, float /*time*/, NearestHit& nearest_hit) {
-    Hit best;
-    float nearest = ray.tfar;
-    const float origin = largest_component(ray.origin), k = accel_.magnification();
-    SoaNodeTest<4, true> nodes(ray, accel_.reach() + k * (origin + accel_.reach()));
+  bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
+    if (!accel_.mesh().instancing) return !accel_.placed().empty() && trace_below<AnyHit>(ray, best);
     const bvh::Bvh4& top = accel_.top();
-    walk_bvh<false>(
-        top.base(), top.root(), nodes, stack_.data(), nearest, counting_, [&](bvh::NodeReference reference) {
+    SoaNodeTest<4, true> nodes(ray, top.max_coordinate());
+    leaves_.begin(ray);
+    const bool over = walk_bvh<false>(
+        top.base(), top.root(), nodes, stack_.data(), best.t, counting_, [&](bvh::NodeReference reference) {
           const auto& block = *reinterpret_cast<const IndexBlock<1>*>(top.base() + bvh::offset_of(reference));
-          const bool over = visit<AnyHit>(ray, accel_.placed()[block.id[0]], nearest, best);
-          nodes.shorten(nearest);
-          return over;
+          const two_level::Placed& instance = accel_.placed()[block.id[0]];
+          leaves_.enter(instance);
+          const PlacedRay placed(ray, instance, best.t);
+          const bool found = (AnyHit ? any_ : closest_)(*instance.below, placed, leaves_, best, counting_);
+          nodes.shorten(best.t);
+          return AnyHit && found;
         });
-    if (best.is_hit()) nearest_hit = {best.t, best.u, best.v, std::int32_t(best.primitive)};
-    return best.is_hit();
+    if constexpr (!AnyHit) leaves_.finish(best);
+    return over;
   }
 
  private:
-  /// Returns true when the search is over. `nearest` may stay above best.t, so that an equal hit of a lower id is not
-  /// lost.
+  /// A scene without instances is the structure below. The batch counts its rays; those that go below are not rays
+  /// more.
   template <bool AnyHit>
-  bool visit(const Ray& ray, const two_level::Placed& instance, float& nearest, Hit& best) {
-    if (instance.identity) {
-      Ray clipped = ray;
-      clipped.tfar = nearest;
-      if constexpr (AnyHit) {
-        if (any_below(instance, clipped)) best.primitive = instance.first_primitive;
-        return best.is_hit();
-      }
-      Hit hit = closest_below(instance, clipped);
-      if (hit.is_hit()) {
-        hit.primitive += instance.first_primitive;
-        offer(hit, hit.t, nearest, best);
-      }
-      return false;
-    }
-    Ray mapped;
-    mapped.origin = transform_point(instance.to_object, ray.origin);
-    mapped.direction = transform_direction(instance.to_object, ray.direction);
-    const float slack =
-        0x1p-20f * (largest_component(mapped.origin) + instance.max_coordinate) / largest_component(mapped.direction);
-    const float doubt = 0x1p10f * slack;  // within it of an end of the interval, world space decides
-    const float last = best.is_hit() ? nearest : ray.tfar + slack;
-    mapped.tnear = ray.tnear > slack ? ray.tnear - slack : 0.0f;
-    if constexpr (AnyHit) {
-      mapped.tnear = ray.tnear + doubt, mapped.tfar = ray.tfar - doubt;
-      if (mapped.tnear <= mapped.tfar && any_below(instance, mapped)) {
-        best.primitive = instance.first_primitive;
-        return true;
-      }
-      mapped.tnear = ray.tnear > slack ? ray.tnear - slack : 0.0f;
-      mapped.tfar = ray.tnear + doubt < last ? ray.tnear + doubt : last;
-      if (first_accepted(ray, instance, mapped, doubt, nearest, best)) return true;
-      if (!(ray.tfar < std::numeric_limits<float>::infinity())) return false;
-      mapped.tnear = mapped.tfar > ray.tfar - doubt ? mapped.tfar : ray.tfar - doubt, mapped.tfar = last;
-      return first_accepted(ray, instance, mapped, doubt, nearest, best);
-    }
-    mapped.tfar = last;
-    first_accepted(ray, instance, mapped, doubt, nearest, best);
-    return false;
-  }
-
-  /// The first hit of the mapped ray that holds in world space.
-  bool first_accepted(const Ray& ray, const two_level::Placed& instance, Ray& mapped, float doubt, float& nearest,
-                      Hit& best) {
-    while (mapped.tnear <= mapped.tfar) {
-      const Hit object = closest_below(instance, mapped);
-      if (!object.is_hit()) return false;
-      Hit world = in_world(ray, object, object.primitive + instance.first_primitive);
-      const bool holds = world.t >= ray.tnear && world.t <= ray.tfar;
-      if (holds || (object.t >= ray.tnear + doubt && object.t <= ray.tfar - doubt)) {
-        if (!holds) world.t = object.t;
-        offer(world, object.t, nearest, best);
-        return true;
-      }
-      mapped.tnear = std::nextafter(object.t, std::numeric_limits<float>::infinity());
-    }
-    return false;
-  }
-
-  static void offer(const Hit& hit, float object_t, float& nearest, Hit& best) {
-    if (!(hit.t < best.t || (hit.t == best.t && hit.primitive < best.primitive))) return;
-    best = hit;
-    nearest = object_t > hit.t ? object_t : hit.t;
-  }
-
-  /// The hit as the flat mesh's triangle has it.
-  Hit in_world(const Ray& ray, const Hit& object, std::uint32_t primitive) const {
-    PreparedRay data;
-    tests_->prepare(ray, data);
-    alignas(64) std::byte block[kLargestBlock];
-    tests_->form->fill(block, accel_.mesh(), {&primitive, 1});
-    NearestHit flat{std::numeric_limits<float>::infinity()};
-    if (tests_->closest_hit(data, block, 1, accel_.mesh().vertices.data(), -std::numeric_limits<float>::infinity(),
-                            flat)) {
-      if (tests_->finish) tests_->finish(data, flat);
-      return {flat.t, flat.u, flat.v, primitive};
-    }
-    const std::array<Vec3f, 3> corner = accel_.mesh().corners(primitive);
-    double a[3], e1[3], e2[3], d[3];
-    for (unsigned i = 0; i < 3; ++i) {
-      const double v0 = corner[0][i];
-      a[i] = v0 - ray.origin[i], e1[i] = corner[1][i] - v0, e2[i] = corner[2][i] - v0, d[i] = ray.direction[i];
-    }
-    const double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
-    const double along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
-    const auto t = float((n[0] * a[0] + n[1] * a[1] + n[2] * a[2]) / along);
-    return {__builtin_isfinite(t) ? t : object.t, object.u, object.v, primitive};
-  }
-
-  Hit closest_below(const two_level::Placed& instance, const Ray& ray) {
+  bool trace_below(const Ray& ray, NearestHit& best) {
+    const Accel& below = *accel_.placed()[0].below;
     Hit hit;
-    below([&](Counters* counters) { row_.closest_hit(*instance.below, RayBatch(&ray, 1), {&hit, 1}, counters); });
-    return hit;
-  }
-  bool any_below(const two_level::Placed& instance, const Ray& ray) {
     std::uint8_t occluded = 0;
-    below([&](Counters* counters) { row_.any_hit(*instance.below, RayBatch(&ray, 1), {&occluded, 1}, counters); });
-    return occluded != 0;
-  }
-  /// The batch counts its rays; those that go below are not rays more.
-  template <class Trace>
-  void below(const Trace& trace) {
-    if constexpr (Counting::kCounting) {
-      const std::uint64_t rays = counting_.counters.rays;
-      trace(&counting_.counters);
-      counting_.counters.rays = rays;
-    } else {
-      trace(nullptr);
-    }
+    Counters* counters = nullptr;
+    std::uint64_t rays = 0;
+    if constexpr (Counting::kCounting) counters = &counting_.counters, rays = counters->rays;
+    if constexpr (AnyHit)
+      row_.any_hit(below, RayBatch(&ray, 1), {&occluded, 1}, counters);
+    else
+      row_.closest_hit(below, RayBatch(&ray, 1), {&hit, 1}, counters);
+    if constexpr (Counting::kCounting) counters->rays = rays;
+    if (hit.is_hit()) best = {hit.t, hit.u, hit.v, std::int32_t(hit.primitive)};
+    return AnyHit ? occluded != 0 : hit.is_hit();
   }
 
   const two_level::TwoLevel& accel_;
   const KernelRow& row_;
-  const LeafTests* tests_;
   Counting counting_;
   TraversalStack stack_;
+  PlacedLeaves leaves_;
+  PlacedSearch<Counting> closest_, any_;
 };
 
 /// One set of functions for all rows. Which rows the structure below has is asked when a cell is planned.
 struct TwoLevelFunctions {
-  template <class, bool>
+  template <class, bool Padded>
   static RowFunctions timed() {
-    return SingleRayFunctions<TwoLevelKernel>::timed<CalledLeaves, true>();
+    return SingleRayFunctions<TwoLevelKernel>::timed<CalledLeaves, Padded>();
   }
-  template <bool>
+  template <bool Padded>
   static RowFunctions counting() {
-    return SingleRayFunctions<TwoLevelKernel>::counting<true>();
+    return SingleRayFunctions<TwoLevelKernel>::counting<Padded>();
   }
 };
 
