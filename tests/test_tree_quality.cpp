@@ -14,11 +14,11 @@ using namespace arboretum::test;
 
 TEST_CASE("reinsertion lowers the SAH cost of every builder's tree, and raises that of no structure") {
   std::vector<KernelScene> scenes;
-  scenes.push_back({"random 10000", random_triangles(10000, 0.1f, 6)});
-  scenes.push_back({"sphere", sphere(60)});
+  scenes.push_back({"random 4000", random_triangles(4000, 0.1f, 6)});
+  scenes.push_back({"sphere", sphere(40)});
   // Where inner nodes of less area alone make dearer trees: leaves of several blocks come out otherwise
-  scenes.push_back({"triangles within each other", nested(10000, 1.0003)});
-  for (const char* word : {"fan:3000", "needles:2000", "sphere_flake:5000", "city:5000", "fractal_terrain:5000"})
+  scenes.push_back({"triangles within each other", nested(3000, 1.001)});
+  for (const char* word : {"fan:3000", "needles:2000", "sphere_flake:5000", "city:3000", "fractal_terrain:3000"})
     scenes.push_back({word, load_scene(parse_scene_word(word)).mesh});
   const KernelScene& nested_ones = scenes[2];
   std::size_t trees = 0, lowered = 0;
