@@ -139,17 +139,32 @@ inline TriangleMesh copies(const std::vector<Vec3f>& centres, const std::vector<
   return mesh;
 }
 
+/// Triangles about one point, each `ratio` times the size of the one before.
+inline TriangleMesh nested(std::size_t count, double ratio) {
+  TriangleMesh mesh;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto first = std::uint32_t(mesh.vertices.size());
+    const auto size = float(std::pow(ratio, double(i)));
+    for (const Vec3f corner : {Vec3f{-1, -1, -1}, Vec3f{1, -1, 1}, Vec3f{0, 1, 0}})
+      mesh.vertices.push_back(corner * size);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
 inline std::vector<Vec3f> random_points(std::size_t n, float extent, std::uint64_t seed) {
   std::vector<Vec3f> points(n);
   for (std::size_t i = 0; i < n; ++i) points[i] = uniform_point(seed, i, 0, {{0, 0, 0}, {extent, extent, extent}});
   return points;
 }
 
-inline double sah_of(std::string_view builder, const TriangleMesh& mesh, const BuilderParameters& parameters = {}) {
+inline double sah_of(std::string_view builder, const TriangleMesh& mesh, const BuilderParameters& parameters = {},
+                     std::string_view structure = "bvh2", unsigned threads = 1) {
   BuildSettings settings;
-  settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa(), settings.parameters = parameters;
+  settings.builder = builder, settings.leaf = "triangle4", settings.isa = best_isa(), settings.threads = threads,
+  settings.parameters = parameters;
   BuildReport report;
-  const auto accel = build_structure("bvh2", mesh, settings, report);
+  const auto accel = build_structure(structure, mesh, settings, report);
   return compute_statistics(*accel, mesh, {}, false).sah_cost;
 }
 

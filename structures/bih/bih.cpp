@@ -20,8 +20,8 @@ namespace {
 /// Turns a binary tree with boxes into nodes with planes.
 class Converter {
  public:
-  Converter(const BinaryTree& tree, const Collapse& collapse, const BuilderParameters& costs,
-            MeteredVector<Node>& nodes, LeafLists& lists)
+  Converter(const BinaryTree& tree, const Collapse& collapse, const CollapseSettings& costs, MeteredVector<Node>& nodes,
+            LeafLists& lists)
       : tree_(tree), collapse_(collapse), costs_(costs), nodes_(nodes), lists_(lists), cost_(tree.node_count) {
     price(0);
     nodes_.resize(1);
@@ -29,6 +29,8 @@ class Converter {
     lists_.begin.push_back(std::uint32_t(lists_.ids.size()));
   }
   [[nodiscard]] std::size_t pairs_deep() const noexcept { return deepest_; }
+  /// The SAH cost of the nodes and leaves, times the root's area.
+  [[nodiscard]] double sah_cost() const noexcept { return sah_cost_; }
 
  private:
   [[nodiscard]] Bounds3f box_of(std::uint32_t node) const { return {tree_.nodes[node].lower, tree_.nodes[node].upper}; }
@@ -50,6 +52,7 @@ class Converter {
   /// leave `region`.
   void place(std::uint32_t node, std::uint32_t slot, Bounds3f region, std::size_t pairs) {
     const Bounds3f box = box_of(node);
+    const auto count_node = [&] { sah_cost_ += region.area() * double(costs_.traversal_cost); };
     for (unsigned clipped = 0;;) {  // bit k: axis k is done
       int best = -1;
       double best_cost = 0.999 * cost_[node];
@@ -61,6 +64,7 @@ class Converter {
       }
       if (best < 0) break;
       clipped |= 1u << best;
+      count_node();
       region = clip(region, box, best);
       const std::uint32_t child = take(1);
       nodes_[slot] = {{box.lower[std::size_t(best)], box.upper[std::size_t(best)]},
@@ -71,10 +75,14 @@ class Converter {
       // the code comes later
       nodes_[slot] = {{std::bit_cast<float>(std::uint32_t(lists_.begin.size())), 0.0f}, Node::kLeaf};
       lists_.begin.push_back(std::uint32_t(lists_.ids.size()));
+      const std::uint32_t count = tree_.nodes[node].count;
       const auto begin = tree_.primitives.begin() + tree_.begin_of(node);
-      lists_.ids.insert(lists_.ids.end(), begin, begin + tree_.nodes[node].count);
+      lists_.ids.insert(lists_.ids.end(), begin, begin + count);
+      const std::uint32_t blocks = (count + costs_.block_width - 1) / costs_.block_width;
+      sah_cost_ += region.area() * double(costs_.intersection_cost) * blocks;
       return;
     }
+    count_node();
     std::uint32_t left = tree_.nodes[node].left, right = left + 1;
     std::size_t axis = 0;
     bool swapped = false;
@@ -117,12 +125,19 @@ class Converter {
 
   const BinaryTree& tree_;
   const Collapse& collapse_;
-  const BuilderParameters& costs_;
+  const CollapseSettings& costs_;
   MeteredVector<Node>& nodes_;
   LeafLists& lists_;
   MeteredVector<float> cost_;
   std::size_t deepest_ = 0;
+  double sah_cost_ = 0.0;
 };
+
+double sah_cost_of(const BinaryTree& tree, const CollapseSettings& how) {
+  MeteredVector<Node> nodes;
+  LeafLists lists;
+  return Converter(tree, Collapse(tree, how), how, nodes, lists).sah_cost();
+}
 
 }  // namespace
 
@@ -152,12 +167,14 @@ void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildRe
     lists.begin.assign(2, 0);
   } else {
     with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
+      const CollapseSettings how{
+          2,    unsigned(Block::kWidth), p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
+          true, 2 * sizeof(Node),        sizeof(Block)};
       BinaryTree tree;
-      build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
+      build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report,
+                        {2, [&](const BinaryTree& t) { return sah_cost_of(t, how); }});
       const double start = wall_seconds();
-      const Collapse collapse(tree, {2, unsigned(Block::kWidth), p.max_leaf_blocks, p.traversal_cost,
-                                     p.intersection_cost, true, 2 * sizeof(Node), sizeof(Block)});
-      stack_entries_ = Converter(tree, collapse, p, nodes_, lists).pairs_deep() + 1;
+      stack_entries_ = Converter(tree, Collapse(tree, how), how, nodes_, lists).pairs_deep() + 1;
       nodes_.shrink_to_fit();
       report.phases.emplace_back("planes", wall_seconds() - start);
     });

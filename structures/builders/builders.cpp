@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 
 #include "core/error.h"
 #include "core/names.h"
 #include "structures/builders/builder_parameters.h"
+#include "structures/builders/collapse.h"
 #include "structures/builders/embree_builders.h"
 #include "structures/builders/portable_builders.h"
 #include "structures/builders/reinsertion.h"
@@ -110,7 +112,9 @@ void require_budget(std::string_view builder, std::size_t triangles, float budge
 std::vector<std::string_view> binary_builder_parameters(std::string_view builder) {
   const Found found = find_builder(builder);
   if (!found.entry) return {};
-  std::vector<std::string_view> names{found.reinserts ? "reinsertion_rounds" : "reinsertion_top"};
+  std::vector<std::string_view> names{"reinsertion_top"};
+  if (found.reinserts)
+    names.insert(names.end(), {"reinsertion_rounds", "traversal_cost", "intersection_cost", "max_leaf_blocks"});
   for (std::string_view name : found.entry->reads)
     if (!name.empty()) names.push_back(name);
   return names;
@@ -132,7 +136,7 @@ const std::vector<std::string_view>& binary_builder_names() {
 }
 
 void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, unsigned leaf_width, BinaryTree& tree,
-                       BuildReport& report) {
+                       BuildReport& report, const TreeUse& use) {
   const BuilderParameters& p = settings.parameters;
   const Found found = find_builder(settings.builder);
   if (!found.entry) {
@@ -146,10 +150,16 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
   require_budget(found.entry->name, mesh.size(), splits ? p.duplication_budget : 0.0f);
 
   found.entry->on(settings.isa)(mesh, p, leaf_width, tree, report);
-  if (found.reinserts)
-    reinsert(tree, p.reinsertion_rounds, leaf_width, report);
-  else
-    reinsert_top(tree, own_top ? found.entry->reinserted_top : p.reinsertion_top, report);
+  reinsert_top(tree, own_top ? found.entry->reinserted_top : p.reinsertion_top, report);
+  if (!found.reinserts) return;
+  // A wide node stands for log2(branching) levels of binary ones.
+  const ReinsertionCosts costs{p.traversal_cost / std::log2(float(use.branching)), kLeafVisit * p.intersection_cost,
+                               p.intersection_cost, leaf_width,
+                               std::min(leaf_width * p.max_leaf_blocks, kMaxMergedReferences)};
+  const auto as_it_is = [&](const BinaryTree& t) {
+    return sah_cost(t, {use.branching, leaf_width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost});
+  };
+  reinsert(tree, p.reinsertion_rounds, costs, use.cost ? use.cost : as_it_is, report);
 }
 
 }  // namespace arboretum

@@ -1,6 +1,7 @@
 // The builders of binary trees, by name.
 #pragma once
 
+#include <functional>
 #include <string_view>
 #include <vector>
 
@@ -17,13 +18,19 @@ namespace arboretum {
 using BinaryBuilder = void (*)(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
                                BinaryTree& tree, BuildReport& report);
 
+/// What a structure makes of a binary tree, for `..._reinsertion`: of two trees it keeps the one that costs less.
+struct TreeUse {
+  unsigned branching = 2;                           ///< most children of a node
+  std::function<double(const BinaryTree&)> cost{};  ///< in any unit, the less the better; none: of the tree as it is
+};
+
 /// Every builder that makes a binary tree; the first is the default.
 [[nodiscard]] const std::vector<std::string_view>& binary_builder_names();
 
 /// Builds with settings.builder, using kernels of settings.isa. Throws UserError where there is no such builder, and
 /// for parameters out of range.
 void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, unsigned leaf_width, BinaryTree& tree,
-                       BuildReport& report);
+                       BuildReport& report, const TreeUse& use = {});
 
 /// Throws UserError where so many triangles and, of those, a share `budget` of references more are above
 /// kMaxReferences, or the budget is not within 0 .. 4.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -17,9 +18,6 @@
 namespace arboretum {
 namespace {
 constexpr std::uint32_t kTooMany = 1000;  // references, more than a leaf holds
-/// What a leaf costs beside its blocks, in blocks. SAH knows none of it; where boxes overlap (`generate: needles`) rays
-/// lose by trees that open every leaf.
-constexpr float kLeafVisit = 0.25f;
 
 /// The references without repetitions, sorted, in `room`.
 std::span<const std::uint32_t> distinct(std::span<const std::uint32_t> references, LeafPrimitives& room) noexcept {
@@ -283,6 +281,25 @@ class Collapse::Writer {
 
 void Collapse::write(ReservedArray<WideNode>& out) const {
   if (!tree_.primitives.empty()) Writer(*this, out).write();
+}
+
+double Collapse::cost(std::uint32_t index) const {
+  const BinaryNode& node = tree_.nodes[index];
+  const double area = Bounds3f{node.lower, node.upper}.area();
+  if (is_leaf(index)) return area * double(settings_.intersection_cost) * blocks(index);
+  const Slots slots = children(index);
+  double below[kMaxBranching];
+  const auto child = [&](unsigned i) { below[i] = cost(slots.node[i]); };
+  if (node.count > kOneTask) {
+    tbb::parallel_for(0u, slots.size, child);
+  } else {
+    for (unsigned i = 0; i < slots.size; ++i) child(i);
+  }
+  return std::accumulate(below, below + slots.size, area * double(settings_.traversal_cost));
+}
+
+double sah_cost(const BinaryTree& tree, const CollapseSettings& settings) {
+  return tree.primitives.empty() ? 0.0 : Collapse(tree, settings).cost(0);
 }
 
 WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings) {

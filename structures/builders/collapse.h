@@ -15,6 +15,9 @@ namespace arboretum {
 inline constexpr unsigned kMaxBranching = 16;
 /// A subtree of more references does not become one leaf.
 inline constexpr unsigned kMaxMergedReferences = 256;
+/// What a leaf costs beside its blocks, in blocks. SAH knows none of it; where boxes overlap (`generate: needles`) rays
+/// lose by trees that open every leaf.
+inline constexpr float kLeafVisit = 0.25f;
 
 struct CollapseSettings {
   unsigned branching = 8;
@@ -67,6 +70,9 @@ struct WideTree {
 /// The wide tree, and none of the binary one any more.
 [[nodiscard]] WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings);
 
+/// The SAH cost of the tree that collapse() would make of it, times the root's area.
+[[nodiscard]] double sah_cost(const BinaryTree& tree, const CollapseSettings& settings);
+
 /// Decides which binary nodes become wide nodes and which leaves.
 class Collapse {
  public:
@@ -80,6 +86,8 @@ class Collapse {
   [[nodiscard]] unsigned blocks(std::uint32_t node) const noexcept { return blocks_for(plan_[node].references); }
   /// Writes the wide tree's nodes.
   void write(ReservedArray<WideNode>& out) const;
+  /// The SAH cost of what becomes of the subtree at `node`, times the root's area.
+  [[nodiscard]] double cost(std::uint32_t node) const;
 
  private:
   struct Plan {

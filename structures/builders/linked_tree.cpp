@@ -85,7 +85,7 @@ class Layout {
 
 BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width) { return Layout(tree, leaf_width).run(); }
 
-LinkedTree to_linked(BinaryTree&& tree) {
+LinkedTree to_linked(const BinaryTree& tree) {
   if (tree.node_count > LinkedNode::kLeaf)
     throw UserError("reinsertion: a tree of more than 2^31 nodes; take wider leaf blocks or a smaller mesh");
   LinkedTree out;
@@ -99,7 +99,7 @@ LinkedTree to_linked(BinaryTree&& tree) {
                                     : LinkedNode::inner(box, node.left, node.left + 1);
     }
   });
-  out.primitives = std::move(tree.primitives), out.duplicates = tree.duplicates;
+  out.primitives = tree.primitives, out.duplicates = tree.duplicates;
   return out;
 }
 

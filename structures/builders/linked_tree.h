@@ -44,6 +44,6 @@ struct LinkedTree {
 [[nodiscard]] BinaryTree lay_out(const LinkedTree& tree, unsigned leaf_width);
 
 /// The other way: nodes keep their numbers. Throws UserError where those take more than 31 bits.
-[[nodiscard]] LinkedTree to_linked(BinaryTree&& tree);
+[[nodiscard]] LinkedTree to_linked(const BinaryTree& tree);
 
 }  // namespace arboretum

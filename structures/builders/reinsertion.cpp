@@ -1,8 +1,8 @@
-// Each pass looks, in parallel and without changing anything, for the best new place of every node; then moves are made
-// one after another, the most gainful first. A move's gain is what it changes in the tree as it then is: one that no
-// longer gains is taken back. So no locks are needed, no conflict can spoil the tree, and the result is the same for
-// any number of threads. Things that lie within each other would become a chain; a move that brings anything below
-// kMaxReinsertedDepth is not made.
+// Each pass looks, in parallel and without changing anything, for the place of every node where the inner nodes' areas
+// are least; then moves are made one after another, the most gainful first. What a move is worth is what it changes of
+// the cost of the tree as it then is, some subtrees of which are leaves: one that gains nothing there is taken back. So
+// no locks are needed, no conflict can spoil the tree, and the result is the same for any number of threads. Things
+// that lie within each other would become a chain; a move that brings anything below kMaxReinsertedDepth is not made.
 #include "structures/builders/reinsertion.h"
 
 #include <algorithm>
@@ -20,7 +20,8 @@ namespace {
 
 constexpr std::uint32_t kNone = ~0u;
 constexpr std::size_t kGrain = 128;
-constexpr unsigned kMostVisits = 1024;  ///< of one search: where all boxes overlap nothing can be left out
+constexpr std::uint32_t kMany = 1u << 30;  ///< references, more than any leaf holds
+constexpr unsigned kMostVisits = 1024;     ///< of one search: where all boxes overlap nothing can be left out
 
 struct Move {
   float gain;
@@ -29,8 +30,8 @@ struct Move {
 
 class Reinsertion {
  public:
-  explicit Reinsertion(LinkedTree& tree)
-      : tree_(tree), nodes_(tree.nodes), parent_(tree.nodes.size()), height_(tree.nodes.size()) {
+  Reinsertion(LinkedTree& tree, const ReinsertionCosts& costs)
+      : tree_(tree), costs_(costs), nodes_(tree.nodes), parent_(tree.nodes.size()), below_(tree.nodes.size()) {
     parent_[tree.root] = kNone;
     MeteredVector<std::uint32_t> order(nodes_.size());  // parents before their children, wherever they stand
     std::size_t listed = 0;
@@ -41,7 +42,7 @@ class Reinsertion {
       parent_[node.left] = parent_[node.right] = order[k];
       order[listed++] = node.left, order[listed++] = node.right;
     }
-    while (listed-- > 0) height_[order[listed]] = height_from_children(order[listed]);
+    while (listed-- > 0) below_[order[listed]] = below_from_children(order[listed]);
   }
 
   /// Whether anything was gained.
@@ -120,47 +121,54 @@ class Reinsertion {
     }
   }
 
-  /// Boxes from `index` up; returns by how much their areas grew.
-  double refit_upwards(std::uint32_t index) noexcept {
-    double grown = 0.0;
+  /// What is below a node, itself included.
+  struct Below {
+    double cost;               ///< times area
+    std::uint32_t references;  ///< at most kMany
+    std::uint32_t height;      ///< levels; 0 for a leaf
+    bool operator==(const Below&) const = default;
+  };
+
+  [[nodiscard]] Below below_from_children(std::uint32_t i) const noexcept {
+    const LinkedNode& node = nodes_[i];
+    if (node.is_leaf()) return {leaf_cost(i, node.size()), std::min(node.size(), kMany), 0};
+    const Below &left = below_[node.left], &right = below_[node.right];
+    Below all{double(area(i)) * costs_.node + left.cost + right.cost,
+              std::min(left.references + right.references, kMany), 1 + std::max(left.height, right.height)};
+    if (all.references <= costs_.max_leaf_references) all.cost = std::min(all.cost, leaf_cost(i, all.references));
+    return all;
+  }
+  [[nodiscard]] double leaf_cost(std::uint32_t i, std::uint32_t references) const noexcept {
+    const std::uint32_t blocks = (references + costs_.block_width - 1) / costs_.block_width;
+    return double(area(i)) * (costs_.leaf + double(costs_.block) * blocks);
+  }
+
+  /// Boxes, and what is below, from `index` up.
+  void refit_upwards(std::uint32_t index) noexcept {
     for (; index != kNone; index = parent_[index]) {
       LinkedNode& node = nodes_[index];
       const LinkedNode &left = nodes_[node.left], &right = nodes_[node.right];
       const Vec3f lower = min(left.lower, right.lower), upper = max(left.upper, right.upper);
-      if (lower == node.lower && upper == node.upper) break;
-      grown += double(half_area(lower, upper)) - half_area(node.lower, node.upper);
+      const bool same_box = lower == node.lower && upper == node.upper;
       node.lower = lower, node.upper = upper;
+      const Below below = below_from_children(index);
+      if (same_box && below == below_[index]) break;
+      below_[index] = below;
     }
-    return grown;
   }
 
-  /// Takes the node out with its parent and puts both above `target`; returns by how much the inner nodes' areas grew.
-  double move(std::uint32_t index, std::uint32_t target) noexcept {
+  /// Takes the node out with its parent and puts both above `target`.
+  void move(std::uint32_t index, std::uint32_t target) noexcept {
     const std::uint32_t parent = parent_[index], brother = sibling(index), grandparent = parent_[parent];
-    const double before = area(parent);
     replace_child(grandparent, parent, brother);
-    double grown = refit_upwards(grandparent);
+    refit_upwards(grandparent);
     replace_child(parent_[target], target, parent);
     LinkedNode& p = nodes_[parent];
     (p.left == index ? p.right : p.left) = target;
     parent_[target] = parent;
     p.lower = min(nodes_[index].lower, nodes_[target].lower), p.upper = max(nodes_[index].upper, nodes_[target].upper);
-    grown += area(parent) - before;
-    return grown + refit_upwards(parent_[parent]);
-  }
-
-  /// How many levels are below.
-  [[nodiscard]] std::uint32_t height_from_children(std::uint32_t i) const noexcept {
-    const LinkedNode& node = nodes_[i];
-    return node.is_leaf() ? 0 : 1 + std::max(height_[node.left], height_[node.right]);
-  }
-
-  void update_heights(std::uint32_t index) noexcept {
-    for (; index != kNone; index = parent_[index]) {
-      const std::uint32_t height = height_from_children(index);
-      if (height == height_[index]) break;
-      height_[index] = height;
-    }
+    below_[parent] = below_from_children(parent);
+    refit_upwards(parent_[parent]);
   }
 
   bool try_move(std::uint32_t index, std::uint32_t target) noexcept {
@@ -170,47 +178,43 @@ class Reinsertion {
     for (std::uint32_t i = target; i != kNone; i = parent_[i], ++depth) {
       if (i == index) return false;  // an earlier move has put the target below
     }
-    if (depth + std::max(height_[index], height_[target]) > kMaxReinsertedDepth) return false;
-    const std::uint32_t brother = sibling(index), grandparent = parent_[parent];
-    if (move(index, target) < 0.0) {
-      // The parent, which now stands elsewhere, is right before and after what its old place changes.
-      height_[parent] = height_from_children(parent);
-      update_heights(grandparent);
-      height_[parent] = height_from_children(parent);
-      update_heights(parent_[parent]);
-      return true;
-    }
-    (void)move(index, brother);
+    if (depth + std::max(below_[index].height, below_[target].height) > kMaxReinsertedDepth) return false;
+    const std::uint32_t brother = sibling(index);
+    const double before = below_[tree_.root].cost;
+    move(index, target);
+    if (below_[tree_.root].cost < before) return true;
+    move(index, brother);
     return false;
   }
 
   LinkedTree& tree_;
+  const ReinsertionCosts costs_;
   MeteredVector<LinkedNode>& nodes_;
   MeteredVector<std::uint32_t> parent_;
-  MeteredVector<std::uint32_t> height_;  ///< 0 for a leaf
+  MeteredVector<Below> below_;
   MeteredVector<Move> moves_;
 };
 
 }  // namespace
 
-bool reinsert(LinkedTree& tree, unsigned rounds) {
-  Reinsertion passes(tree);
+bool reinsert(LinkedTree& tree, unsigned rounds, const ReinsertionCosts& costs) {
+  Reinsertion passes(tree, costs);
   unsigned done = 0;
   while (done < rounds && passes.pass()) ++done;
   return done > 0;
 }
 
-void reinsert(BinaryTree& tree, unsigned rounds, unsigned leaf_width, BuildReport& report) {
+void reinsert(BinaryTree& tree, unsigned rounds, const ReinsertionCosts& costs,
+              const std::function<double(const BinaryTree&)>& cost, BuildReport& report) {
   if (tree.primitives.empty()) return;
-  const bool duplicates = tree.duplicates;
   const double start = wall_seconds();
   // Laid out first: numbers, and with them the order among equal gains, then depend on the tree alone.
-  LinkedTree linked = to_linked(std::move(tree));
-  tree = lay_out(linked, leaf_width);
-  linked = to_linked(std::move(tree));
-  (void)reinsert(linked, rounds);
-  tree = lay_out(linked, leaf_width);
-  tree.duplicates = duplicates;
+  LinkedTree linked = to_linked(lay_out(to_linked(tree), costs.block_width));
+  if (reinsert(linked, rounds, costs)) {
+    BinaryTree better = lay_out(linked, costs.block_width);
+    linked = {};
+    if (cost(better) < cost(tree)) tree = std::move(better);
+  }
   report.phases.emplace_back("reinsertion", wall_seconds() - start);
 }
 

@@ -130,13 +130,21 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   require_triangles(kName, mesh.size());
   const LeafForm& form = require_leaf_form(kName, settings.leaf);
 
+  const CollapseSettings how{unsigned(kBranching),
+                             form.width,
+                             p.max_leaf_blocks,
+                             p.traversal_cost,
+                             p.intersection_cost,
+                             p.collapse == "optimal",
+                             sizeof(typename Format::Node),
+                             form.bytes,
+                             Format::kGranule};
   BinaryTree tree;
-  build_binary_tree(mesh, settings, form.width, tree, report);
+  build_binary_tree(mesh, settings, form.width, tree, report,
+                    {how.branching, [&](const BinaryTree& t) { return sah_cost(t, how); }});
 
   double start = wall_seconds();
-  const WideTree wide = collapse(
-      std::move(tree), {unsigned(kBranching), form.width, p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
-                        p.collapse == "optimal", sizeof(typename Format::Node), form.bytes, Format::kGranule});
+  const WideTree wide = collapse(std::move(tree), how);
   report.phases.emplace_back("collapse", wall_seconds() - start);
 
   start = wall_seconds();
