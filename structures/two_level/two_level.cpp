@@ -44,9 +44,10 @@ bool is_searchable(std::string_view below) {
   return found;
 }
 
-/// Bounds of the box's image, computed in double and rounded outwards.
+/// Bounds of the box's image, computed in double and rounded outwards, which may take them beyond float; of an identity
+/// the box itself.
 Bounds3f image(const AffineMap& map, const Bounds3f& box) {
-  if (box.empty()) return box;
+  if (box.empty() || is_identity(map)) return box;
   Bounds3f result;
   for (int row = 0; row < 3; ++row) {
     double low = map.m[row][3], high = low;
