@@ -148,29 +148,33 @@ void Collapse::choose_leaves(std::uint32_t index) {
   }
 }
 
-void Collapse::expand(std::uint32_t index, unsigned slots, Slots& out) const noexcept {
+void Collapse::expand(std::uint32_t index, std::uint32_t begin, unsigned slots, Slots& out) const noexcept {
   if (slots > 1) {
     const std::uint8_t* choice = &choice_[choices_of(index)];
-    if (const unsigned used = (choice[slots - 1] >> 4) + 1u; used > 1) return expand_children(index, used, out);
+    if (const unsigned used = (choice[slots - 1] >> 4) + 1u; used > 1) return expand_children(index, begin, used, out);
   }
-  out.node[out.size++] = index;
+  out.node[out.size] = index, out.begin[out.size++] = begin;
 }
 
-void Collapse::expand_children(std::uint32_t index, unsigned slots, Slots& out) const noexcept {
+void Collapse::expand_children(std::uint32_t index, std::uint32_t begin, unsigned slots, Slots& out) const noexcept {
   const unsigned left_slots = (choice_[choices_of(index) + slots - 1] & 15u) + 1;
   const std::uint32_t left = tree_.nodes[index].left;
-  expand(left, left_slots, out);
-  expand(left + 1, slots - left_slots, out);
+  expand(left, begin, left_slots, out);
+  expand(left + 1, begin_after(left, begin), slots - left_slots, out);
 }
 
-Slots Collapse::children(std::uint32_t index) const noexcept {
+Slots Collapse::children(std::uint32_t index, std::uint32_t begin) const noexcept {
   Slots out;
   if (settings_.optimal) {
-    expand_children(index, unsigned(plan_[index].slots), out);
+    expand_children(index, begin, unsigned(plan_[index].slots), out);
     return out;
   }
-  const BinaryNode& node = tree_.nodes[index];
-  out.size = 2, out.node[0] = node.left, out.node[1] = node.left + 1;
+  const auto put_pair = [&](std::uint32_t left, std::uint32_t from, unsigned at) {
+    out.node[at] = left, out.begin[at] = from;
+    out.node[out.size] = left + 1, out.begin[out.size++] = begin_after(left, from);
+  };
+  out.size = 1;
+  put_pair(tree_.nodes[index].left, begin, 0);
   while (out.size < settings_.branching) {  // open the largest
     int largest = -1;
     float largest_area = -1.0f;
@@ -180,9 +184,7 @@ Slots Collapse::children(std::uint32_t index) const noexcept {
         largest_area = area, largest = int(i);
     }
     if (largest < 0) break;
-    const std::uint32_t opened = tree_.nodes[out.node[largest]].left;
-    out.node[largest] = opened;
-    out.node[out.size++] = opened + 1;
+    put_pair(tree_.nodes[out.node[largest]].left, out.begin[largest], unsigned(largest));
   }
   return out;
 }
@@ -199,12 +201,14 @@ class Collapse::Writer {
     out.reserve(1 + runs * kRun), out.hand_out(1);
   }
 
-  void write() {
+  /// Returns how many granules all take.
+  std::uint64_t write() {
     Share share;
-    (void)write(0, 0, share);
+    const Below all = write(0, 0, 0, share);
     shares_.push_back(share);
     for (const Share& last : shares_)
       if (!last.is_new()) out_.hand_out(kRun - last.left());
+    return all.granules;
   }
 
  private:
@@ -216,25 +220,27 @@ class Collapse::Writer {
     return numbers_.take(n, share, [&] { out_.hand_out(share.is_new() ? 0 : kRun); });
   }
 
-  /// Returns the SAH cost of the subtree for a ray that enters it.
-  float write(std::uint32_t index, std::uint32_t place, Share& share) {
+  struct Below {
+    float cost;  ///< SAH cost for a ray that enters the subtree
+    std::uint64_t granules;
+  };
+
+  /// Writes the subtree, whose references begin at `begin`.
+  Below write(std::uint32_t index, std::uint32_t begin, std::uint32_t place, Share& share) {
     const BinaryNode& node = tree_.nodes[index];
     const CollapseSettings& settings = collapse_.settings_;
-    WideNode& out = out_[place];
-    out.box = {node.lower, node.upper}, out.count = node.count;
+    const Bounds3f box{node.lower, node.upper};
     if (collapse_.is_leaf(index)) {
       const unsigned blocks = collapse_.blocks(index);
-      out.first = tree_.begin_of(index);
-      out.children = 0, out.blocks = blocks, out.repeats = tree_.duplicates && !node.is_leaf();
-      out.bytes = round_up(blocks * settings.block_bytes);
-      return (kLeafVisit + float(blocks)) * settings.intersection_cost;
+      out_[place] = WideNode::leaf(box, begin, node.count, blocks, tree_.duplicates && !node.is_leaf());
+      return {(kLeafVisit + float(blocks)) * settings.intersection_cost, granules(blocks * settings.block_bytes)};
     }
-    const Slots slots = collapse_.children(index);
-    const std::uint32_t first = out.first = take(slots.size, share);
-    out.children = slots.size, out.blocks = 0, out.repeats = false;
-    float costs[kMaxBranching];
-    const auto child = [&](unsigned i, Share& its) { costs[i] = write(slots.node[i], first + i, its); };
-    if (node.count > kOneTask) {
+    const Slots slots = collapse_.children(index, begin);
+    const std::uint32_t first = take(slots.size, share);
+    Below below[kMaxBranching];
+    const auto child = [&](unsigned i, Share& its) { below[i] = write(slots.node[i], slots.begin[i], first + i, its); };
+    const bool large = node.count > kOneTask;
+    if (large) {
       // A thread that waits here takes up other tasks, but none at the same time: its place's share is its own.
       tbb::parallel_for(0u, slots.size, [&](unsigned i) {
         child(i, shares_[std::size_t(tbb::this_task_arena::current_thread_index())]);
@@ -242,16 +248,17 @@ class Collapse::Writer {
     } else {
       for (unsigned i = 0; i < slots.size; ++i) child(i, share);
     }
-    std::uint64_t bytes = round_up(settings.node_bytes);
-    float cost = settings.traversal_cost;
+    Below all{settings.traversal_cost, granules(settings.node_bytes)};
     const float area = node.half_area();
+    float costs[kMaxBranching];
     for (unsigned i = 0; i < slots.size; ++i) {
-      bytes += out_[first + i].bytes;
-      cost += costs[i] * (area > 0.0f ? tree_.nodes[slots.node[i]].half_area() / area : 1.0f);
+      costs[i] = below[i].cost;
+      all.granules += below[i].granules;
+      all.cost += costs[i] * (area > 0.0f ? tree_.nodes[slots.node[i]].half_area() / area : 1.0f);
     }
-    out.bytes = bytes;
+    out_[place] = WideNode::inner(box, first, slots.size, large, all.granules);
     order(&out_[first], costs, slots.size);
-    return cost;
+    return all;
   }
 
   /// Puts children that cost little, such as leaves, last, where any hit looks first; others of much the same cost,
@@ -268,9 +275,9 @@ class Collapse::Writer {
       children[to] = moved, cost[to] = its;
     }
   }
-  [[nodiscard]] std::uint64_t round_up(std::uint64_t bytes) const noexcept {
+  [[nodiscard]] std::uint64_t granules(std::uint64_t bytes) const noexcept {
     const std::uint64_t granule = collapse_.settings_.granule;
-    return (bytes + granule - 1) / granule * granule;
+    return (bytes + granule - 1) / granule;
   }
   const Collapse& collapse_;
   const BinaryTree& tree_;
@@ -279,15 +286,15 @@ class Collapse::Writer {
   NumberRuns numbers_{1, kRun};
 };
 
-void Collapse::write(ReservedArray<WideNode>& out) const {
-  if (!tree_.primitives.empty()) Writer(*this, out).write();
+std::uint64_t Collapse::write(ReservedArray<WideNode>& out) const {
+  return tree_.primitives.empty() ? 0 : Writer(*this, out).write();
 }
 
 double Collapse::cost(std::uint32_t index) const {
   const BinaryNode& node = tree_.nodes[index];
   const double area = Bounds3f{node.lower, node.upper}.area();
   if (is_leaf(index)) return area * double(settings_.intersection_cost) * blocks(index);
-  const Slots slots = children(index);
+  const Slots slots = children(index, 0);
   double below[kMaxBranching];
   const auto child = [&](unsigned i) { below[i] = cost(slots.node[i]); };
   if (node.count > kOneTask) {
@@ -304,15 +311,17 @@ double sah_cost(const BinaryTree& tree, const CollapseSettings& settings) {
 
 WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings) {
   WideTree wide;
-  Collapse(tree, settings).write(wide.nodes);
+  const Collapse plan(tree, settings);
+  tree.first.clear();
+  wide.granules = plan.write(wide.nodes);
   wide.primitives = std::move(tree.primitives);
-  tree.nodes.clear(), tree.first.clear();
+  tree.nodes.clear();
   return wide;
 }
 
 std::span<const std::uint32_t> WideTree::leaf_primitives(const WideNode& leaf, LeafPrimitives& room) const noexcept {
-  const std::span<const std::uint32_t> references{primitives.data() + leaf.first, leaf.count};
-  return leaf.repeats ? distinct(references, room) : references;
+  const std::span<const std::uint32_t> references{primitives.data() + leaf.first(), leaf.references()};
+  return leaf.repeats() ? distinct(references, room) : references;
 }
 
 }  // namespace arboretum

@@ -33,34 +33,60 @@ struct CollapseSettings {
 /// Room for the primitives of a leaf that is merged from a subtree.
 using LeafPrimitives = std::array<std::uint32_t, kMaxMergedReferences>;
 
-/// The wide children of a binary node, at most kMaxBranching.
+/// The wide children of a binary node, at most kMaxBranching, and where the references of each begin.
 struct Slots {
   unsigned size = 0;
-  std::uint32_t node[kMaxBranching];
+  std::uint32_t node[kMaxBranching], begin[kMaxBranching];
 };
 
-/// A node or leaf of a wide tree.
-struct WideNode {
+/// A node or leaf of a wide tree, in 32 bytes: trees of millions of them are held beside what is made of them.
+class WideNode {
+ public:
+  WideNode() = default;
+  [[nodiscard]] static WideNode leaf(const Bounds3f& box, std::uint32_t first, unsigned references, unsigned blocks,
+                                     bool repeats) noexcept {
+    return {box, first, 0, repeats, references | blocks << kReferenceBits};
+  }
+  [[nodiscard]] static WideNode inner(const Bounds3f& box, std::uint32_t first, unsigned children, bool large,
+                                      std::uint64_t granules) noexcept {
+    return {box, first, children, large, granules};
+  }
+
   Bounds3f box;
-  std::uint32_t first;  ///< of a node's children in WideTree::nodes; of a leaf's references in WideTree::primitives
-  std::uint32_t count;  ///< references below
-  std::uint64_t bytes : 48;    ///< of the subtree: its own, in granules, and all below
-  std::uint64_t children : 6;  ///< 0 for a leaf
-  std::uint64_t blocks : 9;    ///< of a leaf
-  std::uint64_t repeats : 1;   ///< the leaf's references may name a primitive more than once
 
-  [[nodiscard]] bool is_leaf() const noexcept { return children == 0; }
+  [[nodiscard]] bool is_leaf() const noexcept { return children_ == 0; }
+  /// Of a node's children in WideTree::nodes; of a leaf's references in WideTree::primitives.
+  [[nodiscard]] std::uint32_t first() const noexcept { return first_; }
+  [[nodiscard]] unsigned children() const noexcept { return children_; }
+  /// Of a node: more references below than one task takes.
+  [[nodiscard]] bool is_large() const noexcept { return mark_ != 0; }
+  /// Of a node: what it takes with all below, where that is less than 2^28 granules.
+  [[nodiscard]] std::uint64_t granules() const noexcept { return size_; }
+  [[nodiscard]] unsigned references() const noexcept { return size_ & ((1u << kReferenceBits) - 1); }
+  [[nodiscard]] unsigned blocks() const noexcept { return size_ >> kReferenceBits; }
+  /// Of a leaf: its references may name a primitive more than once.
+  [[nodiscard]] bool repeats() const noexcept { return mark_ != 0; }
+
+ private:
+  static constexpr unsigned kReferenceBits = 9;
+  static_assert(kMaxMergedReferences < 1u << kReferenceBits);
+  WideNode(const Bounds3f& b, std::uint32_t first, unsigned children, bool mark, std::uint64_t size) noexcept
+      : box(b), first_(first & ((1u << 30) - 1)), children_(children & 31u), mark_(mark),
+        size_(size & ((1u << 28) - 1)) {}
+
+  std::uint64_t first_ : 30, children_ : 5, mark_ : 1, size_ : 28;
 };
-static_assert(sizeof(WideNode) == 40);
+static_assert(sizeof(WideNode) == 32);
 
 /// What of a binary tree becomes of a wide one: all that has to be known to write it. Node 0 is the root, children
 /// stand next to each other, the ones of which the SAH expects the least work last: there any hit looks first.
 struct WideTree {
   ReservedArray<WideNode> nodes;
   MeteredVector<std::uint32_t> primitives;
+  std::uint64_t granules = 0;  ///< of the whole tree
 
   [[nodiscard]] std::span<const WideNode> children(const WideNode& node) const noexcept {
-    return {nodes.data() + node.first, node.children};
+    return {nodes.data() + node.first(), node.children()};
   }
   /// The primitives of a leaf, none of them twice; in `room`, or in the tree where it holds them so.
   [[nodiscard]] std::span<const std::uint32_t> leaf_primitives(const WideNode& leaf,
@@ -80,12 +106,12 @@ class Collapse {
 
   /// Whether the subtree at `node` becomes one leaf.
   [[nodiscard]] bool is_leaf(std::uint32_t node) const noexcept { return plan_[node].leaf; }
-  /// The children of the wide node made from `node`, which is not a leaf.
-  [[nodiscard]] Slots children(std::uint32_t node) const noexcept;
+  /// The children of the wide node made from `node`, which is not a leaf and whose references begin at `begin`.
+  [[nodiscard]] Slots children(std::uint32_t node, std::uint32_t begin) const noexcept;
   /// Blocks of the leaf made from `node`, which is_leaf().
   [[nodiscard]] unsigned blocks(std::uint32_t node) const noexcept { return blocks_for(plan_[node].references); }
-  /// Writes the wide tree's nodes.
-  void write(ReservedArray<WideNode>& out) const;
+  /// Writes the wide tree's nodes; returns how many granules all take. Does not look at BinaryTree::first.
+  std::uint64_t write(ReservedArray<WideNode>& out) const;
   /// The SAH cost of what becomes of the subtree at `node`, times the root's area.
   [[nodiscard]] double cost(std::uint32_t node) const;
 
@@ -104,8 +130,12 @@ class Collapse {
   [[nodiscard]] unsigned blocks_for(unsigned references) const noexcept {
     return (references + settings_.block_width - 1) / settings_.block_width;
   }
-  void expand(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
-  void expand_children(std::uint32_t node, unsigned slots, Slots& out) const noexcept;
+  void expand(std::uint32_t node, std::uint32_t begin, unsigned slots, Slots& out) const noexcept;
+  void expand_children(std::uint32_t node, std::uint32_t begin, unsigned slots, Slots& out) const noexcept;
+  /// Where the references of a child begin whose left neighbour is `left`.
+  [[nodiscard]] std::uint32_t begin_after(std::uint32_t left, std::uint32_t begin) const noexcept {
+    return begin + tree_.nodes[left].count;
+  }
 
   /// Of an inner node: one row for each pair of children.
   [[nodiscard]] std::size_t choices_of(std::uint32_t node) const noexcept {

@@ -15,7 +15,6 @@
 #include "structures/builders/box4.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
-#include "structures/builders/one_task.h"
 #include "structures/bvh/bvh.h"
 #include "structures/bvh/wide_refit.h"
 #include "structures/leaves/leaf_names.h"
@@ -59,7 +58,7 @@ class Emitter {
       for (unsigned i = 0; i < count; ++i) {
         if (children[i].is_leaf() != leaves) continue;
         child_offset[i] = next;
-        next += children[i].bytes;
+        next += bytes(children[i]);
       }
     }
     Bounds3f boxes[kMaxBranching];
@@ -77,7 +76,7 @@ class Emitter {
         depth[i] = subtree(children[i], child_offset[i]);
       }
     };
-    if (from.count > kOneTask) {
+    if (from.is_large()) {
       tbb::parallel_for(0u, count, descend);
     } else {
       for (unsigned i = 0; i < count; ++i) descend(i);
@@ -86,19 +85,24 @@ class Emitter {
   }
 
   void leaf(const WideNode& from, std::size_t offset) const {
-    boxes_.prefetch([&](std::size_t i) { return tree_.primitives[i]; }, from.first, from.first + from.count,
+    boxes_.prefetch([&](std::size_t i) { return tree_.primitives[i]; }, from.first(), from.first() + from.references(),
                     tree_.primitives.size() - 1);
     LeafPrimitives room;
     form_.fill(base_ + offset, mesh_, tree_.leaf_primitives(from, room));
-    const std::size_t used = from.blocks * form_.bytes;
-    std::memset(base_ + offset + used, 0, from.bytes - used);
+    const std::size_t used = from.blocks() * form_.bytes;
+    std::memset(base_ + offset + used, 0, bytes(from) - used);
   }
 
   [[nodiscard]] static NodeReference reference(const WideNode& node, std::size_t offset) noexcept {
-    return NodeReference(offset) | (node.is_leaf() ? kLeafBit | NodeReference(node.blocks - 1) : 0u);
+    return NodeReference(offset) | (node.is_leaf() ? kLeafBit | NodeReference(node.blocks() - 1) : 0u);
   }
 
  private:
+  /// Of a node with all below, or of a leaf.
+  [[nodiscard]] std::size_t bytes(const WideNode& node) const noexcept {
+    return node.is_leaf() ? round_up<Format>(node.blocks() * form_.bytes) : node.granules() * Format::kGranule;
+  }
+
   const TriangleMesh& mesh_;
   const TriangleBoxes boxes_;
   const LeafForm& form_;
@@ -157,7 +161,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
     return;
   }
   const WideNode& root = wide.nodes[0];
-  const std::uint64_t bytes = root.bytes;
+  const std::uint64_t bytes = wide.granules * Format::kGranule;
   if (bytes > std::numeric_limits<NodeReference>::max()) {
     throw UserError(std::string(kName) + " with " + settings.leaf + " would take " + std::to_string(bytes >> 20) +
                     " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
