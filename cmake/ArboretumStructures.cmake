@@ -219,14 +219,17 @@ int main(int argc, char** argv) {
   arboretum_add_structures(${target} ${words_STRUCTURES})
 endfunction()
 
-# Arboretum's tests of every kernel, over the kernels of these structures and of brute_force, which they are compared with.
+# Arboretum's tests of every kernel and its structure-level cases B01 to B30, over these structures and brute_force, which they are
+# compared with.
 function(arboretum_kernel_tests target)
   cmake_parse_arguments(PARSE_ARGV 1 words "" "" "STRUCTURES;LIBRARIES")
   if(NOT TARGET arboretum::tests)
     message(FATAL_ERROR "arboretum_kernel_tests(${target}) needs find_package(arboretum REQUIRED COMPONENTS tests)")
   endif()
-  add_executable(${target} "${ARBORETUM_TESTS_FOLDER}/test_kernels.cpp")
-  target_link_libraries(${target} PRIVATE arboretum::arboretum arboretum::oracle arboretum::tests ${words_LIBRARIES})
+  set(sources kernels structure_cases structure_cases_large structure_cases_moved structure_cases_rays)
+  list(TRANSFORM sources REPLACE "(.+)" "${ARBORETUM_TESTS_FOLDER}/test_\\1.cpp")
+  add_executable(${target} ${sources})
+  target_link_libraries(${target} PRIVATE arboretum::arboretum arboretum::scenes arboretum::oracle arboretum::tests ${words_LIBRARIES})
   target_compile_options(${target} PRIVATE -O1)  # Catch2 takes half as long to compile; the kernels have options of their own
   get_filename_component(root "${ARBORETUM_TESTS_FOLDER}" DIRECTORY)
   target_include_directories(${target} PRIVATE "${root}")

@@ -103,6 +103,8 @@ struct StructureInfo {
   bool holds_motion = false;  ///< takes a mesh with key frames and rays with times; the others hold one moment
   bool needs_motion = false;  ///< measured only where the scene moves
   bool takes_below = false;   ///< stands above structures of another kind: BuilderParameters::below
+  bool flat = false;          ///< no hierarchy: a ray looks at all of it, however many triangles there are
+  bool root_is_node = false;  ///< above a single leaf, too: a grid of cells, a list of boxes
   /// why it has no other way of traversal, where that is so: what skipped cells say
   std::string_view only_single_rays = {};
   /// why its rays do not go as streams, where they go in other ways than alone: the same

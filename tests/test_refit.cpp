@@ -30,7 +30,7 @@ TriangleMesh deformed(TriangleMesh mesh) {
 }
 
 bool can_refit(std::string_view structure) {
-  return structure.starts_with("bvh") && structure != "bvh4_aos" && structure != "bvh4_motion";
+  return structure.starts_with("bvh") && structure != "bvh4_motion";
 }
 
 }  // namespace

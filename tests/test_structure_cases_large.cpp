@@ -42,7 +42,7 @@ TEST_CASE("B08: a flat grid: hits at nodes, edge midpoints and cell centres, and
                              if (row->intersector != "watertight" || row->box != "padded") continue;
                              for (const Hit& hit : closest_hit(*row, accel, rays)) REQUIRE(hit.is_hit());
                            }
-                           if (combination.is("brute_force")) return;
+                           if (combination.entry->info.flat) return;
                            const Counters c = counted(combination, accel, rays);
                            const double count = double(rays.size());
                            CAPTURE(double(c.nodes) / count, double(c.leaves) / count, double(c.triangles) / count);
@@ -135,7 +135,7 @@ TEST_CASE("B12: point triangles by the thousand and one real: costs free of NaN,
   const TriangleMesh million = scene(1000000);
   std::string_view last;
   for (const Combination& combination : combinations()) {
-    if (combination.entry->info.name == last || combination.is("brute_force")) continue;
+    if (combination.entry->info.name == last || combination.entry->info.flat) continue;
     // One of the wide BVHs: they share the builder
     if (combination.entry->info.name.starts_with("bvh") && !combination.is("bvh8")) continue;
     last = combination.entry->info.name;

@@ -18,6 +18,7 @@ const StructureInfo& BruteForce::static_info() {
     i.only_single_rays = "every ray tests every triangle: there is no node to share";
     i.builders = {"in_order"};
     i.uses_parameters = false;
+    i.flat = true;
     i.leaves = all_leaf_names();
     return i;
   }();

@@ -40,6 +40,7 @@ const StructureInfo& Grid::static_info() {
         "not built: each ray steps from cell to cell at distances of its own; what packets share in a grid is another "
         "walk, that of their frustum through slices of cells";
     i.builders = {"two_level", "uniform"};
+    i.root_is_node = true;
     i.leaves = all_leaf_names();
     return i;
   }();

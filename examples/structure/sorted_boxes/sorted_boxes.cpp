@@ -67,6 +67,8 @@ const StructureInfo& SortedBoxes::static_info() {
     i.summary = "a flat list of leaf blocks, each with a box: all boxes tested, hit ones visited from near to far";
     i.builders = binary_builder_names();
     i.leaves = all_leaf_names();
+    i.flat = true;
+    i.root_is_node = true;
     return i;
   }();
   return info;
