@@ -54,8 +54,12 @@ inline constexpr IntersectorPromise kIntersectorPromises[] = {
      Conditioning::none, 40, "the two sides of an edge compute values of exactly opposite sign"},
     {"pluecker_double", "pluecker in double: t to half an ulp, may miss at vertices", Coverage::edges, 0.5,
      Conditioning::vertices, 40, "as pluecker, with t nearly always to the last bit"},
-    {"watertight", "Woop, Benthin, Wald 2013: no cracks on closed meshes with padded boxes", Coverage::closed, 0,
-     Conditioning::none, 40, "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
+    {"watertight",
+     "Woop, Benthin, Wald 2013: with padded boxes no cracks on closed meshes, the same hits in every structure (rays "
+     "in a "
+     "triangle's plane apart)",
+     Coverage::closed, 0, Conditioning::none, 40,
+     "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
     {"watertight_refined", "watertight, and t, u, v of the nearest hit again in double", Coverage::closed, 0.5,
      Conditioning::edges, 40, "as watertight, the nearest hit's t, u, v computed again in double"},
     {"baldwin_weber", "Baldwin and Weber 2016: precomputed map to the unit triangle; may miss along edges",
@@ -64,8 +68,9 @@ inline constexpr IntersectorPromise kIntersectorPromises[] = {
      Conditioning::none, 40, "stored planes: accurate near the origin alone"},
     {"wald_projection", "Wald 2004: precomputed projection along an axis; may miss along edges", Coverage::none, 0,
      Conditioning::none, 40, "neighbours are projected along different axes"},
-    {"exact", "filtered, then exact arithmetic: hit or miss, nearest and t proved right", Coverage::exact, 0.5,
-     Conditioning::none, 0, "filtered, and exact arithmetic where the filter cannot decide"},
+    {"exact",
+     "filtered, then exact arithmetic: with padded boxes hit or miss, nearest and t proved right in every structure",
+     Coverage::exact, 0.5, Conditioning::none, 0, "filtered, and exact arithmetic where the filter cannot decide"},
 };
 
 /// `loses_nothing`: no box that the exact ray touches is missed, and none whose triangle is an ulp nearer than the best

@@ -108,23 +108,6 @@ inline StructureStatistics statistics_of(const Accel& accel, const TriangleMesh&
   return compute_statistics(accel, mesh, {}, false);
 }
 
-/// Where a structure is known to differ from brute_force with padded boxes, and why. It must then be right to 2^-12 of
-/// t.
-struct KnownLimit {
-  std::string_view test, structure, reason;
-};
-inline constexpr KnownLimit kKnownLimits[] = {
-    {"B14", "kdtree",
-     "watertight takes a neighbour that the exact ray passes by: among vertices a thousand times farther apart than "
-     "that neighbour is large, its sheared vertices are off by more than the kd-tree's pad, and the cells of a clipped "
-     "triangle are no larger than it"},
-};
-[[nodiscard]] inline bool has_known_limit(std::string_view structure) {
-  const std::string test = Catch::getResultCapture().getCurrentTestName();
-  return std::ranges::any_of(kKnownLimits,
-                             [&](const KnownLimit& l) { return test.starts_with(l.test) && l.structure == structure; });
-}
-
 /// Exact answers and brute_force's to the same rays; one set of the latter for each intersector.
 class Reference {
  public:
@@ -154,7 +137,6 @@ class Reference {
   /// every ray; other intersectors may take a triangle that the exact ray passes by, which a structure need not find,
   /// so they are compared where brute_force has the exact primitive. Other boxes may lose hits, but give no other ids.
   void check(const Combination& combination, const Accel& accel) {
-    const bool limited = has_known_limit(combination.entry->info.name);
     for (const KernelRow* row : combination.rows) {
       INFO(name_of(*row) << ", " << combination.builder);
       const std::vector<Hit> hits = closest_hit(*row, accel, rays_);
@@ -165,8 +147,6 @@ class Reference {
             expected[i].is_hit() == truth_[i].hit.is_hit() && expected[i].primitive == truth_[i].hit.primitive;
         if (row->intersector != "watertight" && !right) return true;
         if (row->box != "padded") return !hits[i].is_hit() || hits[i].primitive < mesh_.size();
-        if (limited && hits[i].is_hit() && std::abs(hits[i].t - expected[i].t) <= 0x1p-12f * std::abs(expected[i].t))
-          return true;
         return same_bits(std::span(&hits[i], 1), std::span(&expected[i], 1)) &&
                any[i] == std::uint8_t(expected[i].is_hit());
       };

@@ -29,9 +29,7 @@ TriangleMesh deformed(TriangleMesh mesh) {
   return mesh;
 }
 
-bool can_refit(std::string_view structure) {
-  return structure.starts_with("bvh") && structure != "bvh4_motion";
-}
+bool can_refit(std::string_view structure) { return structure.starts_with("bvh") && structure != "bvh4_motion"; }
 
 }  // namespace
 
