@@ -4,7 +4,7 @@
 usage: test_package.py STEP SETTINGS.json    (written by CMake: tests/CMakeLists.txt)
   install    installs the build tree and moves the result: nothing of it may know where it was built
   library    examples/library, built against the installation and against the build tree, and run
-  structure  examples/structure, built out of tree: its structure is listed, and swept with right answers
+  structure  examples/structure, built out of tree: its structure is listed, passes the tests and is swept with right answers
 """
 
 import json
@@ -101,6 +101,8 @@ def step_structure():
     check(objects, "no kernel objects")
     call(sys.executable, SOURCE / "tests/symbols/check_symbols.py", *objects)
 
+    cases = call(folder / "test_my_structures", "--list-test-names-only", expect=1).stdout  # Catch's status is their number
+    check(all(f"\nB{number:02}: " in cases for number in range(1, 31)), f"not all of the cases B01 to B30: {cases}")
     tests = call(folder / "test_my_structures").stdout
     check("All tests passed" in tests, tests)
 
