@@ -2,27 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-
 #include "experiments/rendered_rays.h"
+#include "traversal/kernel_keys.h"
 
 namespace arboretum {
-namespace {
-
-/// Rays of a packet: 8 of packet8, hybrid8, packet8_coherent; 0 where the way of traversal has none.
-std::size_t packet_width(std::string_view traversal) {
-  for (std::string_view family : {"packet", "hybrid"}) {
-    if (!traversal.starts_with(family)) continue;
-    const std::string_view rest = traversal.substr(family.size());
-    std::size_t rays = 0;
-    std::from_chars(rest.data(), rest.data() + rest.size(), rays);
-    return rays;
-  }
-  return 0;
-}
-
-}  // namespace
-
 std::size_t rays_a_call(const Cell& cell) {
   if (cell.call == "packet") return packet_width(cell.traversal);
   return cell.call == "ray" ? 1 : 0;

@@ -126,9 +126,8 @@ Json promise_entries(const Registry& registry) {
       entry["crack_free"] = promise.coverage == Coverage::closed || promise.coverage == Coverage::exact;
       entry["exact"] = promise.coverage == Coverage::exact;
       entry["t_error_ulp"] = promise.t_ulp > 0 ? Json(promise.t_ulp) : Json(nullptr);
-      entry["t_error_conditioning"] = promise.conditioning == Conditioning::none    ? Json(nullptr)
-                                      : promise.conditioning == Conditioning::edges ? Json("edges")
-                                                                                    : Json("vertices");
+      const std::string_view conditioning = to_string(promise.conditioning);
+      entry["t_error_conditioning"] = conditioning.empty() ? Json(nullptr) : Json(conditioning);
       entry["range_exponent"] = promise.exponent > 0 ? Json(promise.exponent) : Json(nullptr);
       entries.push_back(std::move(entry));
     }

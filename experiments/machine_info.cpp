@@ -112,9 +112,7 @@ Json machine_context(const Experiment& experiment, const std::string& configurat
   context["compiler_flags"] = build_info::kFlags;
   context["build_type"] = build_info::kBuildType;
   context["version"] = build_info::kVersion;
-  if (const StructureEntry* embree = find_structure("embree"))
-    context["embree"] =
-        std::string(embree->info.summary.substr(0, embree->info.summary.find(':')));  // with its version
+  if (const StructureEntry* embree = find_structure("embree")) context["embree"] = embree->info.library;
   const Revision at = revision();
   context["git_revision"] = at.hash.empty() ? "unknown" : at.hash;
   context["git_dirty"] = at.dirty;

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "experiments/sampling.h"
+#include "traversal/kernel_keys.h"
 
 namespace arboretum {
 namespace {
@@ -117,7 +118,7 @@ void add_facts(Json& facts, const Counters& c, std::size_t of_rays, std::string_
     }
   }
   const bool chooses = traversal == "auto";
-  const bool packets = chooses || traversal.starts_with("packet") || traversal.starts_with("hybrid");
+  const bool packets = chooses || packet_width(traversal) > 0;
   if ((packets || traversal.starts_with("stream")) && c.nodes > 0) {
     facts["rays_per_node_visit"] = share(c.nodes, c.nodes - c.nodes_shared);
     if (c.leaves > 0) facts["rays_per_leaf_visit"] = share(c.leaves, c.leaves - c.leaves_shared);

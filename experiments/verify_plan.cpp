@@ -34,19 +34,18 @@ Plan make_verify_plan(const VerifyCommand& command, const SceneChoice& scene, bo
   experiment.metrics = {.trace = true, .build = false, .quality = false, .accuracy = true};
   refuse_repeated_axes(command.axes);
   for (const std::string& word : command.axes) {
-    // `all` of any axis; the builder has one of its own.
     const std::size_t equals = word.find('=');
     const auto axis = parse_axis(word.substr(0, equals));
-    if (axis && axis != Axis::builder && axis != Axis::call && equals != std::string::npos &&
-        word.substr(equals + 1) == kAll) {
+    if (axis == Axis::call) throw UserError("command line: verify calls with batches alone and has no call axis");
+    if (axis == Axis::workload || axis == Axis::threads)
+      throw UserError(fmt::format("command line: verify has rays of its own and no {} axis; see --kinds, --threads",
+                                  word.substr(0, equals)));
+    // `all` of any axis; the builder has one of its own.
+    if (axis && axis != Axis::builder && equals != std::string::npos && word.substr(equals + 1) == kAll) {
       experiment.axes[index_of(*axis)] = all_values(*axis, registry, without_brute_force);
       continue;
     }
     AxisWord read = read_axis_word(word, registry, {});
-    if (read.key == "call") throw UserError("command line: verify calls with batches alone and has no call axis");
-    if (read.key == "workload" || read.key == "threads")
-      throw UserError(
-          fmt::format("command line: verify has rays of its own and no {} axis; see --kinds, --threads", read.key));
     experiment.axes[index_of(*parse_axis(read.key))] = std::move(read.values);
   }
   const auto fill = [&](Axis a, std::vector<std::string> values) {

@@ -18,7 +18,8 @@
 // At least 3.5 % are left for E's own five roundings, and 2^-140 is more than all underflows. U, V, W all beyond E on
 // one side: certainly hit; one beyond E, another beyond -E: certainly missed; else exact arithmetic. An overflow of z^,
 // x^, y^ or of a product makes E infinite or NaN, since (L + 7 u Z) (L + Z) is no less than any product, and then
-// nothing is certain. Denormals must not be flushed.
+// nothing is certain. (A NaN x^ comes of an infinite z^ or of a NaN shear alone, so max_abs may drop it.) Denormals
+// must not be flushed.
 //
 // Distances. With z in units of t (times 1 / d_z), t is the mean of the vertices' z with weights U / (U + V + W) >= 0.
 // The weights' errors move it by less than

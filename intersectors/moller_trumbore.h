@@ -93,17 +93,18 @@ struct MollerTrumbore {
   /// Lanes are the W rays from k on, those of `in` against triangle `i` of the block: what intersect() computes, bit
   /// for bit. `again`: rays that must be tested one by one instead; here none.
   template <int W, class Block>
-  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData&, int /*group*/, int k,
-                                               vm<W> in, const Block& block, int i, TriangleHits<W>& hits,
-                                               vm<W>& again) {
+  static ARBORETUM_INLINE unsigned intersect_rays(const PacketRays& rays, const PacketData&, int /*group*/, int k,
+                                                  unsigned in, const Block& block, int i, TriangleHits<W>& hits,
+                                                  unsigned& again) {
     using F = vf<W>;
     const auto load = [k](const float(&p)[3][PacketRays::kMost]) {
       return vf3<W>{F::load(p[0] + k), F::load(p[1] + k), F::load(p[2] + k)};
     };
-    again = vm<W>(false);
+    again = 0;
     return in & core<F>(
                     load(rays.origin), load(rays.direction), block,
-                    [i](const float(&p)[Block::kWidth]) { return F(p[i]); }, hits);
+                    [i](const float(&p)[Block::kWidth]) { return F(p[i]); }, hits)
+                    .bits();
   }
 
  private:

@@ -27,6 +27,15 @@ enum class Conditioning : unsigned char {
 /// A component of N is off by at most 4 * 2^-53 of its two products, N.d and N.p by 4 * 2^-53 more, and the products
 /// of three unit vectors that such a determinant sums are at most 1.16 in all: 1.16 * 2^-50.
 inline constexpr double kConditioning = 0x1p-49;
+/// Empty for `none`.
+[[nodiscard]] constexpr std::string_view to_string(Conditioning conditioning) noexcept {
+  switch (conditioning) {
+    case Conditioning::none: return {};
+    case Conditioning::edges: return "edges";
+    case Conditioning::vertices: return "vertices";
+  }
+  return {};
+}
 
 /// Of intersectors without an `exponent`: the exact t is below 2^kTExponent.
 inline constexpr int kTExponent = 127;
@@ -55,9 +64,8 @@ inline constexpr IntersectorPromise kIntersectorPromises[] = {
     {"pluecker_double", "pluecker in double: t to half an ulp, may miss at vertices", Coverage::edges, 0.5,
      Conditioning::vertices, 40, "as pluecker, with t nearly always to the last bit"},
     {"watertight",
-     "Woop, Benthin, Wald 2013: with padded boxes no cracks on closed meshes, the same hits in every structure (rays "
-     "in a "
-     "triangle's plane apart)",
+     "Woop, Benthin, Wald 2013: with padded boxes no cracks on closed meshes, the same hits in every structure (but of "
+     "rays in a triangle's plane)",
      Coverage::closed, 0, Conditioning::none, 40,
      "vertices are rounded once a ray, alike in all triangles; rounding keeps the order"},
     {"watertight_refined", "watertight, and t, u, v of the nearest hit again in double", Coverage::closed, 0.5,
@@ -118,6 +126,11 @@ struct Promise {
 /// `padded` for the tests that promise to lose no hit, `fast` for the others.
 [[nodiscard]] constexpr std::string_view box_called_for(std::string_view intersector) noexcept {
   return promise_of("", intersector, "padded").coverage == Coverage::none ? "fast" : "padded";
+}
+
+/// With padded boxes its hits are the same, bit for bit, in every structure and way of traversal (docs/numerics.md).
+[[nodiscard]] constexpr bool is_structure_independent(std::string_view intersector) noexcept {
+  return promise_of("", intersector, "padded").coverage >= Coverage::closed;
 }
 
 /// In words: "crack-free on closed meshes, coordinates within 2^-40 .. 2^40".

@@ -88,12 +88,12 @@ ARBORETUM_INLINE bool round_in_double(Vec3f origin, Vec3f direction, const Corne
   const double radius = scale * size_1 * size_2 * size_s + __builtin_fabs(t) * (det_error + double_bounds::kRounding);
   const double weight_radius =
       scale * size_d * size_s * (size_1 > size_2 ? size_1 : size_2) + det_error + double_bounds::kRounding;
-  hit.t = float(t - radius);
+  hit.t = float(t - radius) + 0.0f;  // of zeros the one without a sign
   // Comparisons that a NaN makes false.
   if (!(det_error < double_bounds::kMostOfDivisor && weight_radius < double_bounds::kWeight &&
         hit.t == float(t + radius)))
     return false;
-  const __m128 weights = _mm_cvtpd_ps(_mm_min_pd(_mm_max_pd(_mm_setzero_pd(), uv), _mm_set1_pd(1.0)));
+  const __m128 weights = _mm_cvtpd_ps(_mm_min_pd(_mm_max_pd(uv, _mm_setzero_pd()), _mm_set1_pd(1.0)));
   hit.u = _mm_cvtss_f32(weights), hit.v = _mm_cvtss_f32(_mm_movehdup_ps(weights));
   return true;
 }

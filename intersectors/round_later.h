@@ -5,6 +5,7 @@
 
 #include "intersectors/round_in_double.h"
 #include "simd/double.h"
+#include "simd/swizzle.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -45,18 +46,14 @@ class UnroundedHits {
   static ARBORETUM_INLINE D dot(vd3<kLanes> a, vd3<kLanes> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
   static ARBORETUM_INLINE D size_of(vd3<kLanes> a) { return max_x86(max_x86(abs(a.x), abs(a.y)), abs(a.z)); }
 
-#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
-  /// The x of four vectors, their y, their z.
-  struct Transposed {
-    __m128 x, y, z;
-    ARBORETUM_INLINE Transposed(const float* a, const float* b, const float* c, const float* d) {
-      const __m128 p = _mm_loadu_ps(a), q = _mm_loadu_ps(b), r = _mm_loadu_ps(c), s = _mm_loadu_ps(d);
-      const __m128 pq = _mm_unpacklo_ps(p, q), rs = _mm_unpacklo_ps(r, s);
-      x = _mm_movelh_ps(pq, rs), y = _mm_movehl_ps(rs, pq),
-      z = _mm_movelh_ps(_mm_unpackhi_ps(p, q), _mm_unpackhi_ps(r, s));
-    }
-  };
-#endif
+  /// The x of four vectors from number `first` on, their y, their z.
+  template <class At>
+  static ARBORETUM_INLINE vf3<4> four_from(int first, const At& at) {
+    vf<4> row[4] = {vf<4>::load(at(first)), vf<4>::load(at(first + 1)), vf<4>::load(at(first + 2)),
+                    vf<4>::load(at(first + 3))};
+    transpose(row);
+    return {row[0], row[1], row[2]};
+  }
   /// x, y and z of a vector of each ray, in doubles. `at(i)`: where that of ray i lies.
   template <class At>
   static ARBORETUM_INLINE vd3<kLanes> gather(const At& at) {
@@ -64,12 +61,12 @@ class UnroundedHits {
     const __m128 p = _mm_loadu_ps(at(0)), q = _mm_loadu_ps(at(1)), xy = _mm_unpacklo_ps(p, q);
     return {D(_mm_cvtps_pd(xy)), D(_mm_cvtps_pd(_mm_movehl_ps(xy, xy))), D(_mm_cvtps_pd(_mm_unpackhi_ps(p, q)))};
 #else
-    const Transposed first(at(0), at(1), at(2), at(3));
+    const vf3<4> first = four_from(0, at);
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
-    return {D(_mm256_cvtps_pd(first.x)), D(_mm256_cvtps_pd(first.y)), D(_mm256_cvtps_pd(first.z))};
+    return {D(_mm256_cvtps_pd(first.x.v)), D(_mm256_cvtps_pd(first.y.v)), D(_mm256_cvtps_pd(first.z.v))};
 #else
-    const Transposed last(at(4), at(5), at(6), at(7));
-    const auto widened = [](__m128 a, __m128 b) { return D(_mm512_cvtps_pd(_mm256_set_m128(b, a))); };
+    const vf3<4> last = four_from(4, at);
+    const auto widened = [](vf<4> a, vf<4> b) { return D(_mm512_cvtps_pd(_mm256_set_m128(b.v, a.v))); };
     return {widened(first.x, last.x), widened(first.y, last.y), widened(first.z, last.z)};
 #endif
 #endif
@@ -89,10 +86,10 @@ class UnroundedHits {
     const D det_error = scale * size_1 * size_2 * size_d;
     const D radius = scale * size_1 * size_2 * size_s + abs(t) * (det_error + D(double_bounds::kRounding));
     const D weight_radius = scale * size_d * size_s * max_x86(size_1, size_2) + det_error + D(double_bounds::kRounding);
-    const auto weight = [](D w) { return min_x86(max_x86(D(0.0), w), D(1.0)); };
+    const auto weight = [](D w) { return min_x86(max_x86(w, D(0.0)), D(1.0)); };
     float low[kLanes], high[kLanes], u[kLanes], v[kLanes];
-    (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) * inverse).store(u),
-        weight(dot(d, q) * inverse).store(v);
+    (t - radius + D(0.0)).store(low), (t + radius).store(high),  // of zeros the one without a sign
+        weight(dot(s, p) * inverse).store(u), weight(dot(d, q) * inverse).store(v);
     // Comparisons that a NaN makes false.
     const unsigned bounded =
         (det_error < D(double_bounds::kMostOfDivisor)) & (weight_radius < D(double_bounds::kWeight));

@@ -73,19 +73,18 @@ struct Watertight {
   /// Lanes are the W rays from k on, those of `in` against triangle `i` of the block: what intersect() computes, bit
   /// for bit. `again`: rays for which doubles must decide whether they hit, to be tested one by one.
   template <int W, class Block>
-  static ARBORETUM_INLINE vm<W> intersect_rays(const PacketRays& rays, const PacketData& shears, int kz, int k,
-                                               vm<W> in, const Block& block, int i, TriangleHits<W>& hits,
-                                               vm<W>& again) {
+  static ARBORETUM_INLINE unsigned intersect_rays(const PacketRays& rays, const PacketData& shears, int kz, int k,
+                                                  unsigned in, const Block& block, int i, TriangleHits<W>& hits,
+                                                  unsigned& again) {
     using F = vf<W>;
     const Edges<W> e(shears.template sheared<W>(rays, kz, k, block, i));
-    const vm<W> inside = in & e.inside();
-    again = vm<W>(false);
-    if (none(inside)) return inside;
-    const vm<W> open = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits);
-    if (__builtin_expect(any(open), 0)) {
-      again = open & e.ties();
-      const unsigned far_off = (open & ~again).bits();
-      hits.t = plane_distances_of_rays(far_off, rays, kz, k, block, i, hits.t);
+    const unsigned inside = in & e.inside().bits();
+    again = 0;
+    if (inside == 0) return 0;
+    const unsigned open = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits).bits();
+    if (__builtin_expect(open != 0, 0)) {
+      again = open & e.ties().bits();
+      if (const unsigned close = open & ~again) hits.t = plane_distances_of_rays(close, rays, kz, k, block, i, hits.t);
     }
     return inside & ~again;
   }

@@ -152,6 +152,20 @@ RandomSubject random_subject(std::uint64_t seed, std::uint64_t index, std::size_
   return with_rays(moved_and_scaled(mesh, offset, exponent), seed, index, rays);
 }
 
+namespace {
+
+/// x next to itself, times about 1, negated or nothing.
+float mutated(float x, Dice& dice) {
+  switch (dice.below(4)) {
+    case 0: return std::nextafter(x, dice.below(2) ? kInf : -kInf);
+    case 1: return -x;
+    case 2: return x * (1 + dice.exponential(-22, -1));
+    default: return dice.below(2) ? 0.0f : -0.0f;
+  }
+}
+
+}  // namespace
+
 RandomSubject mutated_subject(const TriangleMesh& given, const Ray& given_ray, std::uint64_t seed, std::uint64_t index,
                               std::size_t rays) {
   Dice dice(seed, index);
@@ -177,12 +191,9 @@ RandomSubject mutated_subject(const TriangleMesh& given, const Ray& given_ray, s
   for (std::size_t n = 1 + dice.below(4); n > 0; --n) {
     float& x = any_float();
     switch (dice.below(6)) {
-      case 0: change(x, std::nextafter(x, dice.below(2) ? kInf : -kInf)); break;
-      case 1: change(x, x * (1 + dice.exponential(-22, -1))); break;
-      case 2: change(x, -x); break;
-      case 3: change(x, any_float()); break;
-      case 4: change(x, dice.below(2) ? 0.0f : -0.0f); break;
-      default: change(x, x + dice.exponential(-20, 1)); break;
+      case 0: change(x, any_float()); break;
+      case 1: change(x, x + dice.exponential(-20, 1)); break;
+      default: change(x, mutated(x, dice)); break;
     }
   }
   for (Vec3f& v : mesh.vertices)
@@ -210,12 +221,7 @@ std::vector<Ray> in_company(const Ray& ray, std::uint64_t seed, std::size_t coun
     Ray& other = rays[i];
     for (std::size_t n = 1 + dice.below(3); n > 0; --n) {
       float& x = (dice.below(3) ? other.direction : other.origin)[dice.below(3)];
-      switch (dice.below(4)) {
-        case 0: x = std::nextafter(x, dice.below(2) ? kInf : -kInf); break;
-        case 1: x = -x; break;
-        case 2: x *= 1 + dice.exponential(-22, -1); break;
-        default: x = dice.below(2) ? 0.0f : -0.0f; break;
-      }
+      x = mutated(x, dice);
     }
     if (dice.below(4) != 0) continue;
     constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();

@@ -96,6 +96,7 @@ class StructureVisitor {
 struct StructureInfo {
   std::string_view name;
   std::string_view summary;                ///< one line for `list`
+  std::string_view library = {};           ///< whose it is, with the version, where it is not ours
   std::vector<std::string_view> builders;  ///< the first is the default
   std::vector<std::string_view> leaves;
   bool build_depends_on_isa = false;      ///< built anew for each ISA (embree: the device is set to it)

@@ -1,6 +1,7 @@
 #include "traversal/kernel_keys.h"
 
 #include <algorithm>
+#include <charconv>
 
 #include "intersectors/promises.h"
 
@@ -28,12 +29,22 @@ std::string resolve_traversal(std::string_view traversal, Isa isa) {
   return std::string(traversal) + std::to_string(native_width(isa));
 }
 
+unsigned packet_width(std::string_view traversal) noexcept {
+  unsigned rays = 0;
+  for (std::string_view family : {"packet", "hybrid"}) {
+    if (!traversal.starts_with(family)) continue;
+    traversal.remove_prefix(family.size());
+    std::from_chars(traversal.data(), traversal.data() + traversal.size(), rays);
+    break;
+  }
+  return rays;
+}
+
 std::string why_no_threshold(std::string_view traversal, unsigned hybrid_threshold) {
-  constexpr std::string_view hybrid = "hybrid";
-  if (hybrid_threshold == TraversalSettings::kOwn || !traversal.starts_with(hybrid)) return {};
-  const std::string rays(traversal.substr(hybrid.size()));
-  if (hybrid_threshold <= std::stoul(rays)) return {};
-  return std::string(traversal) + " has packets of " + rays + " rays: no threshold of " +
+  if (hybrid_threshold == TraversalSettings::kOwn || !traversal.starts_with("hybrid")) return {};
+  const unsigned rays = packet_width(traversal);
+  if (hybrid_threshold <= rays) return {};
+  return std::string(traversal) + " has packets of " + std::to_string(rays) + " rays: no threshold of " +
          std::to_string(hybrid_threshold);
 }
 

@@ -25,6 +25,8 @@ inline constexpr std::string_view kAuto = "auto";
 /// `packet` and `hybrid` stand for the width of the ISA's own registers: packet8 on avx2. Others as they are, `auto`
 /// too: a way of its own.
 [[nodiscard]] std::string resolve_traversal(std::string_view traversal, Isa isa);
+/// Rays of a packet of the way of traversal: 8 of packet8, hybrid8, packet8_coherent; 0 where it has none.
+[[nodiscard]] unsigned packet_width(std::string_view traversal) noexcept;
 /// One line: why the way of traversal, a key of the kernel table, has no such threshold ("hybrid4 has packets of 4
 /// rays: no threshold of 8"). Empty where it has, for kOwn, and where the way reads none.
 [[nodiscard]] std::string why_no_threshold(std::string_view traversal, unsigned hybrid_threshold);

@@ -281,12 +281,12 @@ class PacketLeaves {
   ARBORETUM_INLINE void intersect(const Block& block, int triangle, int group, int k, unsigned in, Mask& again) {
     const auto id = std::int32_t(block.id[triangle]);
     TriangleHits<W> hits;
-    vm<W> redo;
-    const vm<W> inside = Leaves::Intersector::template intersect_rays<W>(
-        lanes_.rays, packet_, group, k, vm<W>::from_bits(in), block, triangle, hits, redo);
-    again |= Mask(redo.bits()) << k;
-    if (none(inside)) return;
-    unsigned hit = (inside & (hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
+    unsigned redo;
+    const unsigned inside = Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, in, block,
+                                                                            triangle, hits, redo);
+    again |= Mask(redo) << k;
+    if (inside == 0) return;
+    unsigned hit = inside & ((hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
     if (hit == 0) return;
     alignas(64) float t[W], u[W], v[W], denominator[W];
     hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);

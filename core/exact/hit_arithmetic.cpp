@@ -78,7 +78,8 @@ inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
           high(uv), scale * size_d * size_s * std::max(size_1, size_2) + det_error + double_bounds::kRounding};
 }
 
-float weight(double w) { return static_cast<float>(std::clamp(w, 0.0, 1.0)); }
+/// Of zeros the one without a sign.
+float weight(double w) { return w > 0.0 ? static_cast<float>(std::min(w, 1.0)) : 0.0f; }
 
 }  // namespace
 
@@ -99,7 +100,7 @@ int compare_distances_exactly(const Ray& ray, const Corners& first, const Corner
 
 RoundedHit round_exactly(const Ray& ray, const Corners& corners) noexcept {
   const DoublePoint p = point_in_double(ray, corners);
-  const float t = static_cast<float>(p.t - p.radius);
+  const float t = static_cast<float>(p.t - p.radius) + 0.0f;  // of zeros the one without a sign
   if (t == static_cast<float>(p.t + p.radius) && p.weight_radius < double_bounds::kWeight)
     return {t, weight(p.u), weight(p.v)};
   const RoundedPoint exact = ExactPredicate(ray).round(corners);

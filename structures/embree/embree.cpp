@@ -43,6 +43,7 @@ const StructureInfo& EmbreeAccel::static_info() {
   static const StructureInfo info{
       .name = kName,
       .summary = "Intel Embree " RTC_VERSION_STRING ": its own builders and kernels, beside ours",
+      .library = "Intel Embree " RTC_VERSION_STRING,
       .builders = {"medium", "low", "high"},
       .leaves = {std::begin(kLeaves), std::end(kLeaves)},
       .build_depends_on_isa = true,

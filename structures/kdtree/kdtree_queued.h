@@ -53,20 +53,11 @@ class KdQueuedWalk {
   ARBORETUM_INLINE Target node(State& s, Target node) const {
     Entry* top = s.top - 1;
     const float begin = top->begin, limit = top->end, end = limit < s.best.t ? limit : s.best.t;
-    const unsigned axis = std::uint32_t(node >> 32) & 3u;
-    const float plane = __builtin_bit_cast(float, std::uint32_t(node));
-    const std::byte* pair = place_of(node);
-    const std::uint32_t far_offset = s.planes.far[axis];
-    std::uint64_t near, far;
-    std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
-    const float leave = s.planes.leaving(plane, axis), enter = s.planes.entering(plane, axis);
-    const Entry near_part{near, begin, leave < end ? leave : end}, far_part{far, enter > begin ? enter : begin, end};
-    const bool in_near = !((leave < begin) | (near == kdtree::kEmptyCell)),
-               in_far = !((enter > end) | (far == kdtree::kEmptyCell));
-    *top = AnyHit ? near_part : far_part;
-    top += AnyHit ? in_near : in_far;
-    *top = AnyHit ? far_part : near_part;
-    top += AnyHit ? in_far : in_near;
+    const KdSides sides = sides_of<AnyHit>(node, place_of(node), s.planes, begin, end);
+    *top = sides.later;
+    top += sides.in_later;
+    *top = sides.next;
+    top += sides.in_next;
     s.top = top;
     return top[-1].node;
   }

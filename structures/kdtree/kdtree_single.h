@@ -102,6 +102,28 @@ struct KdRay {
   ARBORETUM_INLINE float leaving(float plane, unsigned axis) const { return fused(plane, r[axis], leave[axis]); }
 };
 
+/// The two sides of a plane, of a cell that the ray is in within [begin, end]: the one that is visited first, the one
+/// that waits, and whether the ray meets them.
+struct KdSides {
+  KdStackEntry next, later;
+  bool in_next, in_later;
+};
+/// Those of the inner node with the bits `node`, whose children lie at `pair`. Both are loaded while t is computed.
+template <bool AnyHit>
+ARBORETUM_INLINE KdSides sides_of(std::uint64_t node, const std::byte* pair, const KdRay& planes, float begin,
+                                  float end) {
+  const unsigned axis = std::uint32_t(node >> 32) & 3u;
+  const float plane = __builtin_bit_cast(float, std::uint32_t(node));
+  const std::uint32_t far_offset = planes.far[axis];
+  std::uint64_t near, far;
+  std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
+  const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
+  const bool in_near = !((leave < begin) | (near == kdtree::kEmptyCell)),
+             in_far = !((enter > end) | (far == kdtree::kEmptyCell));
+  const KdStackEntry front{near, begin, leave < end ? leave : end}, back{far, enter > begin ? enter : begin, end};
+  return AnyHit ? KdSides{back, front, in_far, in_near} : KdSides{front, back, in_near, in_far};
+}
+
 /// One ray from `node` on, within [begin, end] of it; what `leaves` keep for it is `data`. Returns whether an any hit
 /// was found; a closest hit updates `best`. `depth`: of the node, where it is counted.
 template <bool AnyHit, class Leaves, class Counting>
@@ -117,40 +139,22 @@ ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t n
       const auto link = std::uint32_t(node >> 32);
       const unsigned axis = link & 3u;
       if (axis == 3) break;
-      const float plane = __builtin_bit_cast(float, std::uint32_t(node));
-      const std::byte* pair = base + std::size_t(link & ~3u) * 4;
-      const std::uint32_t far_offset = planes.far[axis];
-      std::uint64_t near, far;
-      std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
-      const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
-      const bool skip_near = (leave < begin) | (near == kdtree::kEmptyCell),
-                 skip_far = (enter > end) | (far == kdtree::kEmptyCell);
+      const KdSides sides = sides_of<AnyHit>(node, base + std::size_t(link & ~3u) * 4, planes, begin, end);
       // A plane decides about two cells; a lane each.
-      counting.node(2, 2, 2u - skip_near - skip_far);
+      counting.node(2, 2, unsigned(sides.in_next) + unsigned(sides.in_later));
       counting.at_depth(depths.current(), 2, 2);
       if constexpr (Counting::kCounting) {
-        if (!skip_near && !skip_far) depths.push(top - stack, top - stack + 1);
+        if (sides.in_next && sides.in_later) depths.push(top - stack, top - stack + 1);
       }
       depths.descend();
-      const float far_begin = enter > begin ? enter : begin, near_end = leave < end ? leave : end;
-      if constexpr (AnyHit) {
-        if (skip_far) {
-          if (skip_near) goto pop;
-          node = near, end = near_end;
-        } else {
-          top->node = near, top->begin = begin, top->end = near_end;
-          top += !skip_near;
-          node = far, begin = far_begin;
-        }
+      const auto take = [&](const KdStackEntry& side) { node = side.node, begin = side.begin, end = side.end; };
+      if (sides.in_next) {
+        *top = sides.later;
+        top += sides.in_later;
+        take(sides.next);
       } else {
-        if (skip_near) {
-          if (skip_far) goto pop;
-          node = far, begin = far_begin;
-        } else {
-          top->node = far, top->begin = far_begin, top->end = end;
-          top += !skip_far;
-          node = near, end = near_end;
-        }
+        if (!sides.in_later) goto pop;
+        take(sides.later);
       }
     }
     if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf

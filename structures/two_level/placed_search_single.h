@@ -110,8 +110,10 @@ bool search_placed(const grid::Grid& grid, const PlacedRay& ray, const PlacedLea
 template <bool AnyHit, bool, class Counting>
 bool search_placed(const brute_force::BruteForce& all, const PlacedRay& ray, const PlacedLeaves& leaves,
                    NearestHit& best, const Counting& counting) {
+  if constexpr (AnyHit)
+    return any_hit_in_leaf(leaves, leaves.prepare(ray), leaves.form(), counting, all.base(), all.block_count(),
+                           ray.tnear, ray.tfar);
   counting.leaf(leaves.form(), all.base(), all.block_count());
-  if constexpr (AnyHit) return leaves.any_hit(leaves.prepare(ray), all.base(), all.block_count(), ray.tnear, ray.tfar);
   leaves.closest_hit(leaves.prepare(ray), all.base(), all.block_count(), ray.tnear, best);
   return false;
 }

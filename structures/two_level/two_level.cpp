@@ -10,6 +10,7 @@
 
 #include "core/coordinates.h"
 #include "core/error.h"
+#include "core/rounding.h"
 #include "core/zero_area.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
@@ -44,10 +45,9 @@ bool is_searchable(std::string_view below) {
   return found;
 }
 
-/// Bounds of the box's image, computed in double and rounded outwards, which may take them beyond float; of an identity
-/// the box itself.
+/// Bounds of the box's image, computed in double and rounded outwards.
 Bounds3f image(const AffineMap& map, const Bounds3f& box) {
-  if (box.empty() || is_identity(map)) return box;
+  if (box.empty()) return box;
   Bounds3f result;
   for (int row = 0; row < 3; ++row) {
     double low = map.m[row][3], high = low;
@@ -56,8 +56,7 @@ Bounds3f image(const AffineMap& map, const Bounds3f& box) {
                    b = map.m[row][column] * box.upper[std::size_t(column)];
       low += std::min(a, b), high += std::max(a, b);
     }
-    result.lower[std::size_t(row)] = std::nextafter(float(low), -Bounds3f::kInfinity);
-    result.upper[std::size_t(row)] = std::nextafter(float(high), Bounds3f::kInfinity);
+    result.lower[std::size_t(row)] = rounded_down(low), result.upper[std::size_t(row)] = rounded_up(high);
   }
   return result;
 }
@@ -97,6 +96,7 @@ struct PrototypeFacts {
   std::vector<std::uint32_t> vertices;  ///< those that triangles name
   std::vector<bool> has_no_area;        ///< of its triangles
 
+  PrototypeFacts() = default;
   explicit PrototypeFacts(const TriangleMesh& mesh) : bounds(mesh.bounds()), has_no_area(mesh.size()) {
     std::vector<bool> named(mesh.vertices.size());
     for (std::size_t i = 0; i < mesh.size(); ++i) {
@@ -136,8 +136,6 @@ Bounds3f compare_with_flat(const TriangleMesh& object, const PrototypeFacts& fac
   }
   return box;
 }
-
-float rounded_up(double x) { return std::nextafter(float(x), Bounds3f::kInfinity); }
 
 /// Placed::pad and pad_per_distance, as two_level_kernels.h derives them; `size`: the prototype's largest |coordinate|.
 /// Infinite, so that every box is met, for a map that is as good as singular.
@@ -186,7 +184,7 @@ class BoxMesh {
 /// Hands on what a structure below shows, as part of the whole tree.
 class BelowVisitor final : public StructureVisitor {
  public:
-  BelowVisitor(StructureVisitor& to, const AffineMap* to_world, std::uint32_t first_primitive, unsigned depth,
+  BelowVisitor(StructureVisitor& to, const AffineMap& to_world, std::uint32_t first_primitive, unsigned depth,
                bool counts_bytes)
       : to_(to), to_world_(to_world), first_primitive_(first_primitive), depth_(depth), counts_bytes_(counts_bytes) {}
 
@@ -203,10 +201,10 @@ class BelowVisitor final : public StructureVisitor {
   }
 
  private:
-  [[nodiscard]] Bounds3f in_world(const Bounds3f& box) const { return to_world_ ? image(*to_world_, box) : box; }
+  [[nodiscard]] Bounds3f in_world(const Bounds3f& box) const { return image(to_world_, box); }
 
   StructureVisitor& to_;
-  const AffineMap* to_world_;
+  const AffineMap& to_world_;
   std::uint32_t first_primitive_;
   unsigned depth_;
   bool counts_bytes_;
@@ -300,16 +298,21 @@ const TriangleMesh& TwoLevel::prototype(std::size_t i) const {
 
 template <class SetBox>
 void TwoLevel::place(const SetBox& set_box) {
-  std::vector<PrototypeFacts> facts;
-  for (std::size_t i = 0; i < prototypes_.size(); ++i) facts.emplace_back(prototype(i));
   const std::vector<const Instance*> instances = instances_of(*mesh_);
+  placed_.resize(instances.size());
+  if (!mesh_->instancing) {
+    if (placed_.empty()) return;
+    placed_[0].to_world = &instances[0]->to_world, placed_[0].below = prototypes_[0].get();
+    return set_box(0, mesh_->bounds());
+  }
+  std::vector<PrototypeFacts> facts(prototypes_.size());
+  tbb::parallel_for(std::size_t{0}, facts.size(), [&](std::size_t i) { facts[i] = PrototypeFacts(prototype(i)); });
   for (const Instance* instance : instances) {
     const Bounds3f box = image(instance->to_world, facts[instance->prototype].bounds);
     if (is_finite(box.lower) && is_finite(box.upper)) continue;
     throw UserError("two_level: the image of a prototype's box, of the instance that begins at triangle " +
                     std::to_string(instance->first_primitive) + ", is beyond float; give its map smaller numbers");
   }
-  placed_.resize(instances.size());
   tbb::parallel_for(std::size_t{0}, instances.size(), [&](std::size_t i) {
     const Instance& instance = *instances[i];
     Placed placed;
@@ -348,8 +351,7 @@ bool TwoLevel::visit(StructureVisitor& visitor) const {
   bool seen = true;
   const auto show = [&](std::uint32_t index, unsigned depth) {
     const Placed& p = placed_[index];
-    BelowVisitor below(visitor, p.identity ? nullptr : p.to_world, p.first_primitive, depth,
-                       shown.insert(p.below).second);
+    BelowVisitor below(visitor, *p.to_world, p.first_primitive, depth, shown.insert(p.below).second);
     seen = p.below->visit(below) && seen;
   };
   TopVisitor top(visitor, show);

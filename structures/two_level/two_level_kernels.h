@@ -52,14 +52,13 @@ template <class, bool Padded, class Counting>
 class TwoLevelKernel {
  public:
   TwoLevelKernel(const Accel& accel, const KernelRow& row, Counting counting)
-      : accel_(static_cast<const two_level::TwoLevel&>(accel)), row_(row_below(accel_, row)), counting_(counting),
-        stack_(accel_.top().stack_entries()), leaves_(*row_.tests, accel_.mesh()),
+      : accel_(static_cast<const two_level::TwoLevel&>(accel)), counting_(counting),
+        stack_(accel_.top().stack_entries()), leaves_(*row_below(accel_, row).tests, accel_.mesh()),
         closest_(find_search<false, Padded, Counting>(accel_.below())),
         any_(find_search<true, Padded, Counting>(accel_.below())) {}
 
   template <bool AnyHit>
   bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
-    if (!accel_.mesh().instancing) return !accel_.placed().empty() && trace_below<AnyHit>(ray, best);
     const bvh::Bvh4& top = accel_.top();
     SoaNodeTest<4, true> nodes(ray, top.max_coordinate());
     leaves_.begin(ray);
@@ -78,42 +77,43 @@ class TwoLevelKernel {
   }
 
  private:
-  /// A scene without instances is the structure below. The batch counts its rays; those that go below are not rays
-  /// more.
-  template <bool AnyHit>
-  bool trace_below(const Ray& ray, NearestHit& best) {
-    const Accel& below = *accel_.placed()[0].below;
-    Hit hit;
-    std::uint8_t occluded = 0;
-    Counters* counters = nullptr;
-    std::uint64_t rays = 0;
-    if constexpr (Counting::kCounting) counters = &counting_.counters, rays = counters->rays;
-    if constexpr (AnyHit)
-      row_.any_hit(below, RayBatch(&ray, 1), {&occluded, 1}, counters);
-    else
-      row_.closest_hit(below, RayBatch(&ray, 1), {&hit, 1}, counters);
-    if constexpr (Counting::kCounting) counters->rays = rays;
-    if (hit.is_hit()) best = {hit.t, hit.u, hit.v, std::int32_t(hit.primitive)};
-    return AnyHit ? occluded != 0 : hit.is_hit();
-  }
-
   const two_level::TwoLevel& accel_;
-  const KernelRow& row_;
   Counting counting_;
   TraversalStack stack_;
   PlacedLeaves leaves_;
   PlacedSearch<Counting> closest_, any_;
 };
 
-/// One set of functions for all rows. Which rows the structure below has is asked when a cell is planned.
+/// Which rows the structure below has is asked when a cell is planned. A scene without instances is the structure
+/// below: it gets the batch as it is.
 struct TwoLevelFunctions {
+  template <class Counting, bool Padded>
+  struct Rays : SingleRays<TwoLevelKernel<CalledLeaves, Padded, Counting>, Counting> {
+    using Base = SingleRays<TwoLevelKernel<CalledLeaves, Padded, Counting>, Counting>;
+    static const Accel* only(const Accel& accel) {
+      const auto& two = static_cast<const two_level::TwoLevel&>(accel);
+      return two.mesh().instancing || two.placed().empty() ? nullptr : two.placed()[0].below;
+    }
+    static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits,
+                            Counters* counters) {
+      if (const Accel* below = only(accel))
+        return row_below(static_cast<const two_level::TwoLevel&>(accel), row).closest_hit(*below, rays, hits, counters);
+      Base::closest_hit(accel, row, rays, hits, counters);
+    }
+    static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded,
+                        Counters* counters) {
+      if (const Accel* below = only(accel))
+        return row_below(static_cast<const two_level::TwoLevel&>(accel), row).any_hit(*below, rays, occluded, counters);
+      Base::any_hit(accel, row, rays, occluded, counters);
+    }
+  };
   template <class, bool Padded>
   static RowFunctions timed() {
-    return SingleRayFunctions<TwoLevelKernel>::timed<CalledLeaves, Padded>();
+    return {&Rays<NoCounters, Padded>::closest_hit, &Rays<NoCounters, Padded>::any_hit};
   }
   template <bool Padded>
   static RowFunctions counting() {
-    return SingleRayFunctions<TwoLevelKernel>::counting<Padded>();
+    return {&Rays<WithCounters, Padded>::closest_hit, &Rays<WithCounters, Padded>::any_hit};
   }
 };
 
