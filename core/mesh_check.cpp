@@ -101,6 +101,12 @@ void check_triangles(const TriangleMesh& mesh, Largest largest) {
   check_triangles_of(mesh, "", largest);
 }
 
+void check_one_moment(const TriangleMesh& mesh, std::string_view structure) {
+  if (!mesh.moves()) return;
+  throw UserError(std::string(structure) + " holds one moment, and the mesh has " + number(mesh.frames()) +
+                  " key frames: take bvh4_motion, or pose(mesh, time)");
+}
+
 void check_instances(const TriangleMesh& mesh, Largest largest) {
   if (!mesh.instancing) return;
   const Instancing& instancing = *mesh.instancing;

@@ -1,5 +1,7 @@
 #include "library/arboretum.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,7 +12,9 @@
 
 #include "core/mesh_check.h"
 #include "core/names.h"
+#include "structures/build_threads.h"
 #include "structures/parameter_limits.h"
+#include "structures/structure_file.h"
 #include "traversal/kernel_keys.h"
 
 namespace arboretum {
@@ -102,7 +106,7 @@ TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle
   return mesh;
 }
 
-Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
+Tracer::Tracer(TriangleMesh mesh, TracerSettings settings, NotBuiltYet)
     : mesh_(std::make_unique<const TriangleMesh>(std::move(mesh))), settings_(std::move(settings)) {
   check_triangles(*mesh_);
   check_instances(*mesh_);
@@ -124,12 +128,35 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
   const std::string together = batch_->traversal.starts_with("hybrid") ? "hybrid" : "packet";
   for (std::size_t i = 0; i < kPacketSizes.size(); ++i)
     packet_[i] = row_or_batch(together + std::to_string(kPacketSizes[i]));
+}
 
-  BuildSettings build;
-  build.builder = settings_.builder, build.leaf = settings_.leaf, build.isa = batch_->isa,
-  build.threads = settings_.threads;
-  build.parameters = settings_.parameters;
-  accel_ = build_structure(settings_.structure, *mesh_, build, report_);
+BuildSettings Tracer::build_settings() const {
+  return {.builder = settings_.builder,
+          .leaf = settings_.leaf,
+          .isa = batch_->isa,
+          .threads = settings_.threads,
+          .parameters = settings_.parameters};
+}
+
+Tracer::Tracer(TriangleMesh mesh, TracerSettings settings)
+    : Tracer(std::move(mesh), std::move(settings), NotBuiltYet{}) {
+  accel_ = build_structure(settings_.structure, *mesh_, build_settings(), report_);
+}
+
+Tracer Tracer::load(TriangleMesh mesh, const std::filesystem::path& file, TracerSettings settings) {
+  Tracer tracer(std::move(mesh), std::move(settings), NotBuiltYet{});
+  check_parameters(tracer.settings_.parameters);
+  tracer.accel_ = load_structure(tracer.settings_.structure, *tracer.mesh_, tracer.build_settings(), file);
+  return tracer;
+}
+
+void Tracer::save(const std::filesystem::path& file) const { save_structure(*accel_, *mesh_, build_settings(), file); }
+
+void Tracer::refit(TriangleMesh mesh) {
+  auto moved = std::make_unique<const TriangleMesh>(std::move(mesh));
+  check_instances(*moved);
+  tbb::task_arena(int(allowed_threads(settings_.threads)), 1).execute([&] { accel_->refit(*moved); });
+  mesh_ = std::move(moved);
 }
 
 void Tracer::check(const RayBatch& rays, std::size_t answers) const {

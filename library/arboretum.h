@@ -11,6 +11,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -61,6 +62,21 @@ class Tracer {
   /// float. An empty mesh is none of these: every ray misses it. Nor is an instance without triangles, which takes no
   /// part.
   explicit Tracer(TriangleMesh mesh, TracerSettings settings = {});
+
+  /// As built from `mesh` with `settings`, but the structure comes from a file that save() wrote. Throws UserError as
+  /// the constructor does, and where the file is missing, none of ours, of another version, truncated, damaged, or
+  /// holds another structure, builder, leaf, parameters or mesh (structures/structure_file.h). Leaves follow from the
+  /// instruction set where they are left to it: name one for a file that goes to other machines.
+  [[nodiscard]] static Tracer load(TriangleMesh mesh, const std::filesystem::path& file, TracerSettings settings = {});
+  /// Writes the structure, not the mesh: whole, or not at all. Throws UserError where the file cannot be written, and
+  /// for structures that cannot be saved (`embree`).
+  void save(const std::filesystem::path& file) const;
+  /// Fits the structure to the same triangles with moved vertices, in `settings().threads` threads: quicker than a
+  /// build, and the further the vertices moved the worse to trace. Answers are those of a structure built anew wherever
+  /// those do not depend on the structure (docs/numerics.md). Not for `kdtree`, `grid`, `octree`, `bih`, `two_level`,
+  /// `bvh4_motion` and `embree`. Throws UserError for these, for another number of triangles, for key frames, and for
+  /// what the constructor refuses; the tracer is then as it was. No other call may run meanwhile.
+  void refit(TriangleMesh mesh);
 
   /// The nearest hit within the closed interval [tnear, tfar], t in units of the direction's length. A miss has t =
   /// infinity. The caller sees to 0 <= tnear, which nothing checks: behind a ray's origin some structures look and
@@ -116,7 +132,7 @@ class Tracer {
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
   /// The structure itself: its bytes, and its nodes and leaves by visit().
   [[nodiscard]] const Accel& structure() const noexcept { return *accel_; }
-  /// Seconds, peak memory and phases of the build.
+  /// Seconds, peak memory and phases of the build; all zero where the structure was loaded.
   [[nodiscard]] const BuildReport& report() const noexcept { return report_; }
   /// The settings with every key filled in that was left to the others.
   [[nodiscard]] const TracerSettings& settings() const noexcept { return settings_; }
@@ -132,6 +148,11 @@ class Tracer {
  private:
   static constexpr std::array<std::size_t, 5> kPacketSizes{4, 8, 16, 32, 64};
 
+  enum class NotBuiltYet {};
+  /// All but the structure.
+  Tracer(TriangleMesh mesh, TracerSettings settings, NotBuiltYet);
+  [[nodiscard]] BuildSettings build_settings() const;
+
   /// The packet with rays in place of those switched off that every kernel leaves out (is_valid() of core/ray.h).
   template <std::size_t N>
   [[nodiscard]] static std::array<Ray, N> only(const std::array<Ray, N>& packet, std::uint64_t active) noexcept {
@@ -145,7 +166,7 @@ class Tracer {
   std::unique_ptr<const TriangleMesh> mesh_;  ///< on the heap: the structure points at it
   TracerSettings settings_;
   BuildReport report_;
-  std::unique_ptr<const Accel> accel_;
+  std::unique_ptr<Accel> accel_;
   const KernelRow* one_ = nullptr;
   const KernelRow* batch_ = nullptr;
   std::array<const KernelRow*, kPacketSizes.size()> packet_{};

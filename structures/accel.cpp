@@ -1,6 +1,5 @@
 #include "structures/accel.h"
 
-#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include "core/mesh_check.h"
 #include "core/names.h"
 #include "core/timer.h"
+#include "structures/build_threads.h"
 #include "structures/parameter_limits.h"
 #include "structures/registry.h"
 
@@ -72,18 +72,13 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
 
   check_parameters(settings.parameters);
   check_triangles(mesh, Largest::finite);
-  if (mesh.moves() && !entry->info.holds_motion) {
-    throw UserError(std::string(name) + " holds one moment, and the mesh has " + std::to_string(mesh.frames()) +
-                    " key frames: take bvh4_motion, or pose(mesh, time)");
-  }
+  if (!entry->info.holds_motion) check_one_moment(mesh, name);
   if (entry->info.takes_below) check_instances(mesh, Largest::finite);
 
   std::unique_ptr<Accel> accel = entry->create();
   report = {};
-  // More than TBB may use would be a line of its own on stderr, in whatever program, and far more a crash.
-  const auto most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
   BuildSettings allowed = settings;
-  allowed.threads = unsigned(std::clamp<std::size_t>(settings.threads, 1, most));
+  allowed.threads = allowed_threads(settings.threads);
   tbb::task_arena arena(int(allowed.threads), 1);
   MemoryMeter::reset_peak();
   const std::size_t before = MemoryMeter::current();

@@ -1,33 +1,14 @@
-// What tests of plans and results share: a folder of their own, and structures and kernels that exist on paper alone.
+// What tests of plans and results share: structures and kernels that exist on paper alone.
 #pragma once
 
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "core/error.h"
 #include "experiments/plan.h"
+#include "tests/error_of.h"
+#include "tests/folder.h"
 
 namespace arboretum::test {
-
-namespace fs = std::filesystem;
-
-/// A folder of its own that goes away with the test.
-struct TemporaryFolder {
-  inline static int made = 0;
-  fs::path path =
-      fs::temp_directory_path() / ("arboretum-test-" + std::to_string(::getpid()) + "-" + std::to_string(++made));
-  TemporaryFolder() { fs::remove_all(path), fs::create_directories(path); }
-  ~TemporaryFolder() { fs::remove_all(path); }
-  fs::path write(const std::string& name, const std::string& text) const {
-    std::ofstream(path / name, std::ios::binary) << text;
-    return path / name;
-  }
-};
 
 // Two structures and a handful of kernels that exist on paper alone: what a plan needs.
 inline const StructureEntry kStructures[] = {
@@ -73,15 +54,6 @@ inline Registry paper_registry(std::vector<Isa> isas = {Isa::scalar, Isa::sse, I
     return std::string(structure) + " has no " + std::string(intersector);
   };
   return registry;
-}
-
-inline std::string error_of(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const UserError& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 inline std::vector<std::string> names(const Plan& plan, Cell::Metric metric) {

@@ -1,60 +1,22 @@
-// What the tests of scenes share: a folder of their own, a pyramid in several formats, the one line of an
-// error.
+// What the tests of scenes share: a pyramid in several formats.
 #pragma once
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
-#include "core/error.h"
 #include "scenes/scene.h"
-#include "tests/catch.h"
+#include "tests/error_of.h"
+#include "tests/folder.h"
 
 namespace arboretum::test {
-
-namespace fs = std::filesystem;
-
-/// A folder for one test case's files, removed at its end.
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "arboretum-scenes-XXXXXX").string();
-    REQUIRE(::mkdtemp(name.data()) != nullptr);
-    path_ = name;
-  }
-  ~Folder() { fs::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  fs::path write(const std::string& name, const std::string& bytes) const {
-    std::ofstream(path_ / name, std::ios::binary) << bytes;
-    return path_ / name;
-  }
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 inline Scene load_file(const fs::path& path) {
   SceneSpec spec;
   (path.extension() == ".yaml" ? spec.scene : spec.file) = path;
   return load_scene(spec);
-}
-
-/// The error's line; fails the test where there is none, or it is more than one line.
-inline std::string error_of(const auto& action) {
-  try {
-    action();
-  } catch (const UserError& error) {
-    const std::string line = error.what();
-    CHECK(line.find('\n') == std::string::npos);
-    return line;
-  }
-  FAIL("no UserError");
-  return {};
 }
 
 template <class T>

@@ -72,7 +72,7 @@ TEST_CASE("how many rays a call has follows the call and the width of the way of
 }
 
 TEST_CASE("a plan names a call where it is no batch, has one build for all, and says what cannot be called so") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const auto experiment = [&](const std::string& more) {
     return read_experiment(folder.write("calls.yaml", R"(

@@ -9,10 +9,9 @@
 
 using namespace arboretum;
 using namespace arboretum::test;
-namespace fs = std::filesystem;
 
 TEST_CASE("every fault of a configuration is one line with file, line and the nearest word") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   struct Case {
     const char* yaml;
@@ -104,13 +103,13 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
     CHECK(message.starts_with((file.string() + c.line)));
     CHECK(message.find('\n') == std::string::npos);
   }
-  CHECK(error_of([&] { (void)read_experiment(folder.path / "none.yaml", registry); }).find("no such file") !=
+  CHECK(error_of([&] { (void)read_experiment(folder.path() / "none.yaml", registry); }).find("no such file") !=
         std::string::npos);
-  CHECK(error_of([&] { (void)read_experiment(folder.path, registry); }).find("is a folder") != std::string::npos);
+  CHECK(error_of([&] { (void)read_experiment(folder.path(), registry); }).find("is a folder") != std::string::npos);
 }
 
 TEST_CASE("cells are the product, in names that the contract fixes; auto follows the rest") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("plan.yaml", R"(
 scenes: [{generate: sphere, triangles: 500}]
@@ -135,7 +134,7 @@ axes:
 }
 
 TEST_CASE("scenes may be words, as on the command line") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path model = folder.write("ring.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   folder.write("room.yaml", "models: [{file: ring.obj}]\n");
@@ -145,7 +144,7 @@ TEST_CASE("scenes may be words, as on the command line") {
   const Experiment experiment = read("[ring.obj, room.yaml, sphere:500, 'needles:500:2', sphere]");
   REQUIRE(experiment.scenes.size() == 5);
   CHECK(experiment.scenes[0].spec.file == model);
-  CHECK(experiment.scenes[1].spec.scene == folder.path / "room.yaml");
+  CHECK(experiment.scenes[1].spec.scene == folder.path() / "room.yaml");
   CHECK((experiment.scenes[2].spec.generator == "sphere" && experiment.scenes[2].spec.triangles == 500));
   CHECK(experiment.scenes[3].spec.seed == 2);
   CHECK(experiment.scenes[4].spec.generator == "sphere");
@@ -157,7 +156,7 @@ TEST_CASE("scenes may be words, as on the command line") {
 }
 
 TEST_CASE("what cannot be is skipped with its reason, and an ISA that is lacking is never replaced") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("plan.yaml", R"(
 scenes: [{generate: sphere, triangles: 500}]
@@ -179,7 +178,7 @@ axes:
 }
 
 TEST_CASE("builder all is each that the structure takes, a named one not twice") {
-  TemporaryFolder folder;
+  Folder folder;
   const Registry registry = paper_registry();
   const auto cells = [&](const std::string& axes) {
     const fs::path file = folder.write("all.yaml", "scenes: [{generate: sphere, triangles: 500}]\naxes: {" + axes +
@@ -204,7 +203,7 @@ TEST_CASE("ways of traversal that this machine lacks are known to configurations
 
 TEST_CASE(
     "an optional scene that is not there has its cells skipped with the reason; ARBORETUM_SCENES is where it may be") {
-  TemporaryFolder folder;
+  Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("optional.yaml",
                                      "scenes: [{file: away/far.obj, optional: true}, {generate: sphere, triangles: "
@@ -219,7 +218,7 @@ TEST_CASE(
   CHECK(plan.cells.size() == 2);
   CHECK(effective_yaml(read_experiment(file, registry)).find("{file: away/far.obj, optional: true}") !=
         std::string::npos);
-  const fs::path scenes = folder.path / "scenes";
+  const fs::path scenes = folder.path() / "scenes";
   ::setenv("ARBORETUM_SCENES", scenes.c_str(), 1);
   CHECK(plan_now().skipped.at(0).reason ==
         "optional scene away/far.obj is not here: ARBORETUM_SCENES is " + scenes.string());
@@ -231,7 +230,7 @@ TEST_CASE(
 }
 
 TEST_CASE("include adds cells with the sweep's values where they apply, exclude takes cells away") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("plan.yaml", R"(
 scenes: [{generate: sphere, triangles: 500}]
@@ -260,7 +259,7 @@ metrics: [trace]
 }
 
 TEST_CASE("an include without a structure is of the sweep's structures that take what it names") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const std::string sweep =
       "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree, list], intersector: moller_trumbore, "
@@ -287,7 +286,7 @@ TEST_CASE("a parameter may take the ends of its limits as they are written") {
 
 TEST_CASE(
     "axes of the command line hold for includes too; what is left without a cell is told, as what exclude takes") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("plan.yaml", R"(scenes: [{generate: sphere, triangles: 500}]
 axes: {structure: [tree], intersector: moller_trumbore, isa: [scalar, sse, avx2]}
@@ -317,7 +316,7 @@ metrics: [trace]
 
 TEST_CASE(
     "ways of leaving a surface are part of the cell where several are swept, of workloads that start on surfaces") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const auto plan_of = [&](const std::string& ways) {
     const fs::path file =
@@ -346,7 +345,7 @@ TEST_CASE(
 }
 
 TEST_CASE("placed scenes: a cell for each place, named by it; a choice may name them all") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("placed.yaml", R"(
 scenes: [{generate: sphere, triangles: 500, size: 100, offset: [1, 1e4]}, {generate: sphere, triangles: 600, stretch: 10}]
@@ -367,7 +366,7 @@ metrics: [trace]
 }
 
 TEST_CASE("swept builder parameters are part of the cell where the builder reads them") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("plan.yaml", R"(
 scenes: [{generate: sphere, triangles: 500}]
@@ -385,7 +384,7 @@ metrics: [trace]
 }
 
 TEST_CASE("a parameter multiplies and names the cells that read it, and no others; one that none reads is refused") {
-  const TemporaryFolder folder;
+  const Folder folder;
   Registry registry = paper_registry();
   using Names = std::vector<std::string_view>;
   registry.parameters_read = [](std::string_view structure, std::string_view builder,
@@ -425,7 +424,7 @@ TEST_CASE("a parameter multiplies and names the cells that read it, and no other
 }
 
 TEST_CASE("the command line lays axes over the file") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("small.yaml", kSmall);
   const auto count = [&](Overrides o) {
@@ -443,7 +442,7 @@ TEST_CASE("the command line lays axes over the file") {
 }
 
 TEST_CASE("filters keep and drop by name; a broken expression is named") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("small.yaml", kSmall);
   Plan plan = make_plan(read_experiment(file, registry, {.axes = {"isa=scalar,sse,avx2"}}), registry);
@@ -455,7 +454,7 @@ TEST_CASE("filters keep and drop by name; a broken expression is named") {
 }
 
 TEST_CASE("the effective configuration can be run again and means the same") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   const fs::path file = folder.write("first.yaml", R"(
 experiment: first
@@ -475,7 +474,7 @@ measure: {min_time: 0.125, memory: 512MiB}
 }
 
 TEST_CASE("the figure of ways to leave a surface is drawn where there are several, whatever the metrics") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const auto drawn = [&](const std::string& ways, const std::string& workload) {
     const std::string yaml = "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [tree], workload: [" +
                              workload + "]}\nmetrics: [trace]\nrays: {self_intersection: [" + ways + "]}\n";

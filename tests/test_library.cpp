@@ -8,6 +8,8 @@
 #include "core/instances.h"
 #include "oracle/oracle.h"
 #include "tests/catch.h"
+#include "tests/error_of.h"
+#include "tests/folder.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
 
@@ -62,13 +64,7 @@ std::vector<Hit> check_three_ways(const Tracer& tracer, const std::vector<Ray>& 
 }
 
 std::string message_of(const TracerSettings& settings, TriangleMesh mesh = sphere(4)) {
-  try {
-    const Tracer tracer(std::move(mesh), settings);
-  } catch (const UserError& e) {
-    CHECK(std::string_view(e.what()).find('\n') == std::string_view::npos);
-    return e.what();
-  }
-  return {};
+  return error_of([&] { const Tracer tracer(std::move(mesh), settings); });
 }
 
 TracerSettings with(std::string TracerSettings::*key, std::string value) {
@@ -218,18 +214,8 @@ TEST_CASE("settings of a batch have the command line's limits") {
     std::vector<std::uint8_t> occluded(3);
     RayBatch batch(rays);
     batch.settings = settings;
-    std::string closest, any;
-    try {
-      tracer.closest_hit(batch, hits);
-    } catch (const UserError& e) {
-      closest = e.what();
-    }
-    try {
-      tracer.any_hit(batch, occluded);
-    } catch (const UserError& e) {
-      any = e.what();
-    }
-    CHECK(closest == any);
+    const std::string closest = error_of([&] { tracer.closest_hit(batch, hits); });
+    CHECK(closest == error_of([&] { tracer.any_hit(batch, occluded); }));
     return closest;
   };
   for (const unsigned rays : {0u, 65u, 100000u}) {
@@ -258,6 +244,55 @@ TEST_CASE("a tracer moves with its mesh") {
   const Hit after = second.closest_hit(ray);
   CHECK(same_bits({&before, 1}, {&after, 1}));
   CHECK(second.mesh().size() == sphere(8).size());
+}
+
+TEST_CASE("a saved tracer answers as the one that was built, and a file says what it does not hold") {
+  const Folder folder;
+  const fs::path file = folder / "sphere.arbotree";
+  TracerSettings settings;
+  settings.builder = "spatial_sah", settings.leaf = "triangle4v";
+  const Tracer built(sphere(40), settings);
+  built.save(file);
+  const Tracer loaded = Tracer::load(sphere(40), file, settings);
+  const std::vector<Ray> rays = test_rays(built.mesh());
+  const std::vector<Hit> hits = check_three_ways(built, rays);
+  CHECK(same_bits(check_three_ways(loaded, rays), hits));
+  CHECK(loaded.structure().bytes() == built.structure().bytes());
+  CHECK(loaded.report().phases.empty());
+  CHECK(loaded.settings().isa == built.settings().isa);
+
+  const auto refused = [&](TriangleMesh mesh, const TracerSettings& other) {
+    return error_of([&] { (void)Tracer::load(std::move(mesh), file, other); });
+  };
+  CHECK_THAT(refused(sphere(41), settings), Catch::Contains("another mesh"));
+  CHECK_THAT(refused(sphere(40), {}), Catch::Contains("holds builder 'spatial_sah', not 'binned_sah'"));
+  TracerSettings beyond = settings;
+  beyond.parameters.bins = 1000;
+  CHECK_THAT(refused(sphere(40), beyond), Catch::Contains("bins: 1000 is not within 4 .. 64"));
+  CHECK_THAT(error_of([&] { built.save(folder / "none" / "sphere.arbotree"); }), Catch::Contains("cannot be written"));
+}
+
+TEST_CASE("a refitted tracer answers as one built over the moved mesh, and refuses what it cannot do as it was") {
+  const TriangleMesh mesh = sphere(40);
+  TriangleMesh moved = mesh;
+  for (Vec3f& v : moved.vertices) v = {1.5f * v.x + 0.3f * v.y, v.y, v.z * (1.0f + 0.2f * v.x)};
+  const std::vector<Ray> rays = test_rays(moved);
+  Tracer tracer(mesh);
+  tracer.refit(moved);
+  const std::vector<Hit> hits = check_three_ways(tracer, rays);
+  CHECK(same_bits(hits, check_three_ways(Tracer(moved), rays)));
+  CHECK(tracer.mesh().vertices == moved.vertices);
+
+  CHECK_THAT(error_of([&] { tracer.refit(sphere(41)); }), Catch::Contains("cannot be refitted to"));
+  TriangleMesh moving = mesh;
+  moving.later_frames.push_back(moved.vertices);
+  CHECK_THAT(error_of([&] { tracer.refit(moving); }), Catch::Contains("holds one moment"));
+  TriangleMesh infinite = mesh;
+  infinite.vertices[0].y = kInfinity;
+  CHECK_THAT(error_of([&] { tracer.refit(infinite); }), Catch::Contains("is not finite"));
+  CHECK(same_bits(hits, check_three_ways(tracer, rays)));
+  Tracer grid(mesh, with(&TracerSettings::structure, "grid"));
+  CHECK(error_of([&] { grid.refit(moved); }) == "grid cannot be refitted; build it anew");
 }
 
 TEST_CASE("an empty mesh is missed, an empty batch is nothing") {

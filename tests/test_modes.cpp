@@ -14,6 +14,8 @@
 #include "experiments/result.h"
 #include "structures/leaves/leaf_form.h"
 #include "tests/catch.h"
+#include "tests/error_of.h"
+#include "tests/folder.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
 
@@ -616,10 +618,8 @@ TEST_CASE("auto on SSE leaves streams for rays in flight where rays share little
 TEST_CASE(
     "settings of a way of traversal: in the plan, in the cell's name and in effective.yaml where they mean something, "
     "refused elsewhere") {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("arboretum-modes-" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
-  const std::filesystem::path file = folder / "modes.yaml";
+  const Folder folder;
+  const fs::path file = folder / "modes.yaml";
   const Registry registry = this_registry();
   const auto experiment = [&](const std::string& axes, const std::string& parameters) {
     std::ofstream(file) << "scenes: [{generate: sphere, triangles: 500}]\naxes: {structure: [bvh8, kdtree], "
@@ -629,12 +629,7 @@ TEST_CASE(
     return read_experiment(file, registry);
   };
   const auto message = [&](const std::string& axes, const std::string& parameters) {
-    try {
-      (void)make_plan(experiment(axes, parameters), registry);
-    } catch (const UserError& error) {
-      return std::string(error.what());
-    }
-    return std::string("no error");
+    return error_of([&] { (void)make_plan(experiment(axes, parameters), registry); });
   };
 
   const Experiment swept =
@@ -673,10 +668,9 @@ TEST_CASE(
         std::string::npos);
   CHECK(message("traversal: [queued8]", "hybrid_treshold: 2").find("did you mean 'hybrid_threshold'") !=
         std::string::npos);
-  CHECK(message("traversal: [hybrid8]", "hybrid_threshold: 8") == "no error");
+  CHECK(message("traversal: [hybrid8]", "hybrid_threshold: 8").empty());
   const Plan wide = make_plan(experiment("traversal: [hybrid4]", "hybrid_threshold: [4, 5]"), registry);
   CHECK(std::ranges::any_of(wide.skipped, [](const SkippedCell& c) {
     return c.reason == "hybrid4 has packets of 4 rays: no threshold of 5";
   }));
-  std::filesystem::remove_all(folder);
 }

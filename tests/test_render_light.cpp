@@ -1,11 +1,11 @@
 // Radiance against what it must be: furnaces, point and area lights, mirrors, glass, holes, motion, a lens.
-#include <filesystem>
-#include <fstream>
+
 #include <numbers>
 
 #include "rendering/bsdf.h"
 #include "rendering/surface_point.h"
 #include "scenes/camera.h"
+#include "tests/folder.h"
 #include "tests/render_scenes.h"
 #include "tests/small_meshes.h"
 
@@ -13,8 +13,6 @@ using namespace arboretum;
 using namespace arboretum::test;
 
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -147,7 +145,6 @@ TEST_CASE("an image around the scene: where its pixels are, and densities that a
 TEST_CASE("a floor under an image: paths and shadow rays against the integral") {
   const RadianceImage image = sky_image();
   const Environment sky(image);
-  const fs::path folder = fs::temp_directory_path() / "arboretum-sky.hdr";
   std::string bytes = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";  // flat RGBE pixels
   for (const Vec3f& p : image.pixels) {
     int exponent = 0;
@@ -155,14 +152,15 @@ TEST_CASE("a floor under an image: paths and shadow rays against the integral") 
     for (const float c : {p.x, p.y, p.z}) bytes += char(std::uint8_t(c * scale));
     bytes += char(exponent + 128);
   }
-  std::ofstream(folder, std::ios::binary) << bytes;
-  const Environment stored(read_radiance(folder));
+  const Folder folder;
+  const fs::path file = folder.write("sky.hdr", bytes);
+  const Environment stored(read_radiance(file));
   for (const float roughness : {0.0f, 0.5f}) {
     Scene scene = floor_scene();
     scene.materials[0] = {.diffuse = {0.5f, 0.5f, 0.5f},
                           .specular = Vec3f{1, 1, 1} * (roughness > 0 ? 0.3f : 0.0f),
                           .roughness = roughness};
-    scene.environment = mean_radiance(image), scene.environment_image = folder.string();
+    scene.environment = mean_radiance(image), scene.environment_image = file.string();
     const Vec3d at{0.25, 0, -0.3}, viewer{1, 2, 1.5};
     scene.camera = aimed(to_float(viewer), to_float(at));
     const Surface surface = make_surface(scene.materials[0], EffectSet::all());
@@ -182,7 +180,6 @@ TEST_CASE("a floor under an image: paths and shadow rays against the integral") 
     check_near(seen(scene, 100000, detected(scene).without(EffectKind::diffuse_gi)), to_float(sum), 0.01);
     check_near(seen(scene, 100000, Integrator::whitted), to_float(sum), 0.01);
   }
-  fs::remove(folder);
 }
 
 TEST_CASE("clamped paths bring no more than that from beyond the first hit") {

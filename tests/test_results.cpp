@@ -14,7 +14,6 @@
 
 using namespace arboretum;
 using namespace arboretum::test;
-namespace fs = std::filesystem;
 
 TEST_CASE("median and bootstrap interval") {
   CHECK(median(std::vector{3.0, 1.0, 2.0}) == 2.0);
@@ -27,7 +26,7 @@ TEST_CASE("median and bootstrap interval") {
 }
 
 TEST_CASE("files of lines: a torn last line is dropped, an impossible write is one clear line") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const fs::path file = folder.write("lines", "{\"a\":1}\n{\"b\":");
   CHECK(read_lines(file).size() == 1);
   AppendFile(file, true).append("{\"c\":3}");
@@ -37,7 +36,7 @@ TEST_CASE("files of lines: a torn last line is dropped, an impossible write is o
     CHECK(message.find("No space left") != std::string::npos);
     CHECK(message.find("--resume") != std::string::npos);
   }
-  CHECK(error_of([&] { write_whole(folder.path / "none" / "file", "x"); }).find("cannot be written") !=
+  CHECK(error_of([&] { write_whole(folder.path() / "none" / "file", "x"); }).find("cannot be written") !=
         std::string::npos);
   CHECK(error_of([&] { make_output_folder(file / "below"); }).find("output folder") != std::string::npos);
   write_whole(file, "whole");
@@ -61,21 +60,21 @@ CellResult result_of(const Cell& cell) {
 }  // namespace
 
 TEST_CASE("the journal gives back what it was told, and refuses another configuration") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
   REQUIRE(plan.cells.size() == 2);
   const std::string first = plan.cells[0].name(), second = plan.cells[1].name();
   {
-    Journal journal(folder.path, "hash", plan, false);
+    Journal journal(folder.path(), "hash", plan, false);
     journal.add(first, repetition(0, 1.0));
     journal.finish(result_of(plan.cells[0]));
     journal.add(second, repetition(2, 3.0));
     journal.add(second, repetition(0, 2.0));
   }
-  std::ofstream(folder.path / "repetitions.jsonl", std::ios::app) << "{\"name\":\"torn";
+  std::ofstream(folder.path() / "repetitions.jsonl", std::ios::app) << "{\"name\":\"torn";
   {
-    Journal journal(folder.path, "hash", plan, true);
+    Journal journal(folder.path(), "hash", plan, true);
     REQUIRE(journal.done().size() == 1);
     const CellResult& done = journal.done().at(first);
     CHECK(done.repetitions.size() == 3);
@@ -85,19 +84,19 @@ TEST_CASE("the journal gives back what it was told, and refuses another configur
     REQUIRE(started.size() == 2);
     CHECK((started[0].index == 0 && started[1].index == 2));
   }
-  CHECK(error_of([&] { Journal(folder.path, "other", plan, true); }).find("another configuration") !=
+  CHECK(error_of([&] { Journal(folder.path(), "other", plan, true); }).find("another configuration") !=
         std::string::npos);
-  CHECK(Journal(folder.path, "other", plan, false).done().empty());
+  CHECK(Journal(folder.path(), "other", plan, false).done().empty());
 }
 
 TEST_CASE("a damaged line of a journal is named by file and line") {
   const Registry registry = paper_registry();
   for (const char* line : {"{\"name\": 5, \"configuration_hash\": \"hash\"}", "{\"name\": \"x\"}", "{}"}) {
-    const TemporaryFolder folder;
+    const Folder folder;
     const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
-    Journal(folder.path, "hash", plan, false).finish(result_of(plan.cells[0]));
-    std::ofstream(folder.path / "cells.jsonl", std::ios::app) << line << "\n";
-    CHECK(error_of([&] { Journal(folder.path, "hash", plan, true); }).find("cells.jsonl:2: not a line as `run`") !=
+    Journal(folder.path(), "hash", plan, false).finish(result_of(plan.cells[0]));
+    std::ofstream(folder.path() / "cells.jsonl", std::ios::app) << line << "\n";
+    CHECK(error_of([&] { Journal(folder.path(), "hash", plan, true); }).find("cells.jsonl:2: not a line as `run`") !=
           std::string::npos);
   }
 }
@@ -110,7 +109,7 @@ TEST_CASE("words of a command line are quoted where a shell would read them othe
 }
 
 TEST_CASE("results.json has what Google Benchmark's compare.py reads; the verdict follows the answers") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const Registry registry = paper_registry();
   Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
   plan.skipped.push_back({"some/cell", "no avx512"});

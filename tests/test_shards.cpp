@@ -34,7 +34,7 @@ std::set<std::string> all_names(const Plan& plan) {
 }
 
 struct Sweep {
-  TemporaryFolder folder;
+  Folder folder;
   Registry registry;
   Experiment experiment;
   Plan plan;
@@ -73,7 +73,7 @@ Json machine() {
 /// What `run` leaves of a shard; `most`: it was cut off after so many cells.
 fs::path write_part(const Sweep& sweep, const std::string& name, const Shard& shard, const Json& context = machine(),
                     std::size_t most = SIZE_MAX) {
-  const fs::path folder = sweep.folder.path / name;
+  const fs::path folder = sweep.folder.path() / name;
   fs::create_directories(folder);
   const std::string hash = configuration_hash(sweep.experiment);
   const std::map<std::string, unsigned> shards = split_plan(sweep.experiment, sweep.plan, shard.of);
@@ -216,7 +216,7 @@ TEST_CASE("parts that do not belong together are refused, or merged when told to
   CHECK(configuration.find("different configurations") != std::string::npos);
   CHECK(configuration.find("repetitions: 9") != std::string::npos);
   // Neither an empty line nor the shorter file hides the first difference.
-  const fs::path other = other_sweep.folder.path / "other";
+  const fs::path other = other_sweep.folder.path() / "other";
   const auto told = [&](const std::string& of_one, const std::string& of_other) {
     write_whole(one / "effective.yaml", of_one), write_whole(other / "effective.yaml", of_other);
     return error_of([&] { (void)merged({one, other}); });
@@ -253,9 +253,9 @@ TEST_CASE("parts that do not belong together are refused, or merged when told to
 TEST_CASE("a folder that holds no results names the nearest that does; damaged files are named") {
   const Sweep sweep;
   const fs::path part = write_part(sweep, "shard-one", {1, 2});
-  CHECK(error_of([&] { (void)read_result_folder(sweep.folder.path / "shard-onw"); }).find("shard-one'") !=
+  CHECK(error_of([&] { (void)read_result_folder(sweep.folder.path() / "shard-onw"); }).find("shard-one'") !=
         std::string::npos);
-  CHECK(error_of([&] { (void)read_result_folder(sweep.folder.path); }).find("shard-one'") != std::string::npos);
+  CHECK(error_of([&] { (void)read_result_folder(sweep.folder.path()); }).find("shard-one'") != std::string::npos);
   CHECK(error_of([&] { (void)read_result_folder(part / "results.json"); }).find("give the folder") !=
         std::string::npos);
   std::ofstream(part / "cells.jsonl", std::ios::app) << "{\"name\": \"torn";  // by a kill

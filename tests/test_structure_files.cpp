@@ -20,6 +20,8 @@
 #include "structures/statistics.h"
 #include "structures/structure_file.h"
 #include "tests/catch.h"
+#include "tests/error_of.h"
+#include "tests/folder.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
 
@@ -27,24 +29,6 @@ using namespace arboretum;
 using namespace arboretum::test;
 
 namespace {
-
-namespace fs = std::filesystem;
-
-/// A folder of this test's own, gone at the end.
-class Folder {
- public:
-  Folder() : path_(fs::path(ARBORETUM_BINARY_DIR) / "test_structure_files") {
-    fs::remove_all(path_), fs::create_directories(path_);
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  [[nodiscard]] fs::path operator/(const char* name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
 
 std::string read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -57,14 +41,9 @@ void write(const fs::path& file, const std::string& bytes) {
 
 /// The message of the UserError that loading throws; empty where it loads.
 std::string refusal(const char* name, const TriangleMesh& mesh, const BuildSettings& settings, const fs::path& file) {
-  try {
-    (void)load_structure(name, mesh, settings, file);
-    return "";
-  } catch (const UserError& e) {
-    CHECK(std::string(e.what()).find('\n') == std::string::npos);
-    CHECK(std::string(e.what()).find(file.string()) == 0);
-    return e.what();
-  }
+  const std::string line = error_of([&] { (void)load_structure(name, mesh, settings, file); });
+  CHECK((line.empty() || line.starts_with(file.string())));
+  return line;
 }
 
 bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }

@@ -1,7 +1,6 @@
 // `verify` as a command: its verdicts and words, scenes of instances, and the cases files that it reads.
 #include <unistd.h>
 
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -10,14 +9,16 @@
 #include "experiments/commands.h"
 #include "oracle/random_cases.h"
 #include "tests/catch.h"
+#include "tests/folder.h"
 #include "tests/small_meshes.h"
 #include "traversal/kernel_table.h"
 
 using namespace arboretum;
+using namespace arboretum::test;
 
 namespace {
 
-const std::filesystem::path kSource = ARBORETUM_SOURCE_DIR;
+const fs::path kSource = ARBORETUM_SOURCE_DIR;
 
 struct Outcome {
   int status = 0;
@@ -27,7 +28,8 @@ struct Outcome {
 /// The program's command, its words on stdout and the error that it throws.
 Outcome verify(const VerifyCommand& command) {
   Outcome outcome;
-  const auto path = std::filesystem::temp_directory_path() / ("arboretum_verify_" + std::to_string(getpid()));
+  const Folder folder;
+  const fs::path path = folder / "stdout";
   std::fflush(stdout);
   const int saved = dup(1);
   REQUIRE(std::freopen(path.c_str(), "w", stdout));
@@ -42,7 +44,6 @@ Outcome verify(const VerifyCommand& command) {
   std::stringstream text;
   text << std::ifstream(path).rdbuf();
   outcome.out = text.str();
-  std::filesystem::remove(path);
   return outcome;
 }
 
@@ -51,12 +52,6 @@ std::string any_isa() {
   for (const KernelRow& row : kernel_table())
     if (is_available(row.isa) && row.structure == "bvh8") return std::string(to_string(row.isa));
   return "scalar";
-}
-
-std::filesystem::path written(const std::string& name, const std::string& text) {
-  const auto path = std::filesystem::temp_directory_path() / (std::to_string(getpid()) + name);
-  std::ofstream(path) << text;
-  return path;
 }
 
 }  // namespace
@@ -151,11 +146,11 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
   VerifyCommand command;
   command.axes = {isa, "structure=bvh8", "intersector=watertight"};
   const auto status_of = [&](const std::string& text, std::string* error = nullptr) {
-    const auto path = written("cases.json", text);
+    const Folder folder;
+    const fs::path path = folder.write("cases.json", text);
     command.subject = path.string();
     const Outcome outcome = verify(command);
     if (error) *error = outcome.error;
-    std::filesystem::remove(path);
     return outcome.status;
   };
   CHECK(status_of(R"({"cases": [{"id": "a", )" + triangles + R"(, "hit": true, "t": 1, "nearest_ids": [0]}]})") == 0);
@@ -233,11 +228,11 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
   }
   // --rays: in all, the cases among them; no more than the cases where none can be mutated.
   const auto rays_of = [&](const std::string& text, std::uint64_t rays) {
-    const auto file = written("rays.json", text);
+    const Folder folder;
+    const fs::path file = folder.write("rays.json", text);
     VerifyCommand more = command;
     more.subject = file.string(), more.rays = rays;
     const std::string out = verify(more).out;
-    std::filesystem::remove(file);
     return out.substr(0, out.find('\n'));
   };
   const std::string flat = R"("triangles": [[["nan",0,1],[1,0,1],[0,1,1]]], "origin": [0,0,0], "direction": [0,0,1])";
@@ -271,9 +266,9 @@ TEST_CASE("cases files: right ones are checked, wrong ones are named") {
   add_triangle(mesh, {std::numeric_limits<float>::max(), 0, 1}, {0, std::numeric_limits<float>::lowest(), 1},
                {0x1p-149f, 0, 1});
   const Ray ray{{0.3f, 0.7f, 0}, 0.0f, {0, 0, 1}, 0x1.fp120f};
-  const auto path = written("back.json", R"({"cases": [)" + case_json("back", "why", mesh, ray) + "]}");
+  const Folder folder;
+  const fs::path path = folder.write("back.json", R"({"cases": [)" + case_json("back", "why", mesh, ray) + "]}");
   const VerifyCase back = read_case_file(path).front();
-  std::filesystem::remove(path);
   CHECK(std::memcmp(&back.ray, &ray, sizeof ray) == 0);
   CHECK(back.mesh.vertices == mesh.vertices);
 }

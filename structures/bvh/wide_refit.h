@@ -71,6 +71,7 @@ void WideBvh<Format>::refit(const TriangleMesh& mesh) {
                     " triangles and cannot be refitted to " + std::to_string(mesh.size()) + "; build it anew");
   }
   check_triangles(mesh);
+  check_one_moment(mesh, kName);
   set_scene(mesh, Refitter<Format>(mesh, *find_leaf_form(leaf_), arena_.data()).subtree(root_, 0));
 }
 
