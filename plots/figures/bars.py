@@ -1,7 +1,7 @@
 """Horizontal bars, one a built structure, one panel a scene: what sah_cost and build_time have in common."""
 
 from figures import squares
-from results import NoData, axis_sort_key, ordered, undetermined_axes
+from results import Cell, NoData, axis_sort_key, ordered, undetermined_axes
 from style import colour, hatch, legends_right, panels, part_colour, part_legend, short
 
 
@@ -15,10 +15,7 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
 
     `label_axes` are the axes that may tell bars of a scene apart; those that the ones before settle are not written.
     """
-    cells = without_doubles([c for c in results.structures if value_of(c)], value_of)
-    if not cells:
-        raise NoData("no structure has this figure")
-    varied = [a for a in undetermined_axes(cells, ("scene", "structure", *label_axes)) if a in label_axes]
+    cells, varied = distinct(results, lambda c: value_of(c) and (value_of(c), note_of(c)), label_axes)
     scenes = ordered((c["scene"] for c in cells), "scene")
     bars = {scene: scene_bars([c for c in cells if c["scene"] == scene], varied) for scene in scenes}
     if squares.are_due(bars.values(), varied):
@@ -38,18 +35,39 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
         axis.set_title(short(scenes[index]))
         axis.set_xlabel(axis_label)
     if parts_of:
-        names = list(dict.fromkeys(name for cell in cells for name, value in parts_of(cell) if value > 0))
+        names = in_order([name for name, value in parts_of(cell) if value > 0] for cell in cells)
         if names:
             legends_right(figure, [("part", part_legend(names))])
     return figure
 
 
-def without_doubles(cells, value_of):
-    """A SAH cost that is the same for every ISA, thread count and leaf layout is one bar."""
+def distinct(results, shown_of, label_axes):
+    """The built structures of which there is something to show, those that show the same as one, and those of `label_axes` that tell them apart."""
+    cells = without_doubles([c for c in results.structures if shown_of(c)], shown_of)
+    if not cells:
+        raise NoData("no structure has this figure")
+    return cells, [a for a in undetermined_axes(cells, ("scene", "structure", *label_axes)) if a in label_axes]
+
+
+def without_doubles(cells, shown_of):
+    """A SAH cost that is the same for several ISAs, thread counts and leaf layouts is one bar: the first's, but not called by its threads where others' are the same."""
     seen = {}
     for cell in cells:
-        seen.setdefault((*(cell[a] for a in ("scene", "structure", "builder")), value_of(cell)), cell)
-    return list(seen.values())
+        seen.setdefault((*(cell[a] for a in ("scene", "structure", "builder")), shown_of(cell)), []).append(cell)
+    return [alike[0] if len({c["threads"] for c in alike}) == 1 else Cell({**alike[0].axes, "threads": ""}, alike[0].rows) for alike in seen.values()]
+
+
+def in_order(sequences):
+    """Every name of `sequences` once, each before those that follow it in the sequence that first has it."""
+    found = []
+    for names in sequences:
+        place = len(found)
+        for name in reversed(list(names)):
+            if name in found:
+                place = found.index(name)
+            else:
+                found.insert(place, name)
+    return found
 
 
 def scene_bars(cells, varied):
@@ -61,8 +79,7 @@ def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
     for place, cell in enumerate(cells):
         median, low, high = value_of(cell)
         parts = parts_of(cell) if parts_of else []
-        axis.barh(place, median, 0.74, color="#CCCCCC" if parts else colour(cell["structure"]),
-                  hatch=None if parts else hatch(cell["structure"]), edgecolor="white", linewidth=0.5,
+        axis.barh(place, median, 0.74, **look(cell, parts), edgecolor="white", linewidth=0.5,
                   xerr=None if low == high else [[median - low], [high - median]],
                   error_kw={"elinewidth": 0.9, "ecolor": "#222222", "zorder": 3})
         left = 0.0
@@ -79,6 +96,11 @@ def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
 def digits(value):
     """Three digits or all before the point, without an exponent for what a build takes."""
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:#.3g}"
+
+
+def look(cell, parts):
+    """Colour and hatch of a bar: its structure's, or, beneath its parts, the grey of what none of them covers."""
+    return {"color": "#CCCCCC"} if parts else {"color": colour(cell["structure"]), "hatch": hatch(cell["structure"])}
 
 
 def bar_label(cell, varied):

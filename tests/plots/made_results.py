@@ -53,7 +53,7 @@ def build(structure="bvh8", builder="binned_sah", **more):
     name = f"build/bunny/{structure}/{builder}/triangle8/-/-/-/avx2/-/threads:1"
     figures = {} if structure == "embree" else {
         "sah_cost": 31.5, "nodes": 10, "epo": 4.5, "lcv": 3.0, "triangles": 100, "bytes_per_triangle": 10.0, "node_bytes": 300,
-        "leaf_bytes": 600, "other_bytes": 100, "peak_build_bytes": 1500, "leaf_histogram": [0, 3, 4],
+        "leaf_bytes": 600, "other_bytes": 100, "peak_build_bytes": 1500, "leaf_histogram": [0, 3, 4], "depth_histogram": [0, 0, 1, 6], "leaf_fill": 0.75,
         "phase_seconds": {"splits": 0.01, "leaves": 0.005, "a new phase": 0.001}}
     return {"name": name, "run_type": "iteration", "build_seconds": 0.02, "triangles_per_second": 3e6, "bytes": 1000,
             **figures, **more}
