@@ -105,7 +105,8 @@ std::string leaf_summary(std::string_view leaf) {
                                                           {'i', "indices of vertices"},
                                                           {'w', "the map to the unit triangle (baldwin_weber)"},
                                                           {'h', "three planes (havel_herout)"},
-                                                          {'p', "a plane and two projected edges (wald_projection)"}};
+                                                          {'p', "a plane and two projected edges (wald_projection)"},
+                                                          {'a', "a vertex and edges, as array of structures"}};
   std::string_view rest = leaf.substr(8);
   std::string_view what = "a vertex and precomputed edges";
   for (const auto& [suffix, form] : kForms) {

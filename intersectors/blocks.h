@@ -1,4 +1,4 @@
-// Leaf blocks: M triangles as structure of arrays, in the forms that intersectors read.
+// Leaf blocks: M triangles, as structure of arrays but for one, in the forms that intersectors read.
 //
 //   triangleM  (EdgeBlock):   first vertex, e1 = v0 - v1, e2 = v2 - v0; the edges are rounded, once, to float.
 //   triangleMv (VertexBlock): the three vertices as they are, what the crack-free intersectors need.
@@ -6,6 +6,7 @@
 //     look-up more.
 //   triangleMw (TransformBlock), triangleMh (PlaneBlock), triangleMp (ProjectionBlock): what baldwin_weber, havel_herout
 //     and wald_projection precompute (intersectors/precomputed.h), 48, 48 and 40 bytes a triangle beside the id.
+//   triangle4a (AosBlock): triangle4 as array of structures.
 //
 // A lane without a triangle, or with one of exactly zero area, holds NaN coordinates (every comparison false: never
 // hit); without a triangle its id is kNoPrimitive. Among indices an empty lane repeats the block's first triangle, id
@@ -30,7 +31,7 @@
 namespace arboretum {
 
 /// How a block keeps its triangles; an intersector says which it can read.
-enum class TriangleForm { edges, vertices, indices, transform, planes, projection };
+enum class TriangleForm { edges, vertices, indices, transform, planes, projection, array_of_structures };
 
 template <int M>
 struct alignas(8) EdgeBlock {
@@ -136,13 +137,35 @@ struct alignas(8) ProjectionBlock {
   }
 };
 
+/// Four triangles as array of structures, the leaf of the kernels for Intel's MIC architecture (Benthin, Wald, Woop,
+/// Ernst, Mark 2012; Woop, Benthin, Wald 2013): a 16-lane register holds the first vertex, or an edge, of all four. Ids
+/// stand apart, since as a vector's fourth lane they would be subnormal numbers, which are slow to reckon with.
+struct alignas(8) AosBlock {
+  static constexpr int kWidth = 4;
+  static constexpr TriangleForm kForm = TriangleForm::array_of_structures;
+  static constexpr std::string_view kName = "triangle4a";
+  float v0[4][4];  ///< x y z 0 of each triangle
+  float e1[4][4];  ///< v0 - v1
+  float e2[4][4];  ///< v2 - v0
+  std::uint32_t id[4];
+
+  void set(int lane, const std::array<Vec3f, 3>& corner, std::uint32_t primitive) noexcept {
+    const auto store = [lane](float(&rows)[4][4], Vec3f p) {
+      rows[lane][0] = p.x, rows[lane][1] = p.y, rows[lane][2] = p.z, rows[lane][3] = 0.0f;
+    };
+    store(v0, corner[0]), store(e1, corner[0] - corner[1]), store(e2, corner[2] - corner[0]);
+    id[lane] = primitive;
+  }
+};
+
 /// A block of each width.
 template <template <int> class Block>
 using EveryWidth = TypeList<Block<1>, Block<4>, Block<8>, Block<16>>;
 
 /// Every leaf block that there is.
-using AllBlocks = ConcatLists<EveryWidth<EdgeBlock>, EveryWidth<VertexBlock>, EveryWidth<IndexBlock>,
-                              EveryWidth<TransformBlock>, EveryWidth<PlaneBlock>, EveryWidth<ProjectionBlock>>;
+using AllBlocks =
+    ConcatLists<EveryWidth<EdgeBlock>, EveryWidth<VertexBlock>, EveryWidth<IndexBlock>, EveryWidth<TransformBlock>,
+                EveryWidth<PlaneBlock>, EveryWidth<ProjectionBlock>, TypeList<AosBlock>>;
 
 /// Bytes that hold any of them.
 template <class... Blocks>

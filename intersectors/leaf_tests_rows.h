@@ -47,7 +47,8 @@ using BlocksOf = std::conditional_t<
     Intersector::kEveryLeaf,
     ConcatLists<BlocksOfWidth<EdgeBlock, kRegisterWidth>, BlocksOfWidth<VertexBlock, kRegisterWidth>,
                 BlocksOfWidth<IndexBlock, kRegisterWidth>, BlocksOfWidth<TransformBlock, kRegisterWidth>,
-                BlocksOfWidth<PlaneBlock, kRegisterWidth>, BlocksOfWidth<ProjectionBlock, kRegisterWidth>>,
+                BlocksOfWidth<PlaneBlock, kRegisterWidth>, BlocksOfWidth<ProjectionBlock, kRegisterWidth>,
+                TypeList<AosBlock>>,
     std::conditional_t<(kRegisterWidth >= 8), TypeList<VertexBlock<1>, VertexBlock<4>, VertexBlock<8>, IndexBlock<4>>,
                        TypeList<VertexBlock<1>, VertexBlock<4>, IndexBlock<4>>>>;
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "intersectors/triangle_hits.h"
+#include "simd/swizzle.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -28,7 +29,7 @@ struct MollerTrumboreTerms {
 struct MollerTrumbore {
   static constexpr std::string_view kName = "moller_trumbore";
   static constexpr bool reads(TriangleForm form) {
-    return form == TriangleForm::edges || form == TriangleForm::vertices;
+    return form == TriangleForm::edges || form == TriangleForm::vertices || form == TriangleForm::array_of_structures;
   }
   static constexpr bool kEveryLeaf = true;
 
@@ -41,6 +42,19 @@ struct MollerTrumbore {
     return core<F>(
         in_all_lanes<Block::kWidth>(ray.origin), in_all_lanes<Block::kWidth>(ray.direction), block,
         [](const float(&p)[Block::kWidth]) { return F::load(p); }, hits);
+  }
+
+  /// Four triangles as array of structures: lanes x y z of a group of four are a triangle's, and the operations those
+  /// of core() in its order, so that the answers are, too.
+  template <class Block>
+  requires(Block::kForm == TriangleForm::array_of_structures) static ARBORETUM_INLINE
+      auto intersect(const RayData& ray, const Block& block, TriangleHits<4>& hits) {
+    const auto in_all_groups = [](Vec3f p) { return repeat_four<16>(four(p.x, p.y, p.z, 0.0f)); };
+    const Groups d = in_all_groups(ray.direction), e1 = Groups::load(block.e1[0]), e2 = Groups::load(block.e2[0]);
+    const Groups c = Groups::load(block.v0[0]) - in_all_groups(ray.origin);
+    const Groups n = cross_in_fours(e2, e1), r = cross_in_fours(c, d);
+    return decide(
+        dot_in_fours(n, d), dot_in_fours(r, e2), dot_in_fours(r, e1), [&] { return dot_in_fours(n, c); }, hits);
   }
 
   /// A block as rays of one origin see it: what core() makes of origin and triangle alone, once for all of them. (With
@@ -108,6 +122,17 @@ struct MollerTrumbore {
   }
 
  private:
+  using Groups = vf<16>;  ///< four vectors x y z 0
+  /// dot() of simd/common.h: z first, y added to it, then x.
+  static ARBORETUM_INLINE vf<4> dot_in_fours(Groups a, Groups b) {
+    const Groups z = a * b, yz = madd(a, b, permute_in_fours<0, 2, 2, 3>(z));
+    return first_of_fours(madd(a, b, permute_in_fours<1, 1, 2, 3>(yz)));
+  }
+  static ARBORETUM_INLINE Groups cross_in_fours(Groups a, Groups b) {
+    const auto yzx = [](Groups v) { return permute_in_fours<1, 2, 0, 3>(v); };
+    return yzx(msub(a, yzx(b), yzx(a) * b));
+  }
+
   template <class F>
   struct Corners {
     vec3<F> v0, e1, e2;
@@ -148,21 +173,22 @@ struct MollerTrumbore {
     MollerTrumboreTerms<F> terms(normal(block, t), t.v0 - o);
     terms.meet(t.e1, t.e2, d);
     return decide(
-        terms, [&] { return dot(terms.n, terms.c); }, hits);
+        terms.det, terms.u, terms.v, [&] { return dot(terms.n, terms.c); }, hits);
   }
   template <class F, int M, class Get, class Hits>
   static ARBORETUM_INLINE auto core(vec3<F> /*o*/, vec3<F> d, const FromOrigin<M>& block, const Get& get, Hits& hits) {
     MollerTrumboreTerms<F> terms(three(get, block.n), three(get, block.c));
     terms.meet(three(get, block.e1), three(get, block.e2), d);
     return decide(
-        terms, [&] { return get(block.n_dot_c); }, hits);
+        terms.det, terms.u, terms.v, [&] { return get(block.n_dot_c); }, hits);
   }
 
+  /// Of N.d and u and v times N.d.
   template <class F, class Distance, class Hits>
-  static ARBORETUM_INLINE auto decide(const MollerTrumboreTerms<F>& terms, const Distance& n_dot_c, Hits& hits) {
-    const F det = terms.det, abs_det = abs(det);
+  static ARBORETUM_INLINE auto decide(F det, F u_det, F v_det, const Distance& n_dot_c, Hits& hits) {
+    const F abs_det = abs(det);
     const auto sign = sign_bits(det);
-    const F u = xor_sign(terms.u, sign), v = xor_sign(terms.v, sign);
+    const F u = xor_sign(u_det, sign), v = xor_sign(v_det, sign);
     const auto inside = (u >= F(0.0f)) & (v >= F(0.0f)) & (u + v <= abs_det) & (det != F(0.0f));
     if (any(inside)) {
       hits.t = xor_sign(n_dot_c(), sign) / abs_det;

@@ -51,6 +51,21 @@ ARBORETUM_INLINE vf<4> reduce_fours(vf<16> a, Op op) {
 }
 #endif
 
+/// The first lane of each group.
+ARBORETUM_INLINE vf<4> first_of_fours(vf<16> a) {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+  return vf<4>::map([&](int i) { return a.lane[4 * i]; });
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
+  return vf<4>(_mm_movelh_ps(_mm_unpacklo_ps(a.lo.lo.v, a.lo.hi.v), _mm_unpacklo_ps(a.hi.lo.v, a.hi.hi.v)));
+#elif ARBORETUM_TARGET == ARBORETUM_TARGET_AVX2
+  const __m256 both = _mm256_unpacklo_ps(a.lo.v, a.hi.v);  // x0 x2 y0 y2, x1 x3 y1 y3
+  return vf<4>(_mm_unpacklo_ps(_mm256_castps256_ps128(both), _mm256_extractf128_ps(both, 1)));
+#else
+  const __m512i first = _mm512_castsi128_si512(_mm_setr_epi32(0, 4, 8, 12));
+  return vf<4>(_mm512_castps512_ps128(_mm512_permutexvar_ps(first, a.v)));
+#endif
+}
+
 /// The four lanes of `a` again and again.
 template <int W>
 ARBORETUM_INLINE vf<W> repeat_four(vf<4> a) {

@@ -156,7 +156,7 @@ TEST_CASE("every intersector has a promise, and every block is read by one") {
     ++of_leaf[t.leaf];
   }
   for (const char* leaf :
-       {"triangle4", "triangle4v", "triangle4i", "triangle4w", "triangle4h", "triangle4p", "triangle1w"})
+       {"triangle4", "triangle4v", "triangle4i", "triangle4w", "triangle4h", "triangle4p", "triangle4a", "triangle1w"})
     CHECK(of_leaf[leaf] > 0);
   const Isa isa = all_tests().front().isa;
   CHECK_FALSE(find_leaf_tests("triangle4", "pluecker_double", isa));

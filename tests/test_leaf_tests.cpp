@@ -22,11 +22,11 @@ TEST_CASE(
     bool every_width;        ///< else those that the usual leaves have
   };
   constexpr Reads kReads[] = {
-      {"moller_trumbore", "evi", true}, {"pluecker", "vi", false},
-      {"watertight", "vi", true},       {"exact", "vi", true},
-      {"baldwin_weber", "w", true},     {"havel_herout", "h", true},
-      {"wald_projection", "p", true},   {"moller_trumbore_double", "vi", false},
-      {"pluecker_double", "vi", false}, {"watertight_refined", "vi", false},
+      {"moller_trumbore", "evia", true}, {"pluecker", "vi", false},
+      {"watertight", "vi", true},        {"exact", "vi", true},
+      {"baldwin_weber", "w", true},      {"havel_herout", "h", true},
+      {"wald_projection", "p", true},    {"moller_trumbore_double", "vi", false},
+      {"pluecker_double", "vi", false},  {"watertight_refined", "vi", false},
   };
   REQUIRE(std::size(kReads) == std::size(kIntersectorPromises));
   for (Isa isa : kAllIsas) {
@@ -37,6 +37,7 @@ TEST_CASE(
         for (const int width : {1, 4, 8, 16}) {
           const bool wide = isa == Isa::avx2 || isa == Isa::avx512;
           const bool fits = width <= 4 || (width == 8 && isa != Isa::scalar) || isa == Isa::avx512;
+          if (form == 'a' && width != 4) continue;
           const bool usual = form == 'i' ? width == 4 : width <= 4 || (width == 8 && wide);
           if (!(r.every_width ? fits : usual)) continue;
           const std::string leaf = "triangle" + std::to_string(width) + (form == 'e' ? "" : std::string(1, form));

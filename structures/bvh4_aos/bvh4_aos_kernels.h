@@ -100,7 +100,9 @@ inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows)
   using Structure = bvh4_aos::Bvh4Aos;
   using Packets = BvhPacketFamily<AosPacketNodes>;
   using Single = BvhSingle<AosNodeTest>::Functions;
-  add_rows<Structure, Single>(rows, "single", UsualLeaves{});
+  using AosLeaves =
+      std::conditional_t<kRegisterWidth == 1, TypeList<>, TypeList<CompiledLeaves<AosBlock, MollerTrumbore>>>;
+  add_rows<Structure, Single>(rows, "single", ConcatLists<UsualLeaves, AosLeaves>{});
   add_queued_rows<Structure, BvhNodeQueue<AosNodeTest>::Of, Single>(rows, BatchLeaves{});
   add_packet_rows<Structure, Packets>(rows, TypeList<>{});
   using Incoherent = IncoherentInFlight<BvhNodeQueue<AosNodeTest>::Of, Single, 4>;
