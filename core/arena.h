@@ -9,11 +9,16 @@
 
 namespace arboretum {
 
+template <class T>
+class ReservedArray;
+
 /// Bytes aligned to 64 (2 MiB when larger than that), uninitialised: whoever fills it writes every byte it uses.
 class Arena {
  public:
   Arena() = default;
   explicit Arena(std::size_t bytes);
+  /// Those that the array has handed out.
+  explicit Arena(ReservedArray<std::byte>&& array) noexcept;
   Arena(Arena&& other) noexcept : data_(std::exchange(other.data_, nullptr)), bytes_(std::exchange(other.bytes_, 0)) {}
   Arena& operator=(Arena&& other) noexcept {
     std::swap(data_, other.data_), std::swap(bytes_, other.bytes_);

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <cstdlib>
 #include <new>
 
 #include <sys/mman.h>
@@ -12,9 +13,6 @@ namespace {
 std::atomic<std::size_t> current_bytes{0};
 std::atomic<std::size_t> peak_bytes{0};
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-[[nodiscard]] std::align_val_t alignment_of(std::size_t bytes) noexcept {
-  return std::align_val_t(bytes >= kHugePage ? kHugePage : 64);
-}
 }  // namespace
 
 void MemoryMeter::add(std::size_t bytes) noexcept {
@@ -30,12 +28,13 @@ std::size_t MemoryMeter::peak() noexcept { return peak_bytes.load(std::memory_or
 void MemoryMeter::reset_peak() noexcept { peak_bytes.store(current(), std::memory_order_relaxed); }
 
 void* allocate_uncounted(std::size_t bytes) {
-  void* data = ::operator new(bytes, alignment_of(bytes));
+  void* data = nullptr;
+  if (posix_memalign(&data, bytes >= kHugePage ? kHugePage : 64, bytes) != 0) throw std::bad_alloc();
   if (bytes >= kHugePage) (void)madvise(data, bytes, MADV_HUGEPAGE);  // a wish, not a need
   return data;
 }
 
-void release_uncounted(void* data, std::size_t bytes) noexcept { ::operator delete(data, alignment_of(bytes)); }
+void release_uncounted(void* data) noexcept { std::free(data); }
 
 std::size_t give_back_pages(void* begin, void* end) noexcept {
   static const std::uintptr_t page = std::uintptr_t(sysconf(_SC_PAGESIZE));
@@ -53,7 +52,7 @@ void* allocate_metered(std::size_t bytes) {
 
 void release_metered(void* data, std::size_t bytes) noexcept {
   MemoryMeter::remove(bytes);
-  release_uncounted(data, bytes);
+  release_uncounted(data);
 }
 
 }  // namespace arboretum

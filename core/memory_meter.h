@@ -28,8 +28,8 @@ class MemoryMeter {
 void release_metered(void* data, std::size_t bytes) noexcept;
 /// The same without counting: the caller counts what it uses of it (core/reserved_array.h).
 [[nodiscard]] void* allocate_uncounted(std::size_t bytes);
-/// Gives back what allocate_uncounted(bytes) gave.
-void release_uncounted(void* data, std::size_t bytes) noexcept;
+/// Gives back what allocate_uncounted() gave.
+void release_uncounted(void* data) noexcept;
 /// Hands the whole pages of [begin, end), a part of such an allocation whose values are needed no more, back to the
 /// system. Returns their bytes.
 std::size_t give_back_pages(void* begin, void* end) noexcept;

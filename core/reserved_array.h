@@ -44,6 +44,11 @@ class ReservedArray {
     counted_bytes_.fetch_add(n * sizeof(T), std::memory_order_relaxed);
     MemoryMeter::add(n * sizeof(T));
   }
+  /// Gives up the elements, which count on, to whoever calls release_metered() with the bytes of those handed out.
+  [[nodiscard]] T* release() noexcept {
+    counted_bytes_ = 0, size_ = 0;
+    return std::exchange(data_, nullptr);
+  }
   /// The elements [begin, end), which were handed out, are needed no more: their whole pages go back to the system and
   /// count no longer. Thread-safe for ranges that do not overlap.
   void give_back(std::size_t begin, std::size_t end) noexcept {
@@ -60,7 +65,7 @@ class ReservedArray {
     swap(to);
   }
   void clear() noexcept {
-    if (data_) release_uncounted(data_, size_ * sizeof(T));
+    if (data_) release_uncounted(data_);
     MemoryMeter::remove(counted_bytes_.exchange(0));
     data_ = nullptr, size_ = 0;
   }
@@ -70,6 +75,8 @@ class ReservedArray {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  /// How many count.
+  [[nodiscard]] std::size_t handed_out() const noexcept { return counted_bytes_ / sizeof(T); }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] T* data() noexcept { return data_; }
   [[nodiscard]] const T* data() const noexcept { return data_; }

@@ -11,6 +11,7 @@
 #include "intersectors/blocks.h"
 #include "oracle/oracle.h"
 #include "structures/accel.h"
+#include "structures/builders/box4.h"
 #include "structures/leaves/leaf_form.h"
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"
@@ -62,9 +63,11 @@ class Recorder final : public StructureVisitor {
 const char* const kBvhs[] = {"bvh2", "bvh4", "bvh8", "bvh16"};
 
 std::unique_ptr<Accel> build(const char* structure, const TriangleMesh& mesh, const char* leaf, unsigned threads = 1,
-                             Isa isa = Isa::scalar, const BuilderParameters& parameters = {}) {
+                             Isa isa = Isa::scalar, const BuilderParameters& parameters = {},
+                             const char* builder = "binned_sah") {
   BuildSettings settings;
   settings.leaf = leaf, settings.threads = threads, settings.isa = isa, settings.parameters = parameters;
+  settings.builder = builder;
   BuildReport report;
   auto accel = build_structure(structure, mesh, settings, report);
   CHECK(report.peak_bytes >= accel->bytes());
@@ -111,15 +114,17 @@ TEST_CASE("a tree holds every triangle once, inside its boxes, whatever the leaf
   const TriangleMesh mesh = random_triangles(3001, 0.05f, 1);
   for (const char* structure : kBvhs) {
     for (std::string_view leaf : find_structure(structure)->info.leaves) {
-      for (const char* collapse : {"optimal", "greedy"}) {
-        BuilderParameters p;
-        p.collapse = collapse;
-        const auto accel = build(structure, mesh, std::string(leaf).c_str(), 1, Isa::scalar, p);
-        Recorder seen(mesh);
-        REQUIRE(accel->visit(seen));
-        INFO(structure << " " << leaf << " " << collapse);
-        CHECK(seen.every_triangle_once());
-        CHECK(seen.boxes_hold());
+      for (const char* builder : {"binned_sah", "morton"}) {  // the second may fill leaves before there are nodes
+        for (const char* collapse : {"optimal", "greedy"}) {
+          BuilderParameters p;
+          p.collapse = collapse;
+          const auto accel = build(structure, mesh, std::string(leaf).c_str(), 1, Isa::scalar, p, builder);
+          Recorder seen(mesh);
+          REQUIRE(accel->visit(seen));
+          INFO(structure << " " << leaf << " " << builder << " " << collapse);
+          CHECK(seen.every_triangle_once());
+          CHECK(seen.boxes_hold());
+        }
       }
     }
   }
@@ -127,16 +132,18 @@ TEST_CASE("a tree holds every triangle once, inside its boxes, whatever the leaf
 
 TEST_CASE("the tree is the same for any number of threads and on any ISA") {
   const TriangleMesh mesh = random_triangles(150000, 0.01f, 2);  // large enough for the parallel splits
-  std::uint64_t expected = 0;
-  for (Isa isa : available_isas()) {
-    for (unsigned threads : {1u, 2u, 5u}) {
-      const auto accel = build("bvh8", mesh, "triangle4", threads, isa);
-      Recorder seen(mesh);
-      REQUIRE(accel->visit(seen));
-      if (expected == 0) expected = seen.hash();
-      INFO(to_string(isa) << " threads " << threads);
-      CHECK(seen.hash() == expected);
-      CHECK(seen.every_triangle_once());
+  for (const char* builder : {"binned_sah", "morton"}) {
+    std::uint64_t expected = 0;
+    for (Isa isa : available_isas()) {
+      for (unsigned threads : {1u, 2u, 5u}) {
+        const auto accel = build("bvh8", mesh, "triangle4", threads, isa, {}, builder);
+        Recorder seen(mesh);
+        REQUIRE(accel->visit(seen));
+        if (expected == 0) expected = seen.hash();
+        INFO(builder << " " << to_string(isa) << " threads " << threads);
+        CHECK(seen.hash() == expected);
+        CHECK(seen.every_triangle_once());
+      }
     }
   }
 }
@@ -171,7 +178,7 @@ TEST_CASE("leaves filled by fours are the blocks that are filled one by one") {
   add_triangle(mesh, {0, 0, 0}, {1e30f, 0, 0}, {0, 1e30f, 0});                     // they overflow
   add_triangle(mesh, {0, 0, 0}, {1, 1, 1}, {1 + 0x1p-22f, 1 + 0x1p-23f, 1});       // a sliver
   add_triangle(mesh, {0.1f, 0.1f, 0.1f}, {0.2f, 0.2f, 0.2f}, {0.3f, 0.3f, 0.3f});  // flat or not, by rounding
-  std::size_t different = 0, flat = 0;
+  std::size_t different = 0, flat = 0, not_bounds = 0;
   for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) {
     if constexpr (Block::kForm == TriangleForm::edges || Block::kForm == TriangleForm::vertices) {
       std::vector<std::uint32_t> ids;
@@ -179,11 +186,17 @@ TEST_CASE("leaves filled by fours are the blocks that are filled one by one") {
       for (std::uint32_t last = std::uint32_t(mesh.size()); last-- > 0;) {
         ids.push_back(last);
         if (ids.size() > 33) ids.erase(ids.begin());
-        alignas(64) std::byte a[34 * sizeof(Block)], b[34 * sizeof(Block)];
+        alignas(64) std::byte a[34 * sizeof(Block)], b[34 * sizeof(Block)], c[34 * sizeof(Block)];
         const auto* form = find_leaf_form(Block::kName);
         REQUIRE(form != nullptr);
         form->fill(a, mesh, ids);
         fill_blocks(reinterpret_cast<Block*>(b), mesh, ids);
+        Box4 box;
+        form->fill_and_extend(c, mesh, ids, box);
+        Bounds3f bounds;
+        for (const std::uint32_t id : ids) bounds.extend(mesh.bounds(id));
+        not_bounds += to_vec3f(box.lower) != bounds.lower || to_vec3f(box.upper) != bounds.upper;
+        different += std::memcmp(a, c, (ids.size() + Block::kWidth - 1) / Block::kWidth * sizeof(Block)) != 0;
         const std::size_t words = (ids.size() + Block::kWidth - 1) / Block::kWidth * sizeof(Block) / 4;
         for (std::size_t i = 0; i < words; ++i) {
           std::uint32_t x, y;
@@ -195,6 +208,7 @@ TEST_CASE("leaves filled by fours are the blocks that are filled one by one") {
     }
   });
   CHECK(different == 0);
+  CHECK(not_bounds == 0);
   CHECK(flat > 0);
 }
 

@@ -119,6 +119,23 @@ TEST_CASE("the memory meter sees what arenas and vectors hold, and their peak") 
   CHECK(MemoryMeter::peak() == before + (1 << 20) + 4000);
 }
 
+TEST_CASE("a reserved array becomes an arena of what it has handed out") {
+  const std::size_t before = MemoryMeter::current();
+  {
+    ReservedArray<std::byte> array;
+    array.reserve(3 << 20);
+    array.hand_out(900), array.hand_out(100);
+    CHECK(array.handed_out() == 1000);
+    const std::byte* const data = array.data();
+    const Arena arena(std::move(array));
+    CHECK(array.empty());
+    CHECK(arena.data() == data);
+    CHECK(arena.bytes() == 1000);
+    CHECK(MemoryMeter::current() == before + 1000);
+  }
+  CHECK(MemoryMeter::current() == before);
+}
+
 TEST_CASE("a reserved array counts what it has handed out, less the pages it gave back") {
   const std::size_t before = MemoryMeter::current(), n = 1 << 20;
   {

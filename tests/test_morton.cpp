@@ -1,6 +1,11 @@
-// `morton`: its codes, its order, and how full its leaves are.
+// `morton`: its codes, its order, how full its leaves are, and leaf blocks that are filled while it makes the tree.
+#include <cstring>
+
+#include <tbb/global_control.h>
+
 #include "core/error.h"
 #include "structures/builders/morton_order.h"
+#include "structures/leaves/leaf_blocks.h"
 #include "tests/builder_checks.h"
 
 using namespace arboretum;
@@ -96,6 +101,76 @@ TEST_CASE("morton: what three leaf blocks hold fills no more than it needs") {
     leaves(leaves, 0);
     CHECK(seen > 25000 / (4 * width));
     CHECK(wrong == 0);
+  }
+}
+
+namespace {
+
+struct TreeInBlocks {
+  BinaryTree tree;
+  Arena blocks;
+};
+
+TreeInBlocks build_in_blocks(const TriangleMesh& mesh, const LeafForm& form, unsigned threads) {
+  LeafBlocks blocks(form, 0);
+  BuildSettings settings;
+  settings.builder = "morton", settings.isa = best_isa(), settings.threads = threads;
+  TreeInBlocks built;
+  BuildReport report;
+  tbb::task_arena(int(threads), 1).execute([&] {
+    build_binary_tree(mesh, settings, form.width, built.tree, report, {2, {}, &blocks});
+  });
+  REQUIRE(built.tree.in_blocks);
+  built.blocks = blocks.take(0);
+  return built;
+}
+
+/// Compares the trees below two nodes; `block` is the first below, then the one behind.
+void check_same(const BinaryTree& a, std::uint32_t i, const TreeInBlocks& b, std::uint32_t j, const LeafForm& form,
+                std::size_t& block, std::size_t& wrong) {
+  const BinaryNode &x = a.nodes[i], &y = b.tree.nodes[j];
+  wrong += x.lower != y.lower || x.upper != y.upper || x.is_leaf() != y.is_leaf();
+  if (wrong > 0) return;
+  const std::size_t first = block;
+  if (x.is_leaf()) {
+    std::vector<std::uint32_t> ids;
+    form.append(b.blocks.data() + block++ * form.bytes, 1, ids);
+    wrong += !std::equal(ids.begin(), ids.end(), &a.primitives[a.first[i]], &a.primitives[a.first[i]] + x.count);
+  } else {
+    check_same(a, x.left, b, y.left, form, block, wrong), check_same(a, x.left + 1, b, y.left + 1, form, block, wrong);
+  }
+  wrong += y.count != (block - first) * form.width;
+}
+
+}  // namespace
+
+TEST_CASE("morton: leaf blocks filled while the tree is made are the tree's, in its order, for any number of threads") {
+  const tbb::global_control more_threads_than_cores(tbb::global_control::max_allowed_parallelism, 7);
+  std::vector<Vec3f> peeled;  // one by one
+  for (int i = 0; i < 20; ++i)
+    for (const Vec3f& axis : {Vec3f{1, 0, 0}, Vec3f{0, 1, 0}, Vec3f{0, 0, 1}})
+      peeled.push_back(axis * std::ldexp(1, i));
+  for (int i = 0; i < 20; ++i) peeled.push_back({0, 0, 0});
+  std::vector<Vec3f> crowded = random_points(150000, 1.0f, 7);  // more than the caches are taken to hold
+  for (const Vec3f& p : random_points(20000, 1e-4f, 8)) crowded.push_back(p);
+  for (const TriangleMesh& mesh :
+       {random_triangles(1, 0.5f, 1), copies(peeled, std::vector<float>(peeled.size(), 1e-3f)), sphere(80),
+        copies(crowded, std::vector<float>(crowded.size(), 1e-3f))}) {
+    for (const char* leaf : {"triangle1", "triangle4v", "triangle8", "triangle16h"}) {
+      INFO(mesh.size() << " triangles, " << leaf);
+      const LeafForm& form = *find_leaf_form(leaf);
+      const BinaryTree tree = build("morton", mesh, form.width);
+      const TreeInBlocks one = build_in_blocks(mesh, form, 1);
+      std::size_t block = 0, wrong = 0;
+      check_same(tree, 0, one, 0, form, block, wrong);
+      CHECK(wrong == 0);
+      CHECK(one.blocks.bytes() == block * form.bytes);
+      for (const unsigned threads : {2u, 7u}) {
+        const TreeInBlocks other = build_in_blocks(mesh, form, threads);
+        REQUIRE(other.blocks.bytes() == one.blocks.bytes());
+        CHECK(std::memcmp(other.blocks.data(), one.blocks.data(), one.blocks.bytes()) == 0);
+      }
+    }
   }
 }
 

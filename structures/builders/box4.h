@@ -60,6 +60,8 @@ class TriangleBoxes {
   explicit TriangleBoxes(const TriangleMesh& mesh) noexcept
       : triangles_(mesh.triangles.data()), vertices_(mesh.vertices.data()), corner_(mesh), far_(mesh.size() > kNear) {}
 
+  /// Whether the mesh is larger than the caches.
+  [[nodiscard]] bool are_far() const noexcept { return far_; }
   [[nodiscard]] Box4 box(std::size_t i) const noexcept {
     const Triangle t = triangles_[i];
     const __m128 a = corner_[t.a], b = corner_[t.b], c = corner_[t.c];

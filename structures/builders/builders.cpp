@@ -54,6 +54,9 @@ struct Entry {
   BinaryBuilder (*on)(Isa);
   std::array<std::string_view, 4> reads = {};  ///< of BuilderParameters; reinsertion's apart
   unsigned reinserted_top = 0;                 ///< where reinsertion_top leaves it to the builder
+  /// The builder where it may fill leaf blocks as well.
+  void (*in_blocks)(const TriangleMesh&, const BuilderParameters&, unsigned, LeafBlocks&, BinaryTree&,
+                    BuildReport&) = nullptr;
 };
 
 /// Nodes that top-down builders reinsert: hardly more is gained by all (docs/performance.md).
@@ -69,7 +72,7 @@ constexpr Entry kBuilders[] = {
      on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>,
      {"bins", "duplication_budget", "spatial_overlap", "spatial_gain"},
      kTop},
-    {"morton", on_any<build_morton>, {"morton_bits"}},
+    {"morton", on_any<build_morton>, {"morton_bits"}, 0, build_morton_in_blocks},
     {"ploc", on_any<build_ploc>, {"morton_bits", "ploc_radius"}},
 #ifdef ARBORETUM_HAVE_EMBREE
     {"embree_low", on_any<build_embree_low>, {"traversal_cost", "intersection_cost"}},
@@ -146,11 +149,14 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
   if (found.reinserts) require_within("reinsertion_rounds", p.reinsertion_rounds, kBuilderLimits.reinsertion_rounds);
   const bool own_top = p.reinsertion_top == BuilderParameters::kOwn;
   if (!own_top) require_within("reinsertion_top", p.reinsertion_top, kBuilderLimits.reinsertion_top);
+  const unsigned top = own_top ? found.entry->reinserted_top : p.reinsertion_top;
   const bool splits = found.reads("duplication_budget");
   require_budget(found.entry->name, mesh.size(), splits ? p.duplication_budget : 0.0f);
 
+  if (use.blocks && found.entry->in_blocks && top == 0 && !found.reinserts)
+    return found.entry->in_blocks(mesh, p, leaf_width, *use.blocks, tree, report);
   found.entry->on(settings.isa)(mesh, p, leaf_width, tree, report);
-  reinsert_top(tree, own_top ? found.entry->reinserted_top : p.reinsertion_top, report);
+  reinsert_top(tree, top, report);
   if (!found.reinserts) return;
   // A wide node stands for log2(branching) levels of binary ones.
   const ReinsertionCosts costs{p.traversal_cost / std::log2(float(use.branching)), kLeafVisit * p.intersection_cost,

@@ -12,6 +12,8 @@
 
 namespace arboretum {
 
+class LeafBlocks;
+
 /// Builds a binary tree with leaves of at most `leaf_width` references. Deterministic: the tree depends on the mesh,
 /// the parameters and `leaf_width`, not on threads or ISA. Runs in the caller's TBB arena. The mesh may be empty: then
 /// the tree is, too.
@@ -22,6 +24,7 @@ using BinaryBuilder = void (*)(const TriangleMesh& mesh, const BuilderParameters
 struct TreeUse {
   unsigned branching = 2;                           ///< most children of a node
   std::function<double(const BinaryTree&)> cost{};  ///< in any unit, the less the better; none: of the tree as it is
+  LeafBlocks* blocks = nullptr;                     ///< where a builder that can may fill them: BinaryTree::in_blocks
 };
 
 /// Every builder that makes a binary tree; the first is the default.

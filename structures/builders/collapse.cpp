@@ -1,7 +1,7 @@
 #include "structures/builders/collapse.h"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -71,7 +71,7 @@ struct Collapse::Shares {
 
 Collapse::Collapse(const BinaryTree& tree, const CollapseSettings& settings) : tree_(tree), settings_(settings) {
   plan_.resize(tree.node_count);
-  if (tree.primitives.empty()) return;
+  if (tree.node_count == 0) return;
   if (settings_.optimal) {
     choice_.resize((tree.node_count / 2 + 1) * settings_.branching);
     Costs root;
@@ -233,7 +233,8 @@ class Collapse::Writer {
     if (collapse_.is_leaf(index)) {
       const unsigned blocks = collapse_.blocks(index);
       out_[place] = WideNode::leaf(box, begin, node.count, blocks, tree_.duplicates && !node.is_leaf());
-      return {(kLeafVisit + float(blocks)) * settings.intersection_cost, granules(blocks * settings.block_bytes)};
+      return {(kLeafVisit + float(blocks)) * settings.intersection_cost,
+              granules(tree_.in_blocks ? 0 : blocks * settings.block_bytes)};
     }
     const Slots slots = collapse_.children(index, begin);
     const std::uint32_t first = take(slots.size, share);
@@ -265,8 +266,9 @@ class Collapse::Writer {
   /// within a factor of eight, stay as the builder has them, next to each other in space.
   static void order(WideNode* children, const float* costs, unsigned size) noexcept {
     int cost[kMaxBranching];
-    // round(log8(cost)): of at least 1, but for settings of one's own
-    for (unsigned i = 0; i < size; ++i) cost[i] = std::ilogb(costs[i] * 0x1.6a09e6p1f) / 3;
+    // round(log8(cost)): of at least 1, but for settings of one's own; the exponent as the bits have it
+    for (unsigned i = 0; i < size; ++i)
+      cost[i] = ((std::bit_cast<std::int32_t>(costs[i] * 0x1.6a09e6p1f) >> 23) - 127) / 3;
     for (unsigned i = 1; i < size; ++i) {
       const WideNode moved = children[i];
       const int its = cost[i];
@@ -287,7 +289,7 @@ class Collapse::Writer {
 };
 
 std::uint64_t Collapse::write(ReservedArray<WideNode>& out) const {
-  return tree_.primitives.empty() ? 0 : Writer(*this, out).write();
+  return tree_.node_count == 0 ? 0 : Writer(*this, out).write();
 }
 
 double Collapse::cost(std::uint32_t index) const {
@@ -306,7 +308,7 @@ double Collapse::cost(std::uint32_t index) const {
 }
 
 double sah_cost(const BinaryTree& tree, const CollapseSettings& settings) {
-  return tree.primitives.empty() ? 0.0 : Collapse(tree, settings).cost(0);
+  return tree.node_count == 0 ? 0.0 : Collapse(tree, settings).cost(0);
 }
 
 WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings) {
@@ -314,7 +316,7 @@ WideTree collapse(BinaryTree&& tree, const CollapseSettings& settings) {
   const Collapse plan(tree, settings);
   tree.first.clear();
   wide.granules = plan.write(wide.nodes);
-  wide.primitives = std::move(tree.primitives);
+  wide.primitives = std::move(tree.primitives), wide.in_blocks = tree.in_blocks;
   tree.nodes.clear();
   return wide;
 }

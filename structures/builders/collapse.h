@@ -83,7 +83,8 @@ static_assert(sizeof(WideNode) == 32);
 struct WideTree {
   ReservedArray<WideNode> nodes;
   MeteredVector<std::uint32_t> primitives;
-  std::uint64_t granules = 0;  ///< of the whole tree
+  bool in_blocks = false;      ///< as of the binary tree
+  std::uint64_t granules = 0;  ///< of the whole tree, but for leaves that are filled
 
   [[nodiscard]] std::span<const WideNode> children(const WideNode& node) const noexcept {
     return {nodes.data() + node.first(), node.children()};

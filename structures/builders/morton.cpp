@@ -5,7 +5,11 @@
 // Unlike in the paper a range that a few leaf blocks hold is cut only where those are not made more, so that leaves are
 // full.
 #include <algorithm>
+#include <utility>
+#include <vector>
 
+#include <tbb/concurrent_vector.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
 #include "structures/builders/box4.h"
@@ -14,6 +18,7 @@
 #include "structures/builders/node_pool.h"
 #include "structures/builders/one_task.h"
 #include "structures/builders/phase_clock.h"
+#include "structures/leaves/leaf_blocks.h"
 
 namespace arboretum {
 namespace {
@@ -22,80 +27,198 @@ constexpr std::size_t kFewBlocks = 3;     ///< ranges of so many leaf blocks are
 constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 21 bits of their codes at first, in two
                                           ///< passes; more by 30 bits, in three
 
-class Lbvh {
+/// Leaves as ranges of BinaryTree::primitives.
+class RangesOfIds {
  public:
-  Lbvh(const TriangleMesh& mesh, MortonOrder& order, unsigned leaf_width, BinaryTree& tree)
-      : boxes_(mesh), order_(order), leaf_width_(leaf_width), tree_(tree), pool_(tree, order.size(), kOneTask) {}
-
-  void build() {
-    const std::size_t n = order_.size();
-    tree_.primitives.resize(n);
-    NodePool::Share share;
-    recurse(0, n, n - 1, 0, order_.sorted_bits(), share);
-    pool_.finish();
-  }
-
- private:
-  Box4 leaf(std::size_t begin, std::size_t end, std::size_t last) noexcept {
-    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, last);
+  RangesOfIds(const TriangleMesh& mesh, const MortonOrder& order, BinaryTree& tree)
+      : boxes_(mesh), order_(order), tree_(tree) {}
+  /// How many places a leaf takes.
+  [[nodiscard]] std::size_t places(std::size_t triangles) const noexcept { return triangles; }
+  void make(std::size_t places) const { tree_.primitives.resize(places); }
+  /// Makes a leaf of [begin, end) of the order, from `place` on; returns its box.
+  Box4 leaf(std::uint32_t index, std::size_t begin, std::size_t end, std::size_t place) const noexcept {
+    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, order_.size() - 1);
+    tree_.first[index] = std::uint32_t(place);
     Box4 box;
-    for (std::size_t i = begin; i < end; ++i) box.extend(boxes_.box(tree_.primitives[i] = order_.id(i)));
+    for (std::size_t i = begin; i < end; ++i) box.extend(boxes_.box(tree_.primitives[place++] = order_.id(i)));
     return box;
   }
 
-  std::size_t split(std::size_t begin, std::size_t end) const noexcept {
+ private:
+  const TriangleBoxes boxes_;
+  const MortonOrder& order_;
+  BinaryTree& tree_;
+};
+
+/// Leaves as lanes of filled blocks.
+class FilledBlocks {
+ public:
+  FilledBlocks(const TriangleMesh& mesh, const MortonOrder& order, unsigned width, LeafBlocks& blocks)
+      : mesh_(mesh), boxes_(mesh), order_(order), width_(width), blocks_(blocks) {}
+  [[nodiscard]] std::size_t places(std::size_t) const noexcept { return width_; }
+  void make(std::size_t places) const { blocks_.make(places / width_); }
+  Box4 leaf(std::uint32_t, std::size_t begin, std::size_t end, std::size_t place) const noexcept {
+    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, order_.size() - 1);
+    std::uint32_t ids[kMostWidth];
+    for (std::size_t i = begin; i < end; ++i) ids[i - begin] = order_.id(i);
+    Box4 box;
+    blocks_.fill(place / width_, mesh_, {ids, end - begin}, box);
+    return box;
+  }
+
+ private:
+  static constexpr std::size_t kMostWidth = 16;
+  const TriangleMesh& mesh_;
+  const TriangleBoxes boxes_;
+  const MortonOrder& order_;
+  const unsigned width_;
+  LeafBlocks& blocks_;
+};
+
+/// Where a leaf lies must not depend on scheduling: the whole order is cut before leaves are made.
+template <class Leaves>
+class Lbvh {
+ public:
+  Lbvh(MortonOrder& order, unsigned leaf_width, const Leaves& leaves, BinaryTree& tree)
+      : order_(order), leaf_width_(leaf_width), leaves_(leaves), tree_(tree), pool_(tree, order.size(), kOneTask) {}
+
+  void build() {
+    cut_into_tasks({0, 0, order_.size(), order_.sorted_bits(), {}, {}});
+    std::vector<Task*> tasks;
+    for (Task& task : tasks_) tasks.push_back(&task);
+    std::ranges::sort(tasks, {}, &Task::begin);
+    const auto for_tasks = [&](const auto& f) {
+      tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t i) { f(*tasks[i]); });
+    };
+    for_tasks([this](Task& t) { t.place = cut(t.index, t.begin, t.end, t.sorted, t.share); });
+    std::size_t all = 0;
+    for (Task* t : tasks) all += std::exchange(t->place, all);
+    leaves_.make(all);
+    for_tasks([this](Task& t) { (void)fill(t.index, t.begin, t.place); });
+    pool_.finish();
+    auto task = tasks.begin();
+    (void)join(0, task);
+  }
+
+ private:
+  /// A subtree that one task makes, of [begin, end).
+  struct Task {
+    std::uint32_t index;
+    std::size_t begin, end;
+    unsigned sorted;  ///< bits that the range is sorted by
+    NodePool::Share share;
+    std::size_t place;  ///< how many places its leaves take, then which is the first
+  };
+
+  std::size_t split(std::size_t begin, std::size_t end, unsigned& sorted) {
+    while (order_.refinable(begin, end, sorted)) sorted = order_.refine(begin, end, sorted);
     return end - begin <= kFewBlocks * leaf_width_ ? order_.split_into_blocks(begin, end, leaf_width_)
                                                    : order_.split(begin, end);
   }
 
-  /// [begin, end) is sorted by the first `sorted` bits of the codes; the task that calls goes on up to `last`.
-  Box4 recurse(std::size_t begin, std::size_t end, std::size_t last, std::uint32_t index, unsigned sorted,
-               NodePool::Share& share) {
-    Box4 box;
-    std::uint32_t left = 0;
-    if (end - begin <= leaf_width_) {
-      tree_.first[index] = std::uint32_t(begin);
-      box = leaf(begin, end, last);
-    } else {
-      while (order_.refinable(begin, end, sorted)) sorted = order_.refine(begin, end, sorted);
-      const std::size_t middle = split(begin, end);
-      left = pool_.take_pair(share);
-      Box4 other;
-      if (middle - begin > kOneTask && end - middle > kOneTask) {
+  /// The upper nodes: those of which both sides are too large for a task.
+  void cut_into_tasks(const Task& whole) {
+    Task task = whole;
+    if (task.end - task.begin > 2 * kOneTask) {
+      const std::size_t middle = split(task.begin, task.end, task.sorted);
+      if (middle - task.begin > kOneTask && task.end - middle > kOneTask) {
+        const std::uint32_t left = pool_.take_pair(task.share);
+        tree_.nodes[task.index].left = left;
         tbb::parallel_invoke(
             [&] {
-              NodePool::Share own;
-              box = recurse(begin, middle, middle - 1, left, sorted, own);
+              cut_into_tasks({left, task.begin, middle, task.sorted, {}, {}});
             },
-            [&] { other = recurse(middle, end, last, left + 1, sorted, share); });
-      } else {
-        box = recurse(begin, middle, last, left, sorted, share);
-        other = recurse(middle, end, last, left + 1, sorted, share);
+            [&] {
+              cut_into_tasks({left + 1, middle, task.end, task.sorted, task.share, {}});
+            });
+        return;
       }
-      box.extend(other);
     }
-    tree_.nodes[index] = {to_vec3f(box.lower), left, to_vec3f(box.upper), std::uint32_t(end - begin)};
+    tasks_.push_back(task);
+  }
+
+  /// Links the nodes of a subtree and notes the triangles of leaves; returns how many places those take.
+  std::size_t cut(std::uint32_t index, std::size_t begin, std::size_t end, unsigned sorted, NodePool::Share& share) {
+    BinaryNode& node = tree_.nodes[index];
+    if (end - begin <= leaf_width_) {
+      node.left = 0, node.count = std::uint32_t(end - begin);
+      return leaves_.places(end - begin);
+    }
+    const std::size_t middle = split(begin, end, sorted);
+    const std::uint32_t left = node.left = pool_.take_pair(share);
+    const std::size_t before = cut(left, begin, middle, sorted, share);
+    return before + cut(left + 1, middle, end, sorted, share);
+  }
+
+  void put(std::uint32_t index, const Box4& box, std::size_t places) noexcept {
+    BinaryNode& node = tree_.nodes[index];
+    node.lower = to_vec3f(box.lower), node.upper = to_vec3f(box.upper), node.count = std::uint32_t(places);
+  }
+
+  /// Makes the leaves of a subtree that was cut, from `begin` of the order and `place` on; both go on behind it.
+  Box4 fill(std::uint32_t index, std::size_t& begin, std::size_t& place) noexcept {
+    const BinaryNode node = tree_.nodes[index];
+    const std::size_t first = place;
+    Box4 box;
+    if (node.is_leaf()) {
+      box = leaves_.leaf(index, begin, begin + node.count, place);
+      begin += node.count, place += leaves_.places(node.count);
+    } else {
+      box = fill(node.left, begin, place);
+      box.extend(fill(node.left + 1, begin, place));
+    }
+    put(index, box, place - first);
     return box;
   }
 
-  const TriangleBoxes boxes_;
+  /// Boxes of the upper nodes; `task` is the first below `index`, then the one behind.
+  Bounds3f join(std::uint32_t index, typename std::vector<Task*>::iterator& task) noexcept {
+    BinaryNode& node = tree_.nodes[index];
+    if (index == (*task)->index) {
+      ++task;
+    } else {
+      Bounds3f box = join(node.left, task);
+      box.extend(join(node.left + 1, task));
+      node.lower = box.lower, node.upper = box.upper;
+      node.count = tree_.nodes[node.left].count + tree_.nodes[node.left + 1].count;
+    }
+    return {node.lower, node.upper};
+  }
+
   MortonOrder& order_;
   const unsigned leaf_width_;
+  const Leaves leaves_;
   BinaryTree& tree_;
   NodePool pool_;
+  tbb::concurrent_vector<Task> tasks_;
 };
 
-}  // namespace
-
-void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
-                  BuildReport& report) {
+/// `make_leaves(order)`: what makes them.
+template <class MakeLeaves>
+void build(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
+           BuildReport& report, const MakeLeaves& make_leaves) {
   check_morton_bits(parameters.morton_bits);
   if (mesh.size() == 0) return;
   PhaseClock phase(report);
   MortonOrder order(mesh, parameters.morton_bits, mesh.size() <= kSmall ? 21 : MortonOrder::kAtOnce);
   phase.ends("order");
-  Lbvh(mesh, order, leaf_width, tree).build();
+  Lbvh(order, leaf_width, make_leaves(order), tree).build();
   phase.ends("tree");
+}
+
+}  // namespace
+
+void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
+                  BuildReport& report) {
+  build(mesh, parameters, leaf_width, tree, report,
+        [&](const MortonOrder& order) { return RangesOfIds(mesh, order, tree); });
+}
+
+void build_morton_in_blocks(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+                            LeafBlocks& blocks, BinaryTree& tree, BuildReport& report) {
+  tree.in_blocks = true;
+  build(mesh, parameters, leaf_width, tree, report,
+        [&](const MortonOrder& order) { return FilledBlocks(mesh, order, leaf_width, blocks); });
 }
 
 }  // namespace arboretum

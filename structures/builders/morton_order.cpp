@@ -54,22 +54,16 @@ Box4 doubled_vertex_bounds(const TriangleMesh& mesh) {
   return {_mm_add_ps(all.lower, all.lower), _mm_add_ps(all.upper, all.upper)};
 }
 
-/// Four keys of codes and ids.
-void put_keys(std::uint64_t* to, __m128i code, __m128i id) noexcept {
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_unpacklo_epi32(id, code));
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(to + 2), _mm_unpackhi_epi32(id, code));
-}
-
-/// Sorts n keys, whose ids ascend, by the `bits` of their codes, by digits that suit a few hundred. They are then in
-/// `keys` or `room`: where is returned.
-std::uint64_t* sort_few(std::uint64_t* keys, std::uint64_t* room, std::size_t n, unsigned bits) noexcept {
+/// Sorts n keys by `bits` above the `low` lowest, by digits that suit a few hundred, or very few by all bits; what
+/// stands above is the same for all. They are then in `keys` or `room`: where is returned.
+std::uint64_t* sort_few(std::uint64_t* keys, std::uint64_t* room, std::size_t n, unsigned low, unsigned bits) noexcept {
   if (n <= kVeryFew) {
     std::sort(keys, keys + n);
     return keys;
   }
   const unsigned most = std::clamp(unsigned(std::bit_width(n)), 6u, kMostDigitBits), passes = (bits + most - 1) / most;
   for (unsigned pass = 0; pass < passes; ++pass) {
-    const unsigned shift = 32 + bits * pass / passes, digit_bits = 32 + bits * (pass + 1) / passes - shift;
+    const unsigned shift = low + bits * pass / passes, digit_bits = low + bits * (pass + 1) / passes - shift;
     const std::uint64_t mask = (std::uint64_t{1} << digit_bits) - 1;
     std::uint32_t place[1u << kMostDigitBits];
     std::fill_n(place, mask + 1, 0u);
@@ -96,22 +90,40 @@ std::uint64_t MortonCells::code(__m128 point) const noexcept {
   return morton_code(c[0], c[1], c[2]);
 }
 
-__m128i MortonCells::bits(const __m128 (&point)[4], unsigned skipped, unsigned count) const noexcept {
+__attribute__((always_inline)) inline void MortonCells::put_keys(const __m128 (&point)[4], __m128i id, unsigned id_bits,
+                                                                 unsigned skipped, unsigned count,
+                                                                 std::uint64_t* keys) const noexcept {
   const Points4 p(point[0], point[1], point[2], point[3]);
-  const __m128i shift = _mm_cvtsi32_si128(int(axis_bits_ - (skipped + count) / 3)),
-                mask = _mm_set1_epi32((1 << count / 3) - 1);
-  const auto axis = [&](__m128 at, __m128 lower) {
-    __m128i v = _mm_and_si128(_mm_srl_epi32(number(at, lower, scale_, last_), shift), mask);
-    const auto spread = [&v](int by, int kept) {
-      v = _mm_and_si128(_mm_or_si128(v, _mm_slli_epi32(v, by)), _mm_set1_epi32(kept));
+  const auto number_of = [this](__m128 at, __m128 lower) { return number(at, lower, scale_, last_); };
+  const __m128i x = number_of(p.x, _mm_shuffle_ps(lower_, lower_, 0x00)),
+                y = number_of(p.y, _mm_shuffle_ps(lower_, lower_, 0x55)),
+                z = number_of(p.z, _mm_shuffle_ps(lower_, lower_, 0xaa));
+  const auto bits_of_codes = [&](unsigned behind, unsigned bits) {
+    const __m128i shift = _mm_cvtsi32_si128(int(axis_bits_ - (behind + bits) / 3)),
+                  mask = _mm_set1_epi32((1 << bits / 3) - 1);
+    const auto axis = [&](__m128i v) {
+      v = _mm_and_si128(_mm_srl_epi32(v, shift), mask);
+      const auto spread = [&v](int by, int kept) {
+        v = _mm_and_si128(_mm_or_si128(v, _mm_slli_epi32(v, by)), _mm_set1_epi32(kept));
+      };
+      if (bits > 24) spread(16, 0x030000ff);  // as spread_bits()
+      if (bits > 12) spread(8, 0x0300f00f);
+      spread(4, 0x030c30c3), spread(2, 0x09249249);
+      return v;
     };
-    spread(16, 0x030000ff), spread(8, 0x0300f00f), spread(4, 0x030c30c3), spread(2, 0x09249249);  // as spread_bits()
-    return v;
+    return _mm_or_si128(_mm_or_si128(_mm_slli_epi32(axis(x), 2), _mm_slli_epi32(axis(y), 1)), axis(z));
   };
-  const __m128i x = axis(p.x, _mm_shuffle_ps(lower_, lower_, 0x00)),
-                y = axis(p.y, _mm_shuffle_ps(lower_, lower_, 0x55)),
-                z = axis(p.z, _mm_shuffle_ps(lower_, lower_, 0xaa));
-  return _mm_or_si128(_mm_or_si128(_mm_slli_epi32(x, 2), _mm_slli_epi32(y, 1)), z);
+  // A lane of 32 bits has room for 30.
+  const unsigned first = std::min(count, 30u), others = count - first;
+  const __m128i high = bits_of_codes(skipped, first), zero = _mm_setzero_si128(),
+                low = others > 0 ? bits_of_codes(skipped + first, others) : zero;
+  const __m128i above_low = _mm_cvtsi32_si128(int(others)), above_id = _mm_cvtsi32_si128(int(id_bits));
+  const auto put = [&](std::uint64_t* to, __m128i its_high, __m128i its_low, __m128i its_id) {
+    const __m128i code = _mm_or_si128(_mm_sll_epi64(its_high, above_low), its_low);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_or_si128(_mm_sll_epi64(code, above_id), its_id));
+  };
+  put(keys, _mm_unpacklo_epi32(high, zero), _mm_unpacklo_epi32(low, zero), _mm_unpacklo_epi32(id, zero));
+  put(keys + 2, _mm_unpackhi_epi32(high, zero), _mm_unpackhi_epi32(low, zero), _mm_unpackhi_epi32(id, zero));
 }
 
 void check_morton_bits(unsigned bits) {
@@ -119,7 +131,8 @@ void check_morton_bits(unsigned bits) {
 }
 
 MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorted)
-    : boxes_(mesh), bits_(bits), sorted_(sorted), keys_(mesh.size()) {
+    : boxes_(mesh), bits_(bits), sorted_(sorted), id_bits_(unsigned(std::bit_width(mesh.size()))),
+      held_(std::min(bits, boxes_.are_far() ? (64 - id_bits_) / 3 * 3 : 30)), keys_(mesh.size()) {
   check_morton_bits(bits);
   const std::size_t n = mesh.size();
   if (n == 0) return;
@@ -132,7 +145,7 @@ MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorte
     cells_ = MortonCells(centroids, bits);
     make_keys();
   }
-  radix_sort(keys_, 32, 32 + sorted);
+  radix_sort(keys_, below(sorted), below(0));
 }
 
 /// Puts the keys in the triangles' order; returns the bounds of the doubled centroids.
@@ -148,10 +161,11 @@ Box4 MortonOrder::make_keys() {
     };
     std::size_t i = begin;
     for (; i + 4 <= end; i += 4) {
-      const __m128i code = cells.bits({centroid(i), centroid(i + 1), centroid(i + 2), centroid(i + 3)}, 0, sorted_);
-      put_keys(&keys_[i], code, _mm_add_epi32(_mm_set1_epi32(int(i)), _mm_setr_epi32(0, 1, 2, 3)));
+      const __m128i ids = _mm_add_epi32(_mm_set1_epi32(int(i)), _mm_setr_epi32(0, 1, 2, 3));
+      cells.put_keys({centroid(i), centroid(i + 1), centroid(i + 2), centroid(i + 3)}, ids, id_bits_, 0, held_,
+                     &keys_[i]);
     }
-    for (; i < end; ++i) keys_[i] = cells.code(centroid(i)) >> (bits_ - sorted_) << 32 | i;
+    for (; i < end; ++i) keys_[i] = cells.code(centroid(i)) >> (bits_ - held_) << id_bits_ | i;
     partial[c] = all;
   });
   Box4 all;
@@ -159,16 +173,16 @@ Box4 MortonOrder::make_keys() {
   return all;
 }
 
-/// Writes the keys of [begin, end) with `more` bits of their codes behind the first `sorted`.
-void MortonOrder::next_codes(std::size_t begin, std::size_t end, unsigned sorted, unsigned more,
-                             std::uint64_t* keys) const noexcept {
+/// Writes the keys of [begin, end) with the bits of their codes behind the first held_.
+void MortonOrder::next_codes(std::size_t begin, std::size_t end, std::uint64_t* keys) const noexcept {
   for (std::size_t i = begin; i < end; i += 4, keys += 4) {
     boxes_.prefetch([this](std::size_t k) { return id(k); }, i, i + 4, end - 1);
     std::uint32_t ids[4];
     __m128 centroids[4];
     for (std::size_t k = 0; k < 4; ++k)
       ids[k] = id(std::min(i + k, end - 1)), centroids[k] = doubled_centroid(boxes_.box(ids[k]));
-    put_keys(keys, cells_.bits(centroids, sorted, more), _mm_loadu_si128(reinterpret_cast<const __m128i*>(ids)));
+    cells_.put_keys(centroids, _mm_loadu_si128(reinterpret_cast<const __m128i*>(ids)), id_bits_, held_, bits_ - held_,
+                    keys);
   }
 }
 
@@ -178,20 +192,30 @@ unsigned MortonOrder::refine(std::size_t begin, std::size_t end, unsigned sorted
   // A surface of n triangles is in some 2^(2/3 b) of the cells that b bits tell apart; the rest is left for where it is
   // asked for.
   const unsigned enough = 3 * ((unsigned(std::bit_width(n)) + 1) / 2);
-  const unsigned more = std::min({bits_ - sorted, kAtOnce, enough});
+  const bool anew = sorted == held_;
+  const unsigned now = sorted + std::min((sorted < held_ ? held_ : bits_) - sorted, enough), low = below(now);
   if (n <= kFew) {
     std::array<std::uint64_t, kFew + 3> run, room;
-    next_codes(begin, end, sorted, more, run.data());
-    std::copy_n(sort_few(run.data(), room.data(), n, more), n, first);
+    if (anew) {
+      next_codes(begin, end, run.data());
+    } else {
+      std::copy_n(first, n, run.data());
+    }
+    std::copy_n(sort_few(run.data(), room.data(), n, low, now - sorted), n, first);
   } else {
     MeteredVector<std::uint64_t> run((n + 3) / 4 * 4);
-    for_chunks(
-        n, [&](std::size_t, std::size_t b, std::size_t e) { next_codes(begin + b, begin + e, sorted, more, &run[b]); });
+    for_chunks(n, [&](std::size_t, std::size_t b, std::size_t e) {
+      if (anew) {
+        next_codes(begin + b, begin + e, &run[b]);
+      } else {
+        std::copy(first + std::ptrdiff_t(b), first + std::ptrdiff_t(e), &run[b]);
+      }
+    });
     run.resize(n);
-    radix_sort(run, 32, 32 + more);
+    radix_sort(run, low, low + now - sorted);
     std::copy(run.begin(), run.end(), first);
   }
-  return sorted + more;
+  return now;
 }
 
 void MortonOrder::refine_runs(std::size_t longest) { refine_runs(0, size(), longest, sorted_); }
@@ -201,7 +225,7 @@ void MortonOrder::refine_runs(std::size_t begin, std::size_t end, std::size_t lo
   std::vector<std::pair<std::size_t, std::size_t>> runs;
   for (std::size_t i = begin; i < end;) {
     const std::size_t first = i;
-    while (i < end && code(i) == code(first)) ++i;
+    while (i < end && agree(i, first, sorted)) ++i;
     if (i - first > longest) runs.emplace_back(first, i);
   }
   tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t r) {
@@ -213,7 +237,7 @@ void MortonOrder::refine_runs(std::size_t begin, std::size_t end, std::size_t lo
 std::size_t MortonOrder::split(std::size_t begin, std::size_t end) const noexcept {
   if (code(begin) == code(end - 1)) return begin + (end - begin) / 2;
   // The first index whose code has the bit: all codes here share what stands above it.
-  const std::uint32_t bit = std::bit_floor(code(begin) ^ code(end - 1));
+  const std::uint64_t bit = std::bit_floor(code(begin) ^ code(end - 1));
   std::size_t first = begin, count = end - 1 - begin;
   while (count > 0) {
     const std::size_t half = count / 2;
@@ -227,11 +251,12 @@ std::size_t MortonOrder::split(std::size_t begin, std::size_t end) const noexcep
 std::size_t MortonOrder::split_into_blocks(std::size_t begin, std::size_t end, std::size_t width) const noexcept {
   const std::size_t blocks = (end - begin + width - 1) / width, to_spare = blocks * width - (end - begin);
   std::size_t best = begin + width;
-  std::uint32_t most = 0;
+  std::uint64_t most = 0;
   for (std::size_t full = begin + width; full < begin + blocks * width; full += width) {
     for (std::size_t i = full - to_spare; i <= full; ++i) {
-      const std::uint32_t change = code(i - 1) ^ code(i);
-      if (change > most) most = change, best = i;
+      const std::uint64_t change = code(i - 1) ^ code(i);
+      const bool more = change > most;
+      most = more ? change : most, best = more ? i : best;
     }
   }
   return best;

@@ -24,7 +24,8 @@ class NodePool {
     // Fewer than n / grain + 1 shares (both sides of a split into tasks are larger than that) leave a block unfinished
     // each, and one for each place in the arena.
     const std::size_t shares = n / grain + 2 + std::size_t(tbb::this_task_arena::max_concurrency());
-    tree.nodes.reserve(2 * n + shares * kBlock), tree.first.reserve(tree.nodes.size());
+    tree.nodes.reserve(2 * n + shares * kBlock);
+    if (!tree.in_blocks) tree.first.reserve(tree.nodes.size());
     count(1);
   }
   NodePool(const NodePool&) = delete;
@@ -40,7 +41,10 @@ class NodePool {
 
  private:
   static constexpr std::uint32_t kBlock = 64;
-  void count(std::size_t n) noexcept { tree_.nodes.hand_out(n), tree_.first.hand_out(n); }
+  void count(std::size_t n) noexcept {
+    tree_.nodes.hand_out(n);
+    if (!tree_.in_blocks) tree_.first.hand_out(n);
+  }
 
   BinaryTree& tree_;
   NumberRuns numbers_{1, kBlock};

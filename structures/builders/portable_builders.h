@@ -9,6 +9,9 @@ namespace arboretum {
 /// `morton`: linear BVH. Reads morton_bits.
 void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
                   BuildReport& report);
+/// The same tree, with the leaf blocks filled while it is made.
+void build_morton_in_blocks(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
+                            LeafBlocks& blocks, BinaryTree& tree, BuildReport& report);
 
 /// `ploc`: locally ordered clustering. Reads morton_bits and ploc_radius.
 void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,

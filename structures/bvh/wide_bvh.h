@@ -17,6 +17,7 @@
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
 #include "structures/bvh/wide_refit.h"
+#include "structures/leaves/leaf_blocks.h"
 #include "structures/leaves/leaf_names.h"
 #include "structures/parameter_limits.h"
 
@@ -38,7 +39,8 @@ template <class Format>
   return node;
 }
 
-/// Writes the wide tree into the arena: a node, then its leaves, then its inner children's subtrees.
+/// Writes the wide tree into the arena: a node, then its leaves, then its inner children's subtrees. Leaves that are
+/// filled already stand before all nodes, in the order of the tree.
 template <class Format>
 class Emitter {
  public:
@@ -56,9 +58,7 @@ class Emitter {
     std::size_t child_offset[kMaxBranching];
     for (const bool leaves : {true, false}) {
       for (unsigned i = 0; i < count; ++i) {
-        if (children[i].is_leaf() != leaves) continue;
-        child_offset[i] = next;
-        next += bytes(children[i]);
+        if (children[i].is_leaf() == leaves) child_offset[i] = place(children[i], next);
       }
     }
     Bounds3f boxes[kMaxBranching];
@@ -84,7 +84,9 @@ class Emitter {
     return 1 + *std::max_element(depth, depth + count);
   }
 
+  /// Fills a leaf's blocks, where they are not yet.
   void leaf(const WideNode& from, std::size_t offset) const {
+    if (tree_.in_blocks) return;
     boxes_.prefetch([&](std::size_t i) { return tree_.primitives[i]; }, from.first(), from.first() + from.references(),
                     tree_.primitives.size() - 1);
     LeafPrimitives room;
@@ -98,6 +100,11 @@ class Emitter {
   }
 
  private:
+  /// Where a child lies; `next`, where the next one may, goes on behind it. A leaf that is filled has its place.
+  [[nodiscard]] std::size_t place(const WideNode& child, std::size_t& next) const noexcept {
+    if (child.is_leaf() && tree_.in_blocks) return child.first() / form_.width * form_.bytes;
+    return std::exchange(next, next + bytes(child));
+  }
   /// Of a node with all below, or of a leaf.
   [[nodiscard]] std::size_t bytes(const WideNode& node) const noexcept {
     return node.is_leaf() ? round_up<Format>(node.blocks() * form_.bytes) : node.granules() * Format::kGranule;
@@ -126,6 +133,7 @@ const StructureInfo& WideBvh<Format>::static_info() {
 
 template <class Format>
 void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
+  constexpr std::uint64_t kReach = std::numeric_limits<NodeReference>::max();
   const BuilderParameters& p = settings.parameters;
   require_within("max_leaf_blocks", p.max_leaf_blocks, kBuilderLimits.max_leaf_blocks);
   require_within("bins", p.bins, kBuilderLimits.bins);
@@ -144,8 +152,12 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
                              form.bytes,
                              Format::kGranule};
   BinaryTree tree;
-  build_binary_tree(mesh, settings, form.width, tree, report,
-                    {how.branching, [&](const BinaryTree& t) { return sah_cost(t, how); }});
+  LeafBlocks blocks(form, round_up<Format>(sizeof(typename Format::Node)));
+  const bool in_blocks =
+      form.fill_and_extend && form.bytes % Format::kGranule == 0 && mesh.size() / form.width * form.bytes <= kReach;
+  build_binary_tree(
+      mesh, settings, form.width, tree, report,
+      {how.branching, [&](const BinaryTree& t) { return sah_cost(t, how); }, in_blocks ? &blocks : nullptr});
 
   double start = wall_seconds();
   const WideTree wide = collapse(std::move(tree), how);
@@ -161,19 +173,20 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
     return;
   }
   const WideNode& root = wide.nodes[0];
-  const std::uint64_t bytes = wide.granules * Format::kGranule;
-  if (bytes > std::numeric_limits<NodeReference>::max()) {
+  const std::size_t nodes_begin = blocks.bytes();
+  const std::uint64_t node_bytes = wide.granules * Format::kGranule, bytes = nodes_begin + node_bytes;
+  if (bytes > kReach) {
     throw UserError(std::string(kName) + " with " + settings.leaf + " would take " + std::to_string(bytes >> 20) +
                     " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
   }
-  arena_ = Arena(bytes);
+  arena_ = wide.in_blocks ? blocks.take(node_bytes) : Arena(node_bytes);
   const Emitter<Format> emitter(mesh, form, wide, arena_.data());
-  root_ = emitter.reference(root, 0);
+  root_ = emitter.reference(root, root.is_leaf() ? 0 : nodes_begin);
   unsigned depth = 0;
   if (is_leaf(root_)) {
     emitter.leaf(root, 0);
   } else {
-    depth = emitter.subtree(root, 0);
+    depth = emitter.subtree(root, nodes_begin);
   }
   stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
   set_scene(mesh, root.box);

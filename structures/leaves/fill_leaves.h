@@ -26,19 +26,24 @@ inline constexpr bool kFillsByFours =
   return _mm_cmpgt_ps(_mm_and_ps(_mm_sub_ps(left, right), magnitude), bound);
 }
 
-/// Lanes [lane, lane + 4) of a block, of which `ids` are triangles.
-template <class Block>
+/// Lanes [lane, lane + 4) of a block, of which `ids` are triangles; `see` gets their corners.
+template <class Block, class See>
 void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleVertices& vertices,
-               std::span<const std::uint32_t> ids) noexcept {
-  const __m128 none = _mm_set1_ps(std::numeric_limits<float>::quiet_NaN());
+               std::span<const std::uint32_t> ids, const See& see) noexcept {
   __m128 corner[3][4];
-  for (std::size_t i = 0; i < 4; ++i) {
-    block.id[lane + int(i)] = i < ids.size() ? ids[i] : kNoPrimitive;
-    if (i < ids.size()) {
-      const Triangle t = mesh.triangles[ids[i]];
-      corner[0][i] = vertices[t.a], corner[1][i] = vertices[t.b], corner[2][i] = vertices[t.c];
-    } else {
-      corner[0][i] = corner[1][i] = corner[2][i] = none;
+  const auto take = [&](std::size_t i) __attribute__((always_inline)) {
+    const Triangle t = mesh.triangles[ids[i]];
+    corner[0][i] = vertices[t.a], corner[1][i] = vertices[t.b], corner[2][i] = vertices[t.c];
+    see(corner[0][i], corner[1][i], corner[2][i]);
+    block.id[lane + int(i)] = ids[i];
+  };
+  if (ids.size() == 4) {
+    take(0), take(1), take(2), take(3);
+  } else {
+    for (std::size_t i = 0; i < ids.size(); ++i) take(i);
+    for (std::size_t i = ids.size(); i < 4; ++i) {
+      corner[0][i] = corner[1][i] = corner[2][i] = _mm_set1_ps(std::numeric_limits<float>::quiet_NaN());
+      block.id[lane + int(i)] = kNoPrimitive;
     }
   }
   Points4 a(corner[0][0], corner[0][1], corner[0][2], corner[0][3]),
@@ -71,22 +76,26 @@ void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleV
   }
 }
 
-/// fill_blocks(), by fours where the block allows it.
-template <class Block>
-void fill_leaf(Block* block, const TriangleMesh& mesh, std::span<const std::uint32_t> ids) noexcept {
+/// fill_blocks(), by fours where the block allows it. `see` gets the corners of each triangle.
+template <class Block, class See>
+void fill_leaf(Block* block, const TriangleMesh& mesh, std::span<const std::uint32_t> ids, const See& see) noexcept {
+  const TriangleVertices vertices(mesh);
   if constexpr (kFillsByFours<Block>) {
-    const TriangleVertices vertices(mesh);
     for (; !ids.empty(); ++block) {
       Block& here = *new (block) Block;
       for (int lane = 0; lane < Block::kWidth; lane += 4) {
         const std::size_t count = ids.size() < 4 ? ids.size() : 4;
-        fill_four(here, lane, mesh, vertices, ids.first(count));
+        fill_four(here, lane, mesh, vertices, ids.first(count), see);
         ids = ids.subspan(count);
       }
     }
   } else {
     fill_blocks(block, mesh, ids);
     clear_padding(block, (ids.size() + std::size_t(Block::kWidth) - 1) / std::size_t(Block::kWidth));
+    for (const std::uint32_t id : ids) {
+      const Triangle t = mesh.triangles[id];
+      see(vertices[t.a], vertices[t.b], vertices[t.c]);
+    }
   }
 }
 

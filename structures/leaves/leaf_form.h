@@ -11,6 +11,8 @@
 
 namespace arboretum {
 
+struct Box4;
+
 struct LeafForm {
   std::string_view name;  ///< the key: triangle4, ...
   unsigned width;         ///< triangles that a block can hold
@@ -21,6 +23,9 @@ struct LeafForm {
   void (*append)(const std::byte* at, unsigned blocks, std::vector<std::uint32_t>& out);
   /// How many triangles a block holds.
   unsigned (*triangles)(const std::byte* at) noexcept;
+  /// fill() that extends a box by those triangles as well; none of blocks of indices, which take no vertices.
+  void (*fill_and_extend)(std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids,
+                          Box4& box) noexcept;
 };
 
 /// Every form, in the order of AllBlocks.
