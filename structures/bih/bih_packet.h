@@ -2,8 +2,8 @@
 // lane and a bit in the mask of those that are in a node.
 //
 // Rays that share an octant share near and far, and so one traversal; a packet of mixed signs is one masked traversal
-// an octant. A far child waits on the stack with its rays and their intervals; where no more than `threshold` rays are
-// left they go on alone.
+// an octant. A far child (any hit: a near child) waits on the stack with its rays and their intervals; where no more
+// than `threshold` rays are left they go on alone.
 //
 // A ray's tests are those of bih_single.h, operation by operation, and its nodes come in the same order: it visits just
 // the nodes that it would visit alone, and its answer is the same bit for bit, with `fast` planes, too.
@@ -114,22 +114,26 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
   /// with; another waits below it.
   ARBORETUM_INLINE Entry* divide(Entry* top, unsigned axis, unsigned back) const {
     const bih::Node* const node = top->node;
-    Entry* const near = top + 1;
+    Entry* const next = top + 1;
+    Entry* const near = AnyHit ? top : next;
+    Entry* const far = AnyHit ? next : top;
     const Mask mask = top->mask;
     Mask in_far = 0;
-    near->mask = in_lanes(mask, [&](int k) {
+    const Mask in_near = in_lanes(mask, [&](int k) {
       const F low = F::load(top->low + k), high = F::load(top->high + k);
       const F near_high = min_x86(at_end(node->clip[back], axis, k), high),
               far_low = max_x86(at_begin(node->clip[1 - back], axis, k), low);
-      low.store(near->low + k), near_high.store(near->high + k), far_low.store(top->low + k);
+      (AnyHit ? high : low).store((AnyHit ? next->high : next->low) + k);  // what `top` has of it stays
+      near_high.store(near->high + k), far_low.store(far->low + k);
       in_far |= Mask((far_low <= high).bits()) << k;
       return low <= near_high;
     });
     in_far &= mask;
     const bih::Node* const children = tree_.nodes() + node->first();
-    count(mask, 2, near->mask, in_far);
-    near->node = children + back, top->node = children + 1 - back, top->mask = in_far;
-    return near->mask != 0 ? near : top;
+    count(mask, 2, in_near, in_far);
+    near->node = children + back, near->mask = in_near;
+    far->node = children + 1 - back, far->mask = in_far;
+    return next->mask != 0 ? next : top;
   }
 
   /// A node of one child, with planes on both sides of it.

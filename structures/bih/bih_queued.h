@@ -66,7 +66,7 @@ class BihQueuedWalk : public ListedQueuedWalk<bih::Bih, Leaves, AnyHit> {
         s.top = top;
         return {node->code(), Target::kLeaf};
       }
-      at = step_bih(node, kind, s.interval, low, high, top, NoCounters(nullptr));
+      at = step_bih<AnyHit>(node, kind, s.interval, low, high, top, NoCounters(nullptr));
       if (at == kNoNode) at = pop_bih<AnyHit>(top, s.stack, low, high, s.best.t);
     } while (at != kNoNode);
     return Base::kEnd;

@@ -1,5 +1,6 @@
-// One ray through the bounding interval hierarchy: closest hit and any hit. The ray keeps the
-// interval [low, high] of t in which it is between all planes passed; a plane that ends an interval and one
+// One ray through the bounding interval hierarchy: closest hit front to back, any hit back to front, since what a
+// shadow ray meets stands by its light more often than by its origin (docs/performance/other-structures.md). The ray
+// keeps the interval [low, high] of t in which it is between all planes passed; a plane that ends an interval and one
 // that begins one have constants of their own, so that padded intervals hold the exact ones
 // (traversal/box_test.h). A NaN (plane and origin equal, 0 * inf) leaves an interval as it is.
 #pragma once
@@ -57,27 +58,24 @@ ARBORETUM_INLINE void clip_to_scene(const bih::Bih& tree, const IntervalRay& int
 inline constexpr std::uint32_t kNoNode = ~0u;
 
 /// At an inner node of that kind, with the ray's interval [low, high] there: the child to go on with and its interval,
-/// or kNoNode where the ray meets none; where it meets two, the far one goes to the stack.
-template <class Counting>
+/// or kNoNode where the ray meets none; where it meets two, the one that is visited later goes to the stack.
+template <bool AnyHit, class Counting>
 ARBORETUM_INLINE std::uint32_t step_bih(const bih::Node* node, std::uint32_t kind, const IntervalRay& interval,
                                         float& low, float& high, IntervalEntry*& top, const Counting& counting) {
   const std::uint32_t first = node->first();
   if (kind < bih::Node::kLeaf) {
     const unsigned axis = kind, back = interval.negative[axis];
-    const float near_high = earlier(interval.at_end(node->clip[back], axis), high);
-    const float far_low = later(interval.at_begin(node->clip[1 - back], axis), low);
-    const bool near = low <= near_high, far = far_low <= high;
-    counting.node(2, 2, unsigned(near) + unsigned(far));
-    if (near) {
-      if (far) *top++ = {first + 1 - back, far_low, high};
-      high = near_high;
-      return first + back;
+    const IntervalEntry near{first + back, low, earlier(interval.at_end(node->clip[back], axis), high)},
+        far{first + 1 - back, later(interval.at_begin(node->clip[1 - back], axis), low), high};
+    const IntervalEntry &next = AnyHit ? far : near, &waits = AnyHit ? near : far;
+    const bool in_next = next.low <= next.high, in_waits = waits.low <= waits.high;
+    counting.node(2, 2, unsigned(in_next) + unsigned(in_waits));
+    const auto take = [&](const IntervalEntry& child) { return low = child.low, high = child.high, child.node; };
+    if (in_next) {
+      if (in_waits) *top++ = waits;
+      return take(next);
     }
-    if (far) {
-      low = far_low;
-      return first + 1 - back;
-    }
-    return kNoNode;
+    return in_waits ? take(waits) : kNoNode;
   }
   const unsigned axis = kind - bih::Node::kClip, back = interval.negative[axis];
   low = later(interval.at_begin(node->clip[back], axis), low);
@@ -109,7 +107,7 @@ ARBORETUM_INLINE bool search_bih(const bih::Bih& tree, const IntervalRay& interv
   for (;;) {
     std::uint32_t next = kNoNode;
     if (const std::uint32_t kind = node->kind(); kind != bih::Node::kLeaf) {
-      next = step_bih(node, kind, interval, low, high, top, counting);
+      next = step_bih<AnyHit>(node, kind, interval, low, high, top, counting);
     } else if (visits(node->code())) {
       return true;
     }

@@ -75,7 +75,8 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
         children(planes, permute_by_octant(e.cell.node.mask, octant), e.mask, in, first);
         count(e, in);
         const octree::Node* const children = nodes + e.cell.node.first;
-        for (unsigned number = 8; number-- > 0;) {  // far to near
+        for (unsigned i = 0; i < 8; ++i) {  // the one that is visited first on top
+          const unsigned number = AnyHit ? i : 7 - i;
           if (in[number] == 0) continue;
           *top++ = {planes.child(e.cell, children, number ^ octant), in[number], first[number]};
         }

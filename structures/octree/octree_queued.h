@@ -55,7 +55,7 @@ class OctreeQueuedWalk : public ListedQueuedWalk<octree::Octree, Leaves, AnyHit>
   }
 
   ARBORETUM_INLINE Target node(State& s, Target) const {
-    if (step_octree(tree_, s.box, s.cell, s.tnear, s.best.t, s.top, NoCounters(nullptr))) return next(s);
+    if (step_octree<AnyHit>(tree_, s.box, s.cell, s.tnear, s.best.t, s.top, NoCounters(nullptr))) return next(s);
     return pop(s);
   }
 

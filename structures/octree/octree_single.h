@@ -1,4 +1,5 @@
-// One ray through the octree: closest hit and any hit.
+// One ray through the octree: closest hit front to back, any hit back to front, since what a shadow ray meets stands by
+// its light more often than by its origin (docs/performance/other-structures.md).
 //
 // The eight children are tested at once. They are numbered as the ray meets them, number ^ octant of the
 // direction: bit 0 of that number is 0 in the half that the ray enters first on x, so rising numbers are an
@@ -69,6 +70,14 @@ struct OctreeRay {
   ARBORETUM_INLINE F far(F face) const { return plane_distance(face, reciprocal, far_constant); }
 };
 
+/// Takes one of the children `hit`, numbered as the ray meets them, out of them: the last one or the first.
+template <bool Last>
+ARBORETUM_INLINE unsigned take_child(unsigned& hit) {
+  const auto number = unsigned(Last ? 31 - __builtin_clz(hit) : __builtin_ctz(hit));
+  hit = Last ? hit ^ 1u << number : hit & (hit - 1);
+  return number;
+}
+
 /// A cell and where the ray enters it.
 struct OctreeEntry {
   OctreeCell cell;
@@ -76,8 +85,8 @@ struct OctreeEntry {
 };
 
 /// At the inner cell of `e`, between tnear and the nearest hit: of the children that the ray meets `e` becomes the
-/// first, the others go to the stack, far to near. Returns whether there are any.
-template <class Counting>
+/// first, the others go to the stack, the last one first. Returns whether there are any.
+template <bool AnyHit, class Counting>
 ARBORETUM_INLINE bool step_octree(const octree::Octree& tree, const OctreeRay& box, OctreeEntry& e, float tnear,
                                   float nearest, OctreeEntry*& top, const Counting& counting) {
   using F = vf<8>;
@@ -100,12 +109,8 @@ ARBORETUM_INLINE bool step_octree(const octree::Octree& tree, const OctreeRay& b
   const auto child = [&](unsigned number) {
     return OctreeEntry{planes.child(e.cell, children, number ^ box.octant), t[number]};
   };
-  const unsigned first = unsigned(__builtin_ctz(hit));
-  for (hit &= hit - 1; hit;) {  // far to near
-    const unsigned number = 31u - unsigned(__builtin_clz(hit));
-    hit ^= 1u << number;
-    *top++ = child(number);
-  }
+  const unsigned first = take_child<AnyHit>(hit);
+  while (hit) *top++ = child(take_child<!AnyHit>(hit));
   e = child(first);
   return true;
 }
@@ -131,7 +136,7 @@ ARBORETUM_INLINE bool search_octree(const octree::Octree& tree, const OctreeRay&
   OctreeEntry e{start, 0.0f};
   for (;;) {
     if (e.cell.node.mask != 0) {
-      if (step_octree(tree, box, e, tnear, best.t, top, counting)) continue;
+      if (step_octree<AnyHit>(tree, box, e, tnear, best.t, top, counting)) continue;
     } else if (e.cell.node.first != last) {
       last = e.cell.node.first;
       if (visits(last)) return true;
