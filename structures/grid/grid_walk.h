@@ -2,7 +2,8 @@
 //
 // The distances at which the ray leaves its cell on each axis are `exits`: far - rest * per_cell, where `far`
 // is the distance of the grid's last face on that axis and `rest` the number of cells still before it, so
-// that nothing accumulates (grid.h has the proof). Axes that leave at the same distance are stepped together.
+// that nothing accumulates (grid.h has the proof). Those of the next cells are computed before it is known which axes
+// step. Axes that leave at the same distance are stepped together.
 // An axis along which the ray does not move has far = infinity; lane 3 has FLT_MAX and no cells before it,
 // which ends the walk where all else is infinite.
 #pragma once
@@ -32,7 +33,7 @@ struct GridRay {
 /// A ray's position in one grid.
 struct GridWalk {
   using F = vf<4>;
-  F far, per_cell, rest;
+  F far, per_cell, rest, exits;
   std::uint32_t cell;      ///< number among all cells
   std::int32_t stride[8];  ///< to the next cell, by the axes that step
 
@@ -59,7 +60,7 @@ struct GridWalk {
     far = select(ray.fixed, select(vm<4>::from_bits(8), F(std::numeric_limits<float>::max()), infinity),
                  select(ray.negative, lower, upper) * ray.reciprocal);
     per_cell = select(ray.fixed, F(0.0f), abs(size * ray.reciprocal));
-    rest = select(ray.negative, i, most - i);
+    rest = select(ray.negative, i, most - i), exits = nmadd(rest, per_cell, far);
     const auto row = std::int32_t(level.cells_on(0)), layer = row * std::int32_t(level.cells_on(1));
     std::int32_t k[4];
     index.store(k);
@@ -72,7 +73,6 @@ struct GridWalk {
 
   /// Where the ray leaves the cell, and the axes on which it does.
   ARBORETUM_INLINE float exit(vm<4>& axes) const {
-    const F exits = nmadd(rest, per_cell, far);
     const float t = reduce_min(exits);
     axes = exits <= F(t);
     return t;
@@ -82,7 +82,8 @@ struct GridWalk {
   /// NaN).
   ARBORETUM_INLINE bool step(vm<4> axes) {
     const unsigned bits = axes.bits();
-    rest = rest - select(axes, F(1.0f), F(0.0f));
+    const F less = rest - F(1.0f);
+    exits = select(axes, nmadd(less, per_cell, far), exits), rest = select(axes, less, rest);
     if ((bits == 0) | ((rest < F(0.0f)).bits() != 0)) return false;
     cell += std::uint32_t(stride[bits & 7]);
     return true;
