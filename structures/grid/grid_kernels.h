@@ -1,4 +1,6 @@
-// The kernels of the grid: one ray, closest hit and any hit, through one level of cells or two.
+// The kernels of the grid: one ray through one level of cells or two. Closest hit walks front to back, any hit from the
+// ray's end to its origin, as a closest hit would walk the reversed ray, since what a shadow ray meets stands by its
+// light more often than by its origin (docs/performance/other-structures.md).
 #pragma once
 
 #include "structures/bvh/bvh.h"
@@ -20,8 +22,10 @@ struct GridSingle {
       if (__builtin_expect(!within_walk_bounds(grid, ray), 0)) return far(grid, ray, best, visits);
     }
     const grid::Level& outer = grid.levels()[0];
-    const GridRay lanes(ray);
-    float t = ray.tnear, end = best.t;
+    const GridRay lanes(ray, AnyHit);
+    const float origin = -ray.tnear;
+    float t = AnyHit ? -best.t : ray.tnear, end = AnyHit ? origin : best.t;
+    const auto ends_before = [&](float leave) { return (AnyHit ? origin : best.t) < leave; };
     GridWalk::clip(outer, lanes, t, end);
     if (!(t <= end)) return false;
     const LeafCode* const codes = grid.codes();
@@ -46,7 +50,7 @@ struct GridSingle {
               last = inside;
               if (visits(inside)) return true;
             }
-            if (best.t < inner_leave) return false;
+            if (ends_before(inner_leave)) return false;
             if (!inner.step(inner_axes)) break;
           }
         } else if (code != last) {
@@ -54,7 +58,7 @@ struct GridSingle {
           if (visits(code)) return true;
         }
       }
-      if (best.t < leave) return false;
+      if (ends_before(leave)) return false;
       if (!walk.step(axes)) return false;
       t = leave;
     }

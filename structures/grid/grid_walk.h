@@ -20,9 +20,11 @@ struct GridRay {
   vm<4> fixed;     ///< axes that the ray does not move along (less than 2^-60 of the largest), and lane 3
   vm<4> negative;  ///< by the sign bit: -0 goes with the negative directions
 
-  ARBORETUM_INLINE explicit GridRay(const Ray& ray)
+  /// `reversed`: the same points, at distances of the other sign.
+  ARBORETUM_INLINE GridRay(const Ray& ray, bool reversed)
       : origin(F::load(&ray.origin)), direction(F::load(&ray.direction)), reciprocal(0.0f), fixed(false),
         negative(false) {
+    if (reversed) direction = -direction;
     const F size = abs(direction);
     fixed = (size <= F(largest_component(ray.direction) * 0x1p-60f)) | vm<4>::from_bits(8);
     negative = direction.as_int() < vi<4>(0);
