@@ -358,6 +358,32 @@ TEST_CASE("a grid's expected steps are what random rays take") {
   CHECK(double(counters.boxes) / double(counters.nodes) == Approx(seen.steps).epsilon(0.03));
 }
 
+TEST_CASE("any hit looks at a ray's end first") {
+  TriangleMesh mesh = random_triangles(20000, 0.01f, 16);
+  add_triangle(mesh, {4, -4, -2}, {4, 4, -2}, {4, 0, 6});  // a wall behind all others
+  std::vector<Ray> to_wall, from_wall;
+  for (std::uint64_t i = 0; i < 256; ++i) {
+    const Vec3f d{1, uniform(17, i, 0, -0.1f, 0.1f), uniform(17, i, 1, -0.1f, 0.1f)};
+    const Vec3f o{0, uniform(17, i, 2, -0.8f, 0.8f), uniform(17, i, 3, -0.8f, 0.8f)};
+    to_wall.push_back({o - d * 2, 0, d, i % 2 ? kInfinity : 7.0f});
+    from_wall.push_back({o + d * 5, 0, -d, to_wall.back().tfar});
+  }
+  const std::vector<std::uint8_t> all(to_wall.size(), 1);
+  Structures structures(mesh);
+  std::set<std::string_view> seen;
+  for (const KernelRow& row : runnable_rows()) {
+    const std::string_view s = row.structure;
+    if (row.intersector != "moller_trumbore" || (s != "grid" && s != "octree" && s != "bih" && s != "kdtree")) continue;
+    INFO(name_of(row));
+    seen.insert(s);
+    Counters to, from;
+    REQUIRE(any_hit(row, structures.get(row), to_wall, &to) == all);
+    REQUIRE(any_hit(row, structures.get(row), from_wall, &from) == all);
+    CHECK(double(to.boxes) < 0.9 * double(from.boxes));
+  }
+  CHECK(seen.size() == 4);
+}
+
 TEST_CASE("a level's cells are numbered in 32 bits, however many triangles are in one place") {
   BuilderParameters p;
   p.grid_density = 64;
