@@ -10,23 +10,24 @@ namespace arboretum {
 namespace {
 
 constexpr std::string_view kPlots[] = {
-    "rays_per_second",   "rays_by_builder",    "sah_cost",         "epo",
-    "leaf_histograms",   "bytes_per_triangle", "build_time",       "build_phases",
-    "sah_vs_time",       "accuracy_vs_time",   "lane_utilization", "published_ratios",
-    "leaks_vs_distance", "leaks_vs_aspect",    "leak_picture",     "self_intersection",
-    "traversal_ratios"};
+    "rays_per_second",  "rays_by_builder",    "sah_cost",          "epo",
+    "leaf_histograms",  "bytes_per_triangle", "build_time",        "build_phases",
+    "sah_vs_time",      "build_vs_trace",     "memory_vs_time",    "visits_per_ray",
+    "accuracy_vs_time", "lane_utilization",   "published_ratios",  "leaks_vs_distance",
+    "leaks_vs_aspect",  "leak_picture",       "self_intersection", "traversal_ratios"};
 /// Drawn only where a configuration names them: few experiments have something for them to show.
 constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios", "traversal_ratios"};
 
 bool is_measured(std::string_view plot, const Metrics& m) {
   if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" ||
-      plot == "published_ratios" || plot == "traversal_ratios" ||
-      plot == "self_intersection")  // how rays leave their surface is always checked
+      plot == "memory_vs_time" || plot == "visits_per_ray" || plot == "published_ratios" ||
+      plot == "traversal_ratios" || plot == "self_intersection")  // how rays leave their surface is always checked
     return m.trace;
   if (plot == "build_time" || plot == "build_phases") return m.build;
   if (plot == "sah_cost" || plot == "epo" || plot == "leaf_histograms") return m.quality;
   if (plot == "bytes_per_triangle") return m.trace || m.build;
   if (plot == "sah_vs_time") return m.quality && m.trace;
+  if (plot == "build_vs_trace") return m.build && m.trace;
   return m.accuracy && m.trace;
 }
 

@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator  # noqa: E402
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
 from results import ordered  # noqa: E402
 
@@ -89,6 +89,21 @@ def log_with_zero(axis, which, values):
     ticks.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
 
 
+def log_axis(axis, which, values):
+    """A log scale just wide enough for `values`, with labelled ticks however little they differ."""
+    low, high = min(values, default=1.0), max(values, default=1.0)
+    (axis.set_xscale if which == "x" else axis.set_yscale)("log")
+    first, last = 0.8 * low, 1.2 * high
+    (axis.set_xlim if which == "x" else axis.set_ylim)(first, last)
+    at = lambda digits: [d * 10.0**k for k in range(-3, 12) for d in digits if first <= d * 10.0**k <= last]
+    fine = [t for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(first, last) if first <= t <= last]  # where values hardly differ
+    found = next((f for digits in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)) if len(f := at(digits)) > 2), fine)
+    ticks = axis.xaxis if which == "x" else axis.yaxis
+    ticks.set_major_locator(FixedLocator(found))
+    ticks.set_major_formatter("{x:g}")
+    ticks.set_minor_locator(NullLocator())
+
+
 def plain(value):
     """0, 0.01, 1, 1000, 10⁵, 2·10⁵: as a person writes a power of ten or a multiple of one."""
     if value == 0 or 1e-3 < value < 1e4:
@@ -118,6 +133,12 @@ def structure_legend(structures):
     """Legend handles, one a structure."""
     return [Patch(facecolor=colour(s), edgecolor="white", hatch=hatch(s), label=s)
             for s in ordered(structures, "structure")]
+
+
+BUILDER_MARKERS = {"binned_sah": "o", "sweep_sah": "s", "spatial_sah": "D", "morton": "^", "ploc": "v", "low": "<", "medium": ">", "high": "P", "octants": "h", "uniform": "X",
+                   "two_level": "p"}
+SPARE_BUILDER_MARKERS = ("*", "d", "8", "H", "s", "^", "v", "D", "P", "X")
+builder_marker = Palette(BUILDER_MARKERS, SPARE_BUILDER_MARKERS)
 
 
 WRONG = "#CC1111"  # edges and numbers where answers are wrong

@@ -139,8 +139,8 @@ metrics: [trace, accuracy]
 )");
   const Experiment experiment = read_experiment(file, registry);
   CHECK(experiment.plots == std::vector<std::string>{"rays_per_second", "rays_by_builder", "bytes_per_triangle",
-                                                     "accuracy_vs_time", "leaks_vs_distance", "leaks_vs_aspect",
-                                                     "leak_picture"});
+                                                     "memory_vs_time", "visits_per_ray", "accuracy_vs_time",
+                                                     "leaks_vs_distance", "leaks_vs_aspect", "leak_picture"});
   const Plan plan = make_plan(experiment, registry);
   Journal journal(folder.path(), "hash", plan, false);
   const RunOutcome outcome = run_plan(experiment, plan, registry, journal, {});

@@ -1,9 +1,9 @@
 """One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, or raises NoData. ONLY_WHEN_NAMED: a configuration
 draws it only where it names it, and is told where it could not be drawn.
 
-A new figure is a module here and its name in ALL. Other modules here (bars, rows, squares, modes, leak_lines) are what figures share.
+A new figure is a module here and its name in ALL. Other modules here (bars, rows, squares, trade_offs, modes, leak_lines) are what figures share.
 """
 
 ALL = ("rays_per_second", "traversal_ratios", "rays_by_builder", "sah_cost", "epo", "leaf_histograms", "bytes_per_triangle", "build_time",
-       "build_phases", "sah_vs_time", "accuracy_vs_time", "lane_utilization", "published_ratios", "leaks_vs_distance", "leaks_vs_aspect",
-       "leak_picture", "self_intersection")
+       "build_phases", "sah_vs_time", "build_vs_trace", "memory_vs_time", "visits_per_ray", "accuracy_vs_time", "lane_utilization", "published_ratios",
+       "leaks_vs_distance", "leaks_vs_aspect", "leak_picture", "self_intersection")

@@ -2,10 +2,9 @@
 answers, one for the error of t, a column an instruction set. Otherwise that of each workload's own rays, a panel a scene, workload and
 instruction set."""
 
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
-
+from figures.trade_offs import step_front
 from results import HARD_PREFIX, NoData, ordered
-from style import intersector_colour, intersector_legend, legends_right, log_with_zero, marker_legend, marker_map, panel_grid, panels, short
+from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_legend, marker_map, panel_grid, panels, short
 
 TITLE = "Accuracy against time"
 CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hits, false hits and wrong surfaces against exact "
@@ -67,7 +66,7 @@ def panel(axis, points, values, times, markers):
                   markerfacecolor="white" if cell["box"] == "fast" else own, markeredgecolor=own, clip_on=False)
     step_front(axis, [(t, v) for _, t, v in points])
     log_with_zero(axis, "y", [v for v in values if v is not None])
-    log_time(axis, times)
+    log_axis(axis, "x", times)
 
 
 def add_legends(figure, cells, markers):
@@ -115,32 +114,3 @@ def measure_of(cells):
         if any((value_of(c, name) or 0) > 0 for c in cells):
             return name, label, said + "; upwards: the error of t"
     return wrong, wrong_label, said
-
-
-def log_time(axis, times):
-    low, high = min(times, default=1.0), max(times, default=1.0)
-    axis.set_xscale("log")
-    left, right = 0.85 * low, 1.18 * high
-    axis.set_xlim(left, right)
-    dense = high / low < 30
-    digits = (1, 1.5, 2, 3, 4, 5, 7) if high / low < 5 else (1, 2, 5) if dense else (1,)
-    ticks = [d * 10.0**k for k in range(-1, 8) for d in digits if left <= d * 10.0**k <= right]
-    if len(ticks) < 3:  # times that hardly differ
-        ticks = [t for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(left, right) if left <= t <= right]
-    axis.xaxis.set_major_locator(FixedLocator(ticks))
-    axis.xaxis.set_major_formatter("{x:g}")
-    axis.xaxis.set_minor_locator(NullLocator())
-
-
-def step_front(axis, points):
-    front = pareto_front(points)
-    axis.step([t for t, _ in front], [w for _, w in front], where="post", color="#777777", linewidth=1, zorder=1)
-
-
-def pareto_front(points):
-    """Those (time, wrong) that none other beats in one and equals in the other, by time."""
-    front = []
-    for time, wrong in sorted(points):
-        if not front or wrong < front[-1][1]:
-            front.append((time, wrong))
-    return front

@@ -53,7 +53,7 @@ def places_of(groups):
     return found
 
 
-def row_panels(groups, scenes, widths, room=0.0):
+def row_panels(groups, scenes, widths, room=0.0, title_of=short):
     """For each scene as many panels side by side as there are `widths` (inches, at least; `room` besides, of each, for what stands to its right), all with
     the same rows. Gives the figure and {scene: [axis, ...]}."""
     height = sum(len(rows) + bool(heading) for heading, rows in groups)
@@ -74,7 +74,7 @@ def row_panels(groups, scenes, widths, room=0.0):
             else:
                 axis.set_visible(False)
         if place < len(scenes):
-            own[0].set_title(short(scenes[place]), loc="left")
+            own[0].set_title(title_of(scenes[place]), loc="left")
             found[scenes[place]] = own
     return figure, found
 

@@ -3,7 +3,8 @@ that one of them would decide every fit."""
 
 import numpy as np
 
-from results import NoData, ordered
+from figures import trade_offs
+from results import Estimate, NoData, ordered
 from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panel_grid, panels, structure_legend,
                    wrong_legend, wrong_marker)
 from tables import SAH_STEP
@@ -39,15 +40,11 @@ def draw(results):
 
 def fastest_points(results, metric):
     """(cell, SAH cost, ns a ray) of the fastest mode of each structure as built, scene, workload and ISA."""
-    best = {}
-    for cell in results.traces:
-        rate, cost = cell.value(metric), results.structure_value(cell, "sah_cost")
-        if not rate or cost is None:
-            continue
-        key = tuple(cell[a] for a in ("scene", "structure", "builder", "leaf", "isa", "workload", "threads"))
-        if key not in best or 1e9 / rate < best[key][2]:
-            best[key] = (cell, cost, 1e9 / rate)
-    return list(best.values())
+    def cost(cell):
+        found = results.structure_value(cell, "sah_cost")
+        return None if found is None else Estimate(found, found, found, 1)
+
+    return [(p.cell, p.x.median, p.y.median) for p in trade_offs.fastest_points(results, metric, cost)]
 
 
 def far_apart(points):

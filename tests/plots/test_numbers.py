@@ -11,9 +11,9 @@ from made_results import Folder, build, trace  # noqa: E402
 
 import style  # noqa: E402
 from figures import build_time, rays_by_builder, rays_per_second, squares, traversal_ratios  # noqa: E402
-from figures.accuracy_vs_time import pareto_front  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import linear_fit  # noqa: E402
+from figures.trade_offs import pareto_front  # noqa: E402
 from results import Cell, Results, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
 
 

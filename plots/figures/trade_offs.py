@@ -1,0 +1,183 @@
+"""Points of two costs, lower left better, a panel a scene, workload, instruction set and number of threads: what figures of trade-offs have in common.
+
+Colours are structures, markers builders. Points worth a name have a number, and the names stand below the panel.
+"""
+
+from dataclasses import dataclass
+
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from matplotlib.transforms import ScaledTranslation
+
+from figures.bars import bar_label
+from results import Estimate, NoData, ordered, undetermined_axes
+from style import (SPARE_BUILDER_MARKERS, WRONG, Palette, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend,
+                   wrong_marker)
+
+BUILT = ("scene", "structure", "builder", "leaf", "isa", "workload", "threads")
+PLACE = ("scene", "workload", "isa", "threads")
+NAMED_BY = ("builder", "leaf")
+# Inches: of a panel at least; left of its axes; of a line of the names below it, and of a character there; from the axes' left edge to their numbers, markers and words.
+WIDTH, HEIGHT, LEFT, LINE, CHARACTER = 3.3, 2.6, 0.75, 0.145, 0.062
+NUMBER_AT, MARKER_AT, WORDS_AT = -0.47, -0.27, -0.18
+FONT = 7.5
+MOST_COLUMNS = 4
+
+
+@dataclass(frozen=True)
+class Point:
+    cell: object
+    x: Estimate
+    y: Estimate  # ns a ray
+
+    def scaled(self, factor):
+        return Point(self.cell, Estimate(factor * self.x.median, factor * self.x.low, factor * self.x.high, self.x.samples), self.y)
+
+
+def fastest_points(results, metric, x_of):
+    """A point for each structure as built, traced in its fastest mode, of those cells of which `x_of` is known, on each scene, workload, instruction set and number of threads."""
+    best = {}
+    for cell in results.traces:
+        rate, x = cell.estimate(metric), x_of(cell)
+        if rate is None or rate.low <= 0 or x is None:
+            continue
+        key, time = tuple(cell[a] for a in BUILT), Estimate(1e9 / rate.median, 1e9 / rate.high, 1e9 / rate.low, rate.samples)
+        if key not in best or time.median < best[key].y.median:
+            best[key] = Point(cell, x, time)
+    return list(best.values())
+
+
+def pareto_front(points):
+    """Those (x, y) that none other beats in one and equals in the other, by x."""
+    front = []
+    for x, y in sorted(points):
+        if not front or y < front[-1][1]:
+            front.append((x, y))
+    return front
+
+
+def step_front(axis, points):
+    front = pareto_front(points)
+    axis.step([x for x, _ in front], [y for _, y in front], where="post", color="#777777", linewidth=1, zorder=1)
+
+
+def of_places(points):
+    """{(scene, workload, isa, threads): points} of those places that have at least two; NoData where none has."""
+    if not points:
+        raise NoData("no traced cell has both figures")
+    found = {}
+    for point in points:
+        found.setdefault(tuple(point.cell[a] for a in PLACE), []).append(point)
+    found = {place: here for place, here in found.items() if len(here) > 1}
+    if not found:
+        raise NoData("nowhere are two structures as built to compare")
+    return found
+
+
+def draw_panels(places, x_label, y_label, named_of):
+    """A panel for each of `places`, as of_places() gives them. `x_label(threads)` and `y_label(threads)` name the axes; `named_of(points)` gives (point, text) of those
+    that get a number, by x, the text what is said of it."""
+    points = [p for here in places.values() for p in here]
+    varied = [a for a in undetermined_axes([p.cell for p in points], ("scene", "structure", *NAMED_BY)) if a in NAMED_BY]
+    columns = sorted({place[1:] for place in places}, key=lambda rest: [ordered({p[1 + i] for p in places}, a).index(rest[i]) for i, a in enumerate(PLACE[1:])])
+    titles = {rest: ", ".join([*rest[:2], f"{rest[2]} threads"][: 3 if len({p[3] for p in places}) > 1 else 2]).replace(", 1 threads", ", 1 thread") for rest in columns}
+    named = {place: named_of(here) for place, here in places.items()}
+    lines = max(map(len, named.values()))
+    beside = len({rest[1:] for rest in columns})  # panels of a workload, which stay in a row
+    width = max(WIDTH, LEFT + WORDS_AT + CHARACTER * max(len(bar_label(p.cell, varied)) + 2 + len(text) for here in named.values() for p, text in here))
+    markers = builder_markers([p.cell["builder"] for p in points])
+    figure, axes = panel_grid(ordered((p[0] for p in places), "scene"), list(titles.values()), width, HEIGHT + LINE * (lines + 1.5), beside * max(1, MOST_COLUMNS // beside))
+    figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
+    drawn = []
+    for scene in dict.fromkeys(scene for scene, _ in axes):
+        for rest, title in titles.items():
+            axis, here = axes[scene, title], places.get((scene, *rest), [])
+            if not here:
+                axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
+                continue
+            for point in here:
+                mark(axis, point.x.median, point.y.median, point.cell, markers)
+            step_front(axis, [(p.x.median, p.y.median) for p in here])
+            log_axis(axis, "x", [p.x.median for p in here])
+            log_axis(axis, "y", [p.y.median for p in here])
+            axis.set_xlabel(x_label(rest[2]))
+            axis.set_ylabel(y_label(rest[2]))
+            axis.xaxis.label.set_fontsize(9)
+            axis.yaxis.label.set_fontsize(9)
+            axis.tick_params(labelsize=8.5)
+            names_below(axis, named[scene, *rest], varied, markers)
+            drawn.append((axis, named[scene, *rest]))
+    cells = [p.cell for p in points]
+    answers = wrong_legend(cells, wrong_marker(f"edge: some wrong, up to\n{most_wrong(cells)} per million"))
+    legends_right(figure, [("structure", structure_legend({c["structure"] for c in cells})), ("builder", builder_legend(markers)), *answers])
+    figure.draw_without_rendering()  # numbers have to know where points are
+    for axis, here in drawn:
+        numbers(axis, here)
+    return figure
+
+
+def builder_markers(builders):
+    """{builder: marker}: the same for a builder and its reinserted kin, and for Embree's of our trees and of its own; variants of parameters have their own."""
+    found, variant = {}, Palette({}, SPARE_BUILDER_MARKERS)
+    for builder in ordered(builders, "builder"):
+        name = kind(builder)
+        own = builder_marker(name.partition(":")[0])
+        found[builder] = next((found[b] for b in found if kind(b) == name), None) or (variant(name) if own in found.values() else own)
+    return found
+
+
+def kind(builder):
+    """The builder's name without what its marker does not tell."""
+    return builder.replace("_reinsertion", "", 1).removeprefix("embree_")
+
+
+def reinserted(builder):
+    return builder.partition(":")[0].endswith("_reinsertion")
+
+
+def mark(axis, x, y, cell, markers, size=6.0, **more):
+    """A point; a white dot in its middle where nodes were reinserted."""
+    wrong = is_wrong(cell)
+    axis.plot(x, y, markers[cell["builder"]], color=colour(cell["structure"]), markersize=size, markeredgecolor=WRONG if wrong else "white",
+              markeredgewidth=0.8 if wrong else 0.5, **more)
+    if reinserted(cell["builder"]):
+        axis.plot(x, y, "o", color="white", markersize=0.32 * size, markeredgewidth=0, **more)
+
+
+def builder_legend(markers):
+    """Handles, one a marker, named by what shares it; and what the white dot is."""
+    names = {}
+    for builder, marker in markers.items():
+        names.setdefault((marker, kind(builder)), builder)
+    handles = [Line2D([], [], linestyle="", marker=marker, color="#444444", markeredgewidth=0, markersize=6, label=name) for (marker, name) in names]
+    if any(map(reinserted, markers)):
+        handles.append(Line2D([], [], linestyle="", marker="o", markersize=4.5, color="white", markeredgecolor="#444444", markeredgewidth=2, label="…_reinsertion: white dot"))
+    return handles
+
+
+def names_below(axis, named, varied, markers):
+    """The names of the numbered points below the axis, each with its marker and what is said of it."""
+    scale = axis.figure.dpi_scale_trans
+    for line, (point, text) in enumerate(named):
+        down = -0.56 - LINE * line
+        for x, words, weight in ((NUMBER_AT, str(line + 1), "bold"), (WORDS_AT, bar_label(point.cell, varied), "normal")):
+            axis.annotate(words, (0, 0), (72 * x, 72 * down), xycoords="axes fraction", textcoords="offset points", va="center", fontsize=FONT, fontweight=weight)
+        axis.annotate(text, (1, 0), (0, 72 * down), xycoords="axes fraction", textcoords="offset points", ha="right", va="center", fontsize=FONT)
+        mark(axis, 0, 0, point.cell, markers, 5.0, transform=axis.transAxes + ScaledTranslation(MARKER_AT, down, scale), clip_on=False, scalex=False, scaley=False)
+
+
+def numbers(axis, named):
+    """The numbers beside their points, each at the first place, from the lower left on, where it is on no other numbered point and no other number."""
+    at = [axis.transData.transform((p.x.median, p.y.median)) for p, _ in named]
+    dot = axis.figure.dpi / 72
+    taken = [(x, y, 3.5 * dot) for x, y in at]
+    for i, (x, y) in enumerate(at):
+        places = [(dx, dy) for far in (8.5, 14, 20) for dx, dy in ((-0.7 * far, -0.7 * far), (0, -far), (-far, 0), (0.7 * far, -0.7 * far), (-0.7 * far, 0.7 * far), (0, far), (far, 0))]
+        left = axis.bbox.x0 + 4.5 * dot
+        free = (p for p in places if x + p[0] * dot > left and all((x + p[0] * dot - a) ** 2 + (y + p[1] * dot - b) ** 2 > (r + 3.6 * dot) ** 2 for a, b, r in taken))
+        dx, dy = next(free, places[0])
+        taken.append((x + dx * dot, y + dy * dot, 4.0 * dot))
+        text = axis.annotate(str(i + 1), (named[i][0].x.median, named[i][0].y.median), (dx, dy), textcoords="offset points", ha="center", va="center", fontsize=8,
+                             fontweight="bold", zorder=6, annotation_clip=False)
+        text.set_path_effects([withStroke(linewidth=1.8, foreground="white")])
+        text.set_in_layout(False)

@@ -1,0 +1,102 @@
+"""What a ray meets on its way: nodes, leaves, boxes and triangles, a row a structure, builder and way of traversal, a column a scene and workload."""
+
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullLocator
+
+from figures.rows import FONT, groups_of, places_of, row_panels, rows_are_due
+from results import Cell, NoData, ordered, undetermined_axes
+from style import legends_right, panel_title
+
+TITLE = "Visits and tests of a ray"
+CAPTION = ("Nodes and leaves that a ray visits, and tests of a ray against child boxes and triangles, counted in a pass of its own, untimed; the numbers beside the points are the same, in the legend's order. "
+           "Fewer are better, but not each costs the same: a node's boxes, or a block's triangles, are tested together, and a visit by rays together (packets, streams) is one of each of them. "
+           "A grid's nodes are the cells that the ray crosses. Of several workloads the figure shows one of coherent rays and one of incoherent ones (the latter alone where there are many rows), of several instruction sets the widest. "
+           "Rows that differ in leaf, tests or threads alone and show the same numbers are one. Structures that cannot be looked into, as embree, have none.")
+TESTS = ("leaf", "intersector", "box", "threads")
+AXES = ("builder", "traversal", *TESTS)
+COUNTS = (("nodes_per_ray", "nodes visited", "o", "#332288"), ("leaves_per_ray", "leaves visited", "D", "#117733"),
+          ("boxes_per_ray", "boxes tested", "|", "#332288"), ("triangles_per_ray", "triangles tested", "x", "#CC3311"))
+COHERENT, INCOHERENT = ("primary", "shadow"), ("diffuse", "ambient_occlusion", "reflection")
+WIDTH, COLUMN = 1.3, 0.3  # inches: of a panel, at least; of the numbers of one count beside it
+
+
+def draw(results):
+    cells = [c for c in results.traces if counts(c)]
+    if not cells:
+        raise NoData("no cell has counted its visits")
+    isa = ordered((c["isa"] for c in cells), "isa")[-1]
+    workloads = chosen(ordered((c["workload"] for c in cells), "workload"))
+    cells = [c for c in cells if c["isa"] == isa and c["workload"] in workloads]
+    panels = {panel_of(c): panel_title(c["scene"], c["workload"], WIDTH + COLUMN * len(COUNTS)) for s in ordered((c["scene"] for c in cells), "scene") for w in workloads
+              for c in cells if (c["scene"], c["workload"]) == (s, w)}
+    cells = without_doubles([Cell({**c.axes, "scene": panel_of(c)}, c.rows) for c in cells])
+    if rows_are_due(cells):
+        cells = without_doubles([c for c in cells if c["workload"] == workloads[-1]])
+    varied = [a for a in undetermined_axes(cells, ("scene", "structure", *AXES)) if a in AXES]
+    groups = groups_of(cells, varied, shown)
+    places = places_of(groups)
+    used = {c["scene"] for c in cells}
+    figure, axes = row_panels(groups, [p for p in panels if p in used], [WIDTH], COLUMN * len(COUNTS) + 0.1, panels.get)
+    for panel, (axis,) in axes.items():
+        strip(axis, [(place, counts(row.cells[panel])) for place, row in places if panel in row.cells])
+    handles = [Line2D([], [], linestyle="", marker=marker, color=shade, markersize=5, label=label) for _, label, marker, shade in COUNTS]
+    legends_right(figure, [(f"a ray, {isa}", handles)])
+    return figure
+
+
+def panel_of(cell):
+    return f"{cell['scene']}, {cell['workload']}"
+
+
+def counts(cell):
+    """The cell's COUNTS; None where it has not all."""
+    found = tuple(cell.value(name) for name, *_ in COUNTS)
+    return None if None in found else found
+
+
+def chosen(workloads):
+    """At most one of coherent rays and one of incoherent ones; where there is neither, the first."""
+    found = [next((w for w in kind if w in workloads), None) for kind in (COHERENT, INCOHERENT)]
+    return [w for w in found if w] or workloads[:1]
+
+
+def without_doubles(cells):
+    """Cells that differ in leaf, tests or threads alone and show the same numbers in every panel are one, which is not called by what they differ in."""
+    variants = {}
+    for cell in cells:
+        same = tuple(cell[a] for a in ("structure", "builder", "traversal"))
+        variants.setdefault(same, {}).setdefault(tuple(cell[a] for a in TESTS), []).append(cell)
+    found = []
+    for own in variants.values():
+        alike = {}
+        for tests, here in own.items():
+            alike.setdefault(frozenset((c["scene"], shown(c)) for c in here), []).append(tests)
+        for these in alike.values():
+            blank = {a: "" for i, a in enumerate(TESTS) if len({tests[i] for tests in these}) > 1}
+            found += [Cell({**c.axes, **blank}, c.rows) for c in own[these[0]]]
+    return found
+
+
+def shown(cell):
+    return tuple(map(short_number, counts(cell)))
+
+
+def strip(axis, rows):
+    for i, (_, _, marker, shade) in enumerate(COUNTS):
+        found = [(place, values[i]) for place, values in rows if values[i] > 0]
+        axis.plot([v for _, v in found], [place for place, _ in found], marker, color=shade, markersize=3.6, markeredgewidth=0.9 if marker in "|x" else 0, linestyle="", clip_on=False)
+    axis.set_xscale("log")
+    every = [v for _, values in rows for v in values if v > 0] or [1.0]
+    axis.set_xlim(0.7 * min(every), 1.5 * max(every))
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0,), numticks=6))
+    axis.xaxis.set_minor_locator(NullLocator())
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.set_xlabel("visits and tests a ray", fontsize=FONT + 1)
+    for place, values in rows:
+        for i, (value, (*_, shade)) in enumerate(zip(values, COUNTS)):
+            axis.annotate(short_number(value), (1, place), (72 * COLUMN * (i + 1), 0), xycoords=("axes fraction", "data"), textcoords="offset points", ha="right", va="center",
+                          fontsize=FONT - 1, color=shade)
+
+
+def short_number(value):
+    return f"{value:.2f}" if value < 1 else f"{value:.1f}" if value < 100 else f"{value:.0f}" if value < 9999.5 else f"{value / 1e3:.0f}k"
