@@ -137,8 +137,7 @@ def structure_legend(structures):
 
 BUILDER_MARKERS = {"binned_sah": "o", "sweep_sah": "s", "spatial_sah": "D", "morton": "^", "ploc": "v", "low": "<", "medium": ">", "high": "P", "octants": "h", "uniform": "X",
                    "two_level": "p"}
-SPARE_BUILDER_MARKERS = ("*", "d", "8", "H", "s", "^", "v", "D", "P", "X")
-builder_marker = Palette(BUILDER_MARKERS, SPARE_BUILDER_MARKERS)
+builder_marker = Palette(BUILDER_MARKERS, ("*", "d", "H"))
 
 
 WRONG = "#CC1111"  # edges and numbers where answers are wrong

@@ -1,12 +1,13 @@
 """What a slower build buys: build time against the time of a ray, and from how many rays on it pays."""
 
-from figures.trade_offs import draw_panels, fastest_points, of_places
+from figures.bars import label
+from figures.trade_offs import MOST_NAMES, draw_panels, fastest_points, of_places
 from results import STRUCTURE_AXES
 
 TITLE = "Build time against trace time"
 CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. The grey steps join the points that no other beats in "
            "both. Numbered are those that take the least time for build and rays together, each with the number of rays from which on it does: what its build takes more "
-           "than that of the number before, by what each ray takes less. A point of the steps without a number is worth its build at no number of rays. Of two points whose 95 % intervals "
+           "than that of the number before, by what each ray takes less. Any other is best at no number of rays, or, where there are more than ten of them, over the shortest ranges. Of two points whose 95 % intervals "
            "overlap in build time or in the time of a ray, neither is taken to be better in that. Builds are measured in wall time, with as many threads as the rays beside them; "
            "with more threads both are faster, but builds by less, and so pay later.")
 POWERS = ((1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k"), (1, ""))
@@ -29,11 +30,21 @@ def draw(results):
 
 
 def wall(threads):
-    return f"wall time, {threads} thread{'' if threads == '1' else 's'}" if threads else "wall time"
+    return f"wall time, {label('threads', threads)}" if threads else "wall time"
 
 
 def labelled(points):
-    return [(p, f"from {count(rays)} rays" if rays else "at first") for p, rays in stages(points)]
+    return [(p, f"from {count(rays)} rays" if rays else "at first") for p, rays in longest_stages(points)]
+
+
+def longest_stages(points):
+    """The stages of `points`, or of those of them whose ranges are longest, by ratio: MOST_NAMES at most."""
+    found = stages(points)
+    while len(found) > MOST_NAMES:
+        shortest = min(range(1, len(found) - 1), key=lambda i: found[i + 1][1] / found[i][1])
+        points = [p for p in points if p is not found[shortest][0]]
+        found = stages(points)
+    return found
 
 
 def stages(points):

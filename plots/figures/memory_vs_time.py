@@ -1,12 +1,12 @@
 """Memory against speed: what tracing needs besides the mesh against the time of a ray."""
 
 from figures.bars import digits
-from figures.trade_offs import draw_panels, fastest_points, of_places, pareto_front
+from figures.trade_offs import MOST_NAMES, draw_panels, fastest_points, of_places, pareto_front
 from results import Estimate
 
 TITLE = "Memory against time"
 CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. Memory is what tracing needs besides the mesh, a triangle of the mesh. "
-           "The grey steps join the points that no other beats in both. Numbered are those of them that are a tenth faster than the number before, and the fastest; behind their names "
+           "The grey steps join the points that no other beats in both. Numbered are those of them that are a tenth faster than the number before (or more, where there would be more than ten), and the fastest; behind their names "
            "bytes a triangle and nanoseconds a ray.")
 WORTH = 0.9  # of the time of the number before
 
@@ -24,11 +24,11 @@ def draw(results):
                        lambda here: [(p, f"{digits(p.x.median)} B, {digits(p.y.median)} ns") for p in worth_a_name(here)])
 
 
-def worth_a_name(points):
-    """Those of the Pareto front that are clearly faster than the one before that has a name, and the fastest."""
+def worth_a_name(points, worth=WORTH):
+    """Those of the Pareto front that are clearly faster than the one before that has a name, and the fastest; MOST_NAMES at most."""
     by_place = {(p.x.median, p.y.median): p for p in points}
     named = []
     for x, y in (front := pareto_front(by_place)):
-        if not named or y <= WORTH * named[-1].y.median or y == front[-1][1]:
+        if not named or y <= worth * named[-1].y.median or y == front[-1][1]:
             named.append(by_place[x, y])
-    return named
+    return named if len(named) <= MOST_NAMES else worth_a_name(points, 0.97 * worth)

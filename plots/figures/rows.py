@@ -53,15 +53,15 @@ def places_of(groups):
     return found
 
 
-def row_panels(groups, scenes, widths, room=0.0, title_of=short):
+def row_panels(groups, scenes, widths, room=0.0, title_of=short, together=1):
     """For each scene as many panels side by side as there are `widths` (inches, at least; `room` besides, of each, for what stands to its right), all with
-    the same rows. Gives the figure and {scene: [axis, ...]}."""
+    the same rows; so many neighbours as are `together` stay in one band of them. Gives the figure and {scene: [axis, ...]}."""
     height = sum(len(rows) + bool(heading) for heading, rows in groups)
     labels = 0.3 + CHARACTER * max(len(row.label) for _, rows in groups for row in rows)
     stretch = min(MOST_STRETCH, max(1.0, (WIDEST / len(scenes) - len(widths) * room) / sum(widths)))
     one = stretch * sum(widths) + len(widths) * room
-    bands = -(-len(scenes) // max(1, int(WIDEST / one)))
-    beside = -(-len(scenes) // bands)
+    bands = -(-len(scenes) // max(together, int(WIDEST / one) // together * together))
+    beside = -(-len(scenes) // (bands * together)) * together
     columns = beside * len(widths)
     figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * height, sharey=True, gridspec_kw={"width_ratios": widths * beside})
     found = {}

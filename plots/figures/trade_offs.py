@@ -9,10 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import ScaledTranslation
 
-from figures.bars import bar_label
+from figures.bars import bar_label, label
 from results import Estimate, NoData, ordered, undetermined_axes
-from style import (SPARE_BUILDER_MARKERS, WRONG, Palette, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend,
-                   wrong_marker)
+from style import MARKERS, WRONG, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend, wrong_marker
 
 BUILT = ("scene", "structure", "builder", "leaf", "isa", "workload", "threads")
 PLACE = ("scene", "workload", "isa", "threads")
@@ -21,7 +20,7 @@ NAMED_BY = ("builder", "leaf")
 WIDTH, HEIGHT, LEFT, LINE, CHARACTER = 3.3, 2.6, 0.75, 0.145, 0.062
 NUMBER_AT, MARKER_AT, WORDS_AT = -0.47, -0.27, -0.18
 FONT = 7.5
-MOST_COLUMNS = 4
+MOST_COLUMNS, MOST_NAMES = 4, 10
 
 
 @dataclass(frozen=True)
@@ -78,15 +77,16 @@ def draw_panels(places, x_label, y_label, named_of):
     """A panel for each of `places`, as of_places() gives them. `x_label(threads)` and `y_label(threads)` name the axes; `named_of(points)` gives (point, text) of those
     that get a number, by x, the text what is said of it."""
     points = [p for here in places.values() for p in here]
-    varied = [a for a in undetermined_axes([p.cell for p in points], ("scene", "structure", *NAMED_BY)) if a in NAMED_BY]
+    varied = [a for a in undetermined_axes([p.cell for p in points], ("scene", "structure", "isa", "threads", *NAMED_BY)) if a in NAMED_BY]
     columns = sorted({place[1:] for place in places}, key=lambda rest: [ordered({p[1 + i] for p in places}, a).index(rest[i]) for i, a in enumerate(PLACE[1:])])
-    titles = {rest: ", ".join([*rest[:2], f"{rest[2]} threads"][: 3 if len({p[3] for p in places}) > 1 else 2]).replace(", 1 threads", ", 1 thread") for rest in columns}
+    several = len({threads for *_, threads in places}) > 1
+    titles = {(workload, isa, threads): ", ".join([workload, isa] + ([label("threads", threads)] if several else [])) for workload, isa, threads in columns}
     named = {place: named_of(here) for place, here in places.items()}
     lines = max(map(len, named.values()))
-    beside = len({rest[1:] for rest in columns})  # panels of a workload, which stay in a row
+    beside = min(MOST_COLUMNS, len({rest[1:] for rest in columns}))  # panels of a workload, which stay in a row
     width = max(WIDTH, LEFT + WORDS_AT + CHARACTER * max(len(bar_label(p.cell, varied)) + 2 + len(text) for here in named.values() for p, text in here))
     markers = builder_markers([p.cell["builder"] for p in points])
-    figure, axes = panel_grid(ordered((p[0] for p in places), "scene"), list(titles.values()), width, HEIGHT + LINE * (lines + 1.5), beside * max(1, MOST_COLUMNS // beside))
+    figure, axes = panel_grid(ordered((p[0] for p in places), "scene"), list(titles.values()), width, HEIGHT + LINE * (lines + 1.5), beside * (MOST_COLUMNS // beside))
     figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
     drawn = []
     for scene in dict.fromkeys(scene for scene, _ in axes):
@@ -117,13 +117,19 @@ def draw_panels(places, x_label, y_label, named_of):
 
 
 def builder_markers(builders):
-    """{builder: marker}: the same for a builder and its reinserted kin, and for Embree's of our trees and of its own; variants of parameters have their own."""
-    found, variant = {}, Palette({}, SPARE_BUILDER_MARKERS)
-    for builder in ordered(builders, "builder"):
-        name = kind(builder)
-        own = builder_marker(name.partition(":")[0])
-        found[builder] = next((found[b] for b in found if kind(b) == name), None) or (variant(name) if own in found.values() else own)
-    return found
+    """{builder: marker}: the same for a builder and its reinserted kin, and for Embree's of our trees and of its own; variants of parameters have their own while there are enough."""
+    kinds = list(dict.fromkeys(kind(b) for b in ordered(builders, "builder")))
+    families = list(dict.fromkeys(map(family, kinds)))
+    own = {f: builder_marker(f) for f in families}
+    spare = [m for m in MARKERS if m not in own.values()] or list(MARKERS)
+    found = {next(k for k in kinds if family(k) == f): own[f] for f in families}
+    variants = [k for k in kinds if k not in found]
+    found.update({k: spare[i % len(spare)] for i, k in enumerate(variants)})
+    return {b: found[kind(b)] for b in ordered(builders, "builder")}
+
+
+def family(name):
+    return name.partition(":")[0]
 
 
 def kind(builder):
@@ -132,7 +138,7 @@ def kind(builder):
 
 
 def reinserted(builder):
-    return builder.partition(":")[0].endswith("_reinsertion")
+    return family(builder).endswith("_reinsertion")
 
 
 def mark(axis, x, y, cell, markers, size=6.0, **more):
@@ -173,8 +179,7 @@ def numbers(axis, named):
     taken = [(x, y, 3.5 * dot) for x, y in at]
     for i, (x, y) in enumerate(at):
         places = [(dx, dy) for far in (8.5, 14, 20) for dx, dy in ((-0.7 * far, -0.7 * far), (0, -far), (-far, 0), (0.7 * far, -0.7 * far), (-0.7 * far, 0.7 * far), (0, far), (far, 0))]
-        left = axis.bbox.x0 + 4.5 * dot
-        free = (p for p in places if x + p[0] * dot > left and all((x + p[0] * dot - a) ** 2 + (y + p[1] * dot - b) ** 2 > (r + 3.6 * dot) ** 2 for a, b, r in taken))
+        free = (p for p in places if x + p[0] * dot > axis.bbox.x0 + 4.5 * dot and y + p[1] * dot > axis.bbox.y0 + 5 * dot and all((x + p[0] * dot - a) ** 2 + (y + p[1] * dot - b) ** 2 > (r + 3.6 * dot) ** 2 for a, b, r in taken))
         dx, dy = next(free, places[0])
         taken.append((x + dx * dot, y + dy * dot, 4.0 * dot))
         text = axis.annotate(str(i + 1), (named[i][0].x.median, named[i][0].y.median), (dx, dy), textcoords="offset points", ha="center", va="center", fontsize=8,

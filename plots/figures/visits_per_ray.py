@@ -1,11 +1,10 @@
 """What a ray meets on its way: nodes, leaves, boxes and triangles, a row a structure, builder and way of traversal, a column a scene and workload."""
 
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullLocator
 
 from figures.rows import FONT, groups_of, places_of, row_panels, rows_are_due
 from results import Cell, NoData, ordered, undetermined_axes
-from style import legends_right, panel_title
+from style import legends_right, log_axis, panel_title
 
 TITLE = "Visits and tests of a ray"
 CAPTION = ("Nodes and leaves that a ray visits, and tests of a ray against child boxes and triangles, counted in a pass of its own, untimed; the numbers beside the points are the same, in the legend's order. "
@@ -36,7 +35,7 @@ def draw(results):
     groups = groups_of(cells, varied, shown)
     places = places_of(groups)
     used = {c["scene"] for c in cells}
-    figure, axes = row_panels(groups, [p for p in panels if p in used], [WIDTH], COLUMN * len(COUNTS) + 0.1, panels.get)
+    figure, axes = row_panels(groups, [p for p in panels if p in used], [WIDTH], COLUMN * len(COUNTS) + 0.1, panels.get, len({c["workload"] for c in cells}))
     for panel, (axis,) in axes.items():
         strip(axis, [(place, counts(row.cells[panel])) for place, row in places if panel in row.cells])
     handles = [Line2D([], [], linestyle="", marker=marker, color=shade, markersize=5, label=label) for _, label, marker, shade in COUNTS]
@@ -84,13 +83,10 @@ def shown(cell):
 def strip(axis, rows):
     for i, (_, _, marker, shade) in enumerate(COUNTS):
         found = [(place, values[i]) for place, values in rows if values[i] > 0]
+        if not found:
+            continue  # an empty line that is not clipped would be given room at the figure's corner
         axis.plot([v for _, v in found], [place for place, _ in found], marker, color=shade, markersize=3.6, markeredgewidth=0.9 if marker in "|x" else 0, linestyle="", clip_on=False)
-    axis.set_xscale("log")
-    every = [v for _, values in rows for v in values if v > 0] or [1.0]
-    axis.set_xlim(0.7 * min(every), 1.5 * max(every))
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0,), numticks=6))
-    axis.xaxis.set_minor_locator(NullLocator())
-    axis.xaxis.set_major_formatter("{x:g}")
+    log_axis(axis, "x", [v for _, values in rows for v in values if v > 0])
     axis.set_xlabel("visits and tests a ray", fontsize=FONT + 1)
     for place, values in rows:
         for i, (value, (*_, shade)) in enumerate(zip(values, COUNTS)):
@@ -99,4 +95,4 @@ def strip(axis, rows):
 
 
 def short_number(value):
-    return f"{value:.2f}" if value < 1 else f"{value:.1f}" if value < 100 else f"{value:.0f}" if value < 9999.5 else f"{value / 1e3:.0f}k"
+    return "0" if value == 0 else f"{value:.2f}" if value < 1 else f"{value:.1f}" if value < 100 else f"{value:.0f}" if value < 9999.5 else f"{value / 1e3:.0f}k"

@@ -13,7 +13,6 @@ import style  # noqa: E402
 from figures import build_time, rays_by_builder, rays_per_second, squares, traversal_ratios  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import linear_fit  # noqa: E402
-from figures.trade_offs import pareto_front  # noqa: E402
 from results import Cell, Results, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
 
 
@@ -35,10 +34,6 @@ class Numbers(unittest.TestCase):
         self.assertLess(linear_fit([1, 2, 3, 4], [1, 9, 1, 9])[2], 0.5)
         for x, y in (([1, 2], [1, 2]), ([2, 2, 2], [1, 2, 3]), ([1, 2, 3], [5, 5, 5])):
             self.assertIsNone(linear_fit(x, y))
-
-    def test_pareto_front(self):
-        self.assertEqual(pareto_front([(3, 0), (1, 9), (2, 9), (2, 4), (4, 0)]), [(1, 9), (2, 4), (3, 0)])
-        self.assertEqual(pareto_front([]), [])
 
     def test_ratios_of_traversals(self):
         rates = {("bvh8", "single", "bunny"): 2e6, ("bvh8", "packet8", "bunny"): 6e6, ("embree", "single", "bunny"): 3e6, ("embree", "stream", "bunny"): 4e6,
