@@ -53,11 +53,12 @@ class KdQueuedWalk {
   ARBORETUM_INLINE Target node(State& s, Target node) const {
     Entry* top = s.top - 1;
     const float begin = top->begin, limit = top->end, end = limit < s.best.t ? limit : s.best.t;
-    const KdSides sides = sides_of<AnyHit>(node, place_of(node), s.planes, begin, end);
-    *top = sides.later;
-    top += sides.in_later;
-    *top = sides.next;
-    top += sides.in_next;
+    const KdSides sides = sides_of(node, place_of(node), s.planes, begin, end);
+    const Entry near{sides.near, begin, sides.near_end}, far{sides.far, sides.far_begin, end};
+    *top = AnyHit ? near : far;
+    top += AnyHit ? sides.in_near : sides.in_far;
+    *top = AnyHit ? far : near;
+    top += AnyHit ? sides.in_far : sides.in_near;
     s.top = top;
     return top[-1].node;
   }

@@ -102,14 +102,14 @@ struct KdRay {
   ARBORETUM_INLINE float leaving(float plane, unsigned axis) const { return fused(plane, r[axis], leave[axis]); }
 };
 
-/// The two sides of a plane, of a cell that the ray is in within [begin, end]: the one that is visited first, the one
-/// that waits, and whether the ray meets them.
+/// The two sides of a plane, of a cell that the ray is in within [begin, end]: near within [begin, near_end], far
+/// within [far_begin, end]. (As two entries they would go through memory.)
 struct KdSides {
-  KdStackEntry next, later;
-  bool in_next, in_later;
+  std::uint64_t near, far;
+  float near_end, far_begin;
+  bool in_near, in_far;  ///< whether the ray meets them
 };
 /// Those of the inner node with the bits `node`, whose children lie at `pair`. Both are loaded while t is computed.
-template <bool AnyHit>
 ARBORETUM_INLINE KdSides sides_of(std::uint64_t node, const std::byte* pair, const KdRay& planes, float begin,
                                   float end) {
   const unsigned axis = std::uint32_t(node >> 32) & 3u;
@@ -118,10 +118,12 @@ ARBORETUM_INLINE KdSides sides_of(std::uint64_t node, const std::byte* pair, con
   std::uint64_t near, far;
   std::memcpy(&near, pair + (far_offset ^ 8u), 8), std::memcpy(&far, pair + far_offset, 8);
   const float leave = planes.leaving(plane, axis), enter = planes.entering(plane, axis);
-  const bool in_near = !((leave < begin) | (near == kdtree::kEmptyCell)),
-             in_far = !((enter > end) | (far == kdtree::kEmptyCell));
-  const KdStackEntry front{near, begin, leave < end ? leave : end}, back{far, enter > begin ? enter : begin, end};
-  return AnyHit ? KdSides{back, front, in_far, in_near} : KdSides{front, back, in_near, in_far};
+  return {near,
+          far,
+          leave < end ? leave : end,
+          enter > begin ? enter : begin,
+          !((leave < begin) | (near == kdtree::kEmptyCell)),
+          !((enter > end) | (far == kdtree::kEmptyCell))};
 }
 
 /// One ray from `node` on, within [begin, end] of it; what `leaves` keep for it is `data`. Returns whether an any hit
@@ -139,22 +141,32 @@ ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t n
       const auto link = std::uint32_t(node >> 32);
       const unsigned axis = link & 3u;
       if (axis == 3) break;
-      const KdSides sides = sides_of<AnyHit>(node, base + std::size_t(link & ~3u) * 4, planes, begin, end);
+      const KdSides s = sides_of(node, base + std::size_t(link & ~3u) * 4, planes, begin, end);
       // A plane decides about two cells; a lane each.
-      counting.node(2, 2, unsigned(sides.in_next) + unsigned(sides.in_later));
+      counting.node(2, 2, unsigned(s.in_near) + unsigned(s.in_far));
       counting.at_depth(depths.current(), 2, 2);
       if constexpr (Counting::kCounting) {
-        if (sides.in_next && sides.in_later) depths.push(top - stack, top - stack + 1);
+        if (s.in_near && s.in_far) depths.push(top - stack, top - stack + 1);
       }
       depths.descend();
-      const auto take = [&](const KdStackEntry& side) { node = side.node, begin = side.begin, end = side.end; };
-      if (sides.in_next) {
-        *top = sides.later;
-        top += sides.in_later;
-        take(sides.next);
+      if constexpr (AnyHit) {
+        if (s.in_far) {
+          top->node = s.near, top->begin = begin, top->end = s.near_end;
+          top += s.in_near;
+          node = s.far, begin = s.far_begin;
+        } else {
+          if (!s.in_near) goto pop;
+          node = s.near, end = s.near_end;
+        }
       } else {
-        if (!sides.in_later) goto pop;
-        take(sides.later);
+        if (s.in_near) {
+          top->node = s.far, top->begin = s.far_begin, top->end = end;
+          top += s.in_far;
+          node = s.near, end = s.near_end;
+        } else {
+          if (!s.in_far) goto pop;
+          node = s.far, begin = s.far_begin;
+        }
       }
     }
     if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf
