@@ -11,7 +11,8 @@ from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
 CAPTION = ("A point is a structure on a scene, traced in its fastest mode. The line is the least-squares fit through a panel's "
-           "points, R² its share of the variance explained. A red edge: the mode has wrong answers. "
+           "points, R² its share of the variance explained; with EPO: that of the plane through SAH cost and end-point overlap, which never explains less, so "
+           "small differences say nothing. A red edge: the mode has wrong answers. "
            + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
 
 # Scenes whose costs differ by more get panels of their own.
@@ -23,34 +24,34 @@ def draw(results):
     points = fastest_points(results, metric)
     if not points:
         raise NoData("no traced cell has a SAH cost")
-    workloads = ordered((c["workload"] for c, _, _ in points), "workload")
-    isas = ordered((c["isa"] for c, _, _ in points), "isa")
-    scenes = ordered((c["scene"] for c, _, _ in points), "scene")
-    structures = ordered((c["structure"] for c, _, _ in points), "structure")
+    workloads = ordered((c["workload"] for c, *_ in points), "workload")
+    isas = ordered((c["isa"] for c, *_ in points), "isa")
+    scenes = ordered((c["scene"] for c, *_ in points), "scene")
+    structures = ordered((c["structure"] for c, *_ in points), "structure")
     markers = marker_map(scenes)
 
     if far_apart(points):
         figure = panels_by_scene(points, scenes, [(w, i) for w in workloads for i in isas], markers)
     else:
         figure = panels_of_all(points, workloads, isas, markers)
-    answers = wrong_legend([c for c, _, _ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, _, _ in points])} per million"))
+    answers = wrong_legend([c for c, *_ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, *_ in points])} per million"))
     legends_right(figure, [("structure", structure_legend(structures)), ("scene", marker_legend(markers)), *answers])
     return figure
 
 
 def fastest_points(results, metric):
-    """(cell, SAH cost, ns a ray) of the fastest mode of each structure as built, scene, workload and ISA."""
+    """(cell, SAH cost, ns a ray, EPO or None) of the fastest mode of each structure as built, scene, workload and ISA."""
     def cost(cell):
         found = results.structure_value(cell, "sah_cost")
         return None if found is None else Estimate(found, found, found, 1)
 
-    return [(p.cell, p.x.median, p.y.median) for p in trade_offs.fastest_points(results, metric, cost)]
+    return [(p.cell, p.x.median, p.y.median, results.structure_value(p.cell, "epo")) for p in trade_offs.fastest_points(results, metric, cost)]
 
 
 def far_apart(points):
     """Whether the largest SAH cost of one scene is a multiple of another's."""
     largest = {}
-    for cell, cost, _ in points:
+    for cell, cost, *_ in points:
         largest[cell["scene"]] = max(cost, largest.get(cell["scene"], 0.0))
     return max(largest.values()) > FAR_APART * min(largest.values())
 
@@ -85,7 +86,7 @@ def panels_of_all(points, workloads, isas, markers):
 
 
 def panel(axis, points, markers, title):
-    for cell, cost, nanoseconds in points:
+    for cell, cost, nanoseconds, _ in points:
         axis.plot(cost, nanoseconds, markers[cell["scene"]], color=colour(cell["structure"]), markersize=7,
                   markeredgecolor=WRONG if is_wrong(cell) else "white", markeredgewidth=1.2 if is_wrong(cell) else 0.7)
     fit = linear_fit([p[1] for p in points], [p[2] for p in points])
@@ -93,7 +94,8 @@ def panel(axis, points, markers, title):
         slope, offset, r2 = fit
         ends = np.array([min(p[1] for p in points), max(p[1] for p in points)])
         axis.plot(ends, slope * ends + offset, "-", color="#777777", linewidth=1, zorder=1)
-        title += f"\nR² = {r2:.2f} (n = {len(points)})"
+        both = plane_fit([p[1] for p in points], [p[3] for p in points], [p[2] for p in points])
+        title += f"\nR² = {r2:.2f}{'' if both is None else f', with EPO {both:.2f}'} (n = {len(points)})"
     elif points:
         title += f"\n(n = {len(points)}, no fit)"
     else:
@@ -109,3 +111,16 @@ def linear_fit(x, y):
     slope, offset = np.polyfit(x, y, 1)
     residual = y - (slope * x + offset)
     return slope, offset, 1.0 - float(residual @ residual) / float(((y - y.mean()) ** 2).sum())
+
+
+def plane_fit(x1, x2, y):
+    """R² of the least-squares plane through two predictors; None below five points, where one is missing or does not vary apart from the other."""
+    if len(y) < 5 or None in x2:
+        return None
+    columns, y = np.column_stack([x1, x2, np.ones(len(y))]).astype(float), np.asarray(y, dtype=float)
+    columns /= np.abs(columns).max(axis=0).clip(1e-300)
+    weights, _, rank, _ = np.linalg.lstsq(columns, y, rcond=None)
+    if rank < 3 or np.ptp(y) == 0:
+        return None
+    residual = y - columns @ weights
+    return 1.0 - float(residual @ residual) / float(((y - y.mean()) ** 2).sum())

@@ -114,15 +114,36 @@ class Drawing(unittest.TestCase):
         folder = Folder(everything(), {"experiment": PUBLISHED})
         results = load(folder.path)
         table = json.loads((PLOTS / "published" / f"{PUBLISHED}.json").read_text())
-        rows = [published_ratios.rows_of(results, c, "rays_per_cpu_second") for c in table["comparisons"]]
-        self.assertEqual([len(r) for r in rows], [1, 1, 0])  # no hybrid was measured, and nothing on the dragon
-        place, published, ours = rows[1][0]
-        self.assertEqual(place, "crown\nprimary")
-        self.assertAlmostEqual(published, 41.5 / 32.0)
-        self.assertAlmostEqual(ours["bvh4"][0], 2.5, places=5)
-        self.assertLessEqual(ours["bvh4"][1], 2.5)
-        self.assertTrue(ours["bvh4"][3])  # each of these cells has a wrong answer
+        rows = [published_ratios.rows_of(results, c) for c in table["comparisons"]]
+        # no hybrid and no Morton build was measured, and nothing on the dragon; three numbers of children are published
+        self.assertEqual([len(r) for r in rows], [1, 1, 0, 0, 3])
+        row = rows[1][0]
+        self.assertEqual(row.name, "crown\nprimary")
+        self.assertEqual(row.published, (41.5 / 32.0,) * 2)
+        self.assertAlmostEqual(row.ours["bvh4"][0], 2.5, places=5)
+        self.assertLessEqual(row.ours["bvh4"][1], 2.5)
+        self.assertTrue(row.ours["bvh4"][3])  # each of these cells has a wrong answer
+        self.assertEqual([(r.name, r.published[0], r.ours["bvh4"][0]) for r in rows[4]],
+                         [("none\ncrown\nprimary", 0.2, 0.25), ("one\ncrown\nprimary", 0.5, 0.5), ("two\ncrown\nprimary", 0.2, 0.25)])
         self.assertIn("nothing published", Folder(whole()).plot("--no-report", "--only", "published_ratios").stdout)
+
+    def test_published_ratios_of_any_axis_and_quantity(self):
+        rows = [other("diffuse", structure="bvh2", builder=b, rate=r) for b, r in (("binned_sah", 4e6), ("sweep_sah", 5e6))]
+        rows += [other("diffuse", "city", structure="kdtree", rate=2e6), other("diffuse", "city", structure="bvh2", rate=8e6)]
+        rows += [{**build("bvh2", b, sah_cost=s, bytes=n), "name": f"build/bunny/bvh2/{b}/triangle8/-/-/-/avx2/-/threads:1"} for b, s, n in (("binned_sah", 20.0, 100), ("sweep_sah", 15.0, 150))]
+        results = load(Folder(rows).path)
+
+        def ratios(published, **comparison):
+            comparison = {"of": {"builder": "sweep_sah"}, "to": {"builder": "binned_sah"}, "series": ["bvh2"], **comparison}
+            return [(r.name, r.published, *(round(v[0], 6) for v in r.ours.values())) for r in published_ratios.rows_of(results, {**comparison, "published": published})]
+
+        self.assertEqual(ratios([{"value": [1.1, 1.3]}]), [("bunny\ndiffuse", (1.1, 1.3), 1.25)])
+        self.assertEqual(ratios([{}], quantity="time"), [("bunny\ndiffuse", None, 0.8)])
+        self.assertEqual(ratios([{"label": "SAH cost", "quantity": "sah_cost", "of": 3, "to": 4}, {"quantity": "bytes"}, {"quantity": "epo", "scene": "city"}]),
+                         [("SAH cost\nbunny", (0.75, 0.75), 0.75), ("bunny", None, 1.5)])
+        self.assertEqual(ratios([{}], of={"structure": "kdtree"}, to={"structure": "bvh2"}, series=["kdtree"]), [("city\ndiffuse", None, 0.25)])
+        self.assertEqual(ratios([{}], of={}, to={}, series=[{"name": "ours", "structure": "bvh2", "of": {"builder": "binned_sah"}, "to": {"builder": "sweep_sah"}}]),
+                         [("bunny\ndiffuse", None, 0.8)])
 
     def test_thin_results_never_crash(self):
         cases = {

@@ -12,7 +12,7 @@ from made_results import Folder, build, trace  # noqa: E402
 import style  # noqa: E402
 from figures import build_time, rays_by_builder, rays_per_second, squares, traversal_ratios  # noqa: E402
 from figures.modes import Modes  # noqa: E402
-from figures.sah_vs_time import linear_fit  # noqa: E402
+from figures.sah_vs_time import linear_fit, plane_fit  # noqa: E402
 from results import Cell, Results, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
 
 
@@ -25,6 +25,14 @@ class Numbers(unittest.TestCase):
             self.assertGreaterEqual(found.high, median)
         self.assertEqual(estimate([5.0]).low, 5.0)
         self.assertEqual(estimate([3.0, 1.0, 2.0, 7.0]), estimate([3.0, 1.0, 2.0, 7.0]))
+
+    def test_plane_fit(self):
+        x1, x2 = [1, 2, 3, 4, 5, 6], [2, 0, 5, 1, 1, 7]
+        y = [3 * a + 0.5 * b + 2 for a, b in zip(x1, x2)]
+        self.assertAlmostEqual(plane_fit(x1, x2, y), 1.0)
+        self.assertLess(plane_fit(x1, x2, [1, 9, 1, 9, 1, 9]), 0.9)
+        for a, b, c in ((x1[:4], x2[:4], y[:4]), (x1, [None, *x2[1:]], y), (x1, x1, y), (x1, [3] * 6, y), (x1, x2, [4] * 6)):
+            self.assertIsNone(plane_fit(a, b, c))
 
     def test_linear_fit(self):
         slope, offset, r2 = linear_fit([1, 2, 3, 4], [3, 5, 7, 9])
