@@ -236,8 +236,8 @@ struct Exact {
     alignas(64) float low[W], high[W];
   };
 
-  /// t of the planes of D triangles in doubles, as core/exact/hit_arithmetic.cpp computes it and bounds it; `usable`
-  /// lanes have a bound.
+  /// t of the planes of D triangles in doubles; `usable` lanes have a bound. That is of the products that t is made of,
+  /// so that it is next to nothing for a ray that starts next to a wall along the axes, and nothing on one.
   template <int D>
   struct DoubleDistances {
     using F = vd<D>;
@@ -247,13 +247,13 @@ struct Exact {
     /// `a`: the first corner as seen from the origin; e1, e2: edges from it.
     ARBORETUM_INLINE DoubleDistances(const vd3<D>& towards, const vd3<D>& a, const vd3<D>& e1, const vd3<D>& e2) {
       const auto dot = [](const vd3<D>& p, const vd3<D>& q) { return p.x * q.x + p.y * q.y + p.z * q.z; };
-      const auto size_of = [](const vd3<D>& p) { return max_x86(max_x86(abs(p.x), abs(p.y)), abs(p.z)); };
-      const vd3<D> n{e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x};
+      const auto magnitudes = [](const vd3<D>& p) { return vd3<D>{abs(p.x), abs(p.y), abs(p.z)}; };
+      const vd3<D> p{e1.y * e2.z, e1.z * e2.x, e1.x * e2.y}, q{e1.z * e2.y, e1.x * e2.z, e1.y * e2.x};
+      const vd3<D> n = p - q, terms = magnitudes(p) + magnitudes(q);
       const F inverse = F(1.0) / dot(n, towards), t = dot(n, a) * inverse;
-      const F scale =
-          abs(F(double_bounds::kDeterminant * double_bounds::kQuotient) * inverse) * size_of(e1) * size_of(e2);
-      const F along_error = scale * size_of(towards),
-              radius = scale * size_of(a) + abs(t) * (along_error + F(double_bounds::kRounding));
+      const F scale = abs(F(double_bounds::kTripleProducts * double_bounds::kQuotient) * inverse);
+      const F along_error = scale * dot(terms, magnitudes(towards)),
+              radius = scale * dot(terms, magnitudes(a)) + abs(t) * (along_error + F(double_bounds::kRounding));
       low = t - radius, high = t + radius;
       usable = along_error < F(double_bounds::kMostOfDivisor);
     }

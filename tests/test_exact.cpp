@@ -331,6 +331,34 @@ TEST_CASE("exact kernels of every mode, packets of rays alike whose products ove
   }
 }
 
+TEST_CASE("exact kernels of every mode: rays that start next to walls along the axes through the origin, and on them") {
+  // A room's three walls, each of two triangles, behind them others.
+  TriangleMesh mesh;
+  for (const float at : {0.0f, -1.0f}) {
+    for (const unsigned axis : {0u, 1u, 2u}) {
+      const auto corner = [&](float p, float q) {
+        Vec3f v{at, at, at};
+        v[(axis + 1) % 3] = p, v[(axis + 2) % 3] = q;
+        return v;
+      };
+      add_triangle(mesh, corner(-2, -2), corner(3, -2), corner(3, 3));
+      add_triangle(mesh, corner(-2, -2), corner(3, 3), corner(-2, 3));
+    }
+  }
+  std::vector<Ray> rays;
+  for (const unsigned axis : {0u, 1u, 2u}) {
+    for (const float off : {0.0f, 0x1p-149f, 0x1p-126f, 0x1p-60f, -0x1p-149f, -0x1p-126f}) {
+      for (int i = 0; i < 16; ++i) {  // towards the wall, away from it, nearly along it
+        Ray ray{{0.9f, 0.7f, 0.3f}, 0.0f, {0.3f, 0.5f, 0.2f}, i % 5 == 0 ? 0.5f : kInfinity};
+        ray.origin[axis] = off, ray.origin[(axis + 1) % 3] += 0.01f * float(i);
+        ray.direction[axis] = std::ldexp(i % 2 == 0 ? 1.0f : -1.0f, -(i / 2) * 9);
+        rays.push_back(ray);
+      }
+    }
+  }
+  check(mesh, rays, Truth::by_rationals(mesh, rays), rows_of_every_mode());
+}
+
 TEST_CASE("exact kernels on inputs that once failed") {
   // The edge functions are finite, their sum is not: weights of 0 made a distance of 0 that looked certain.
   TriangleMesh mesh;

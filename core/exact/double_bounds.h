@@ -6,6 +6,8 @@ namespace arboretum::double_bounds {
 
 /// A determinant of three rounded differences is off by less than this times the product of their largest components.
 inline constexpr double kDeterminant = 56 * 0x1p-53;
+/// Of the sum of the magnitudes of its six triple products, which carry at most eight roundings each.
+inline constexpr double kTripleProducts = 9 * 0x1p-53;
 /// The share of itself by which a determinant that is divided by may be off, at most: else there is no bound.
 inline constexpr double kMostOfDivisor = 0x1p-9;
 /// (n + dn) / (d + dd) - n / d is below (dn + |n / d| dd) / |d| times this where dd is at most kMostOfDivisor of |d|.
