@@ -45,6 +45,9 @@ std::string why_impossible(Cell& cell, bool moves, const Registry& registry) {
     if (std::string why = impossible_below(cell, registry); !why.empty()) return why;
   }
   if (const std::string why = lacks_builder(*entry, cell.builder); !why.empty()) return why;
+  if (entry->info.why_no_build) {
+    if (std::string why = entry->info.why_no_build(cell.builder, cell.leaf); !why.empty()) return why;
+  }
   cell.kernel = registry.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
   if (!cell.kernel) {
     const std::string why =

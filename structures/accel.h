@@ -112,6 +112,9 @@ struct StructureInfo {
   std::string_view no_streams = {};
   /// false where the builders read none of BuilderParameters: sweeping them makes no new cells
   bool uses_parameters = true;
+  /// Why a builder of the structure does not make a leaf of it, empty where it does: what skipped cells and refused
+  /// builds say. None: each makes every leaf.
+  std::string (*why_no_build)(std::string_view builder, std::string_view leaf) = nullptr;
 };
 
 class Accel {
@@ -125,7 +128,8 @@ class Accel {
   /// Fits the structure, as it was built, to the same triangles with moved vertices, for a moving mesh: quicker than a
   /// build, and the further they moved the worse to trace. The mesh, which takes the place of the one built from, must
   /// outlive the structure. Runs in the caller's TBB arena. Throws UserError where the structure cannot do it, for
-  /// another number of triangles and for what check_triangles() refuses; the structure is then as it was.
+  /// another number of triangles, for key frames, and for what check_triangles() refuses; the structure is then as it
+  /// was.
   virtual void refit(const TriangleMesh& mesh);
   /// Shows every node and leaf, parents before children, depth first: what follows a node with a greater depth is below
   /// it. Returns false where the structure cannot be looked into (embree).
@@ -150,9 +154,9 @@ struct StructureEntry {
 /// nullptr where there is none of that name.
 [[nodiscard]] const StructureEntry* find_structure(std::string_view name);
 /// Creates and builds, filling in the report's seconds and peak. Throws UserError for a name or setting that is not one
-/// of the structure's, for a builder parameter out of its limits (structures/parameter_limits.h), for a mesh that moves
-/// where the structure holds one moment, and, before the clock starts, for what check_triangles() refuses of any finite
-/// mesh, and check_instances() where the structure takes instances (core/mesh_check.h).
+/// of the structure's or do not go together, for a builder parameter out of its limits (structures/parameter_limits.h),
+/// for a mesh that moves where the structure holds one moment, and, before the clock starts, for what check_triangles()
+/// refuses of any finite mesh, and check_instances() where the structure takes instances (core/mesh_check.h).
 [[nodiscard]] std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh& mesh,
                                                      const BuildSettings& settings, BuildReport& report);
 

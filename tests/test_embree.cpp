@@ -322,6 +322,13 @@ TEST_CASE("embree says what it cannot do") {
   CHECK_THROWS_WITH(build(accel, mesh, Isa::scalar, "medium", "triangle4"), Catch::Contains("no scalar kernels"));
   CHECK_THROWS_WITH(build(accel, mesh, Isa::sse, "mediun", "triangle4"), Catch::Contains("did you mean 'medium'?"));
   CHECK_THROWS_AS(build(accel, mesh, Isa::sse, "medium", "triangle8"), UserError);
+  for (const char* leaf : {"triangle4v", "triangle4i"}) {  // quality that Embree would leave out
+    BuildSettings settings{.builder = "high", .leaf = leaf, .isa = Isa::sse, .parameters = {}};
+    BuildReport report;
+    CHECK_THROWS_WITH(build_structure("embree", mesh, settings, report), Catch::Contains("scenes as with medium"));
+    settings.builder = "low";
+    CHECK_NOTHROW(build_structure("embree", mesh, settings, report));
+  }
   build(accel, mesh, Isa::sse, "medium", "triangle4");
   CHECK_NOTHROW(accel.expect(Isa::sse, Form::triangle4));
   CHECK_THROWS_AS(accel.expect(Isa::avx2, Form::triangle4), std::logic_error);
