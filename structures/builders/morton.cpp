@@ -83,14 +83,16 @@ class Lbvh {
       : order_(order), leaf_width_(leaf_width), leaves_(leaves), tree_(tree), pool_(tree, order.size(), kOneTask) {}
 
   void build() {
-    cut_into_tasks({0, 0, order_.size(), order_.sorted_bits(), {}, {}});
+    cut_into_tasks({0, 0, order_.size(), order_.sorted_bits(), {}, {}, false});
     std::vector<Task*> tasks;
     for (Task& task : tasks_) tasks.push_back(&task);
     std::ranges::sort(tasks, {}, &Task::begin);
     const auto for_tasks = [&](const auto& f) {
       tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t i) { f(*tasks[i]); });
     };
-    for_tasks([this](Task& t) { t.place = cut(t.index, t.begin, t.end, t.sorted, t.share); });
+    for_tasks([this](Task& t) {
+      if (!t.is_cut) t.place = cut(t.index, t.begin, t.end, t.sorted, t.share);
+    });
     std::size_t all = 0;
     for (Task* t : tasks) all += std::exchange(t->place, all);
     leaves_.make(all);
@@ -108,6 +110,7 @@ class Lbvh {
     unsigned sorted;  ///< bits that the range is sorted by
     NodePool::Share share;
     std::size_t place;  ///< how many places its leaves take, then which is the first
+    bool is_cut;        ///< at once, being small beside a large sister, so that shares are as few as NodePool reckons
   };
 
   std::size_t split(std::size_t begin, std::size_t end, unsigned& sorted) {
@@ -116,25 +119,28 @@ class Lbvh {
                                                    : order_.split(begin, end);
   }
 
-  /// The upper nodes: those of which both sides are too large for a task.
-  void cut_into_tasks(const Task& whole) {
-    Task task = whole;
-    if (task.end - task.begin > 2 * kOneTask) {
-      const std::size_t middle = split(task.begin, task.end, task.sorted);
-      if (middle - task.begin > kOneTask && task.end - middle > kOneTask) {
-        const std::uint32_t left = pool_.take_pair(task.share);
-        tree_.nodes[task.index].left = left;
-        tbb::parallel_invoke(
-            [&] {
-              cut_into_tasks({left, task.begin, middle, task.sorted, {}, {}});
-            },
-            [&] {
-              cut_into_tasks({left + 1, middle, task.end, task.sorted, task.share, {}});
-            });
-        return;
-      }
+  /// The upper nodes: those of which a side is too large for a task.
+  void cut_into_tasks(Task task) {
+    if (task.end - task.begin <= 2 * kOneTask) {
+      tasks_.push_back(task);
+      return;
     }
-    tasks_.push_back(task);
+    const std::size_t middle = split(task.begin, task.end, task.sorted);
+    const std::uint32_t left = tree_.nodes[task.index].left = pool_.take_pair(task.share);
+    Task sides[2] = {{left, task.begin, middle, task.sorted, {}, {}, false},
+                     {left + 1, middle, task.end, task.sorted, {}, {}, false}};
+    const bool large[2] = {middle - task.begin > kOneTask, task.end - middle > kOneTask};
+    if (large[0] && large[1]) {
+      sides[1].share = task.share;
+      tbb::parallel_invoke([&] { cut_into_tasks(sides[0]); }, [&] { cut_into_tasks(sides[1]); });
+      return;
+    }
+    Task& small = sides[large[0] ? 1 : 0];
+    small.place = cut(small.index, small.begin, small.end, small.sorted, task.share), small.is_cut = true;
+    tasks_.push_back(small);
+    Task& rest = sides[large[0] ? 0 : 1];
+    rest.share = task.share;
+    cut_into_tasks(rest);
   }
 
   /// Links the nodes of a subtree and notes the triangles of leaves; returns how many places those take.
