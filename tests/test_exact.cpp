@@ -375,6 +375,30 @@ TEST_CASE("exact kernels on inputs that once failed") {
   check(mesh, std::span(&ray, 1), Truth::by_rationals(mesh, std::span(&ray, 1)), exact_rows());
 }
 
+TEST_CASE("triangles in one plane are met at one distance, others not") {
+  using Corners = std::array<Vec3f, 3>;
+  const Corners a{{{0.1f, 0.2f, 0.7f}, {1.3f, -0.4f, 0.9f}, {-0.2f, 1.1f, 0.3f}}};
+  const Ray ray{{0.31f, 0.17f, -2.3f}, 0.0f, {0.02f, 0.05f, 1.1f}, kInfinity};
+  CHECK(compare_distances_exactly(ray, a, {a[2], a[0], a[1]}) == 0);
+  CHECK(compare_distances_exactly(ray, a, {a[1], a[0], a[2]}) == 0);
+  Corners beyond = a;
+  for (Vec3f& p : beyond) p.z = std::nextafter(p.z, 2.0f);
+  CHECK(compare_distances_exactly(ray, a, beyond) == -1);
+  CHECK(compare_distances_exactly(ray, beyond, a) == 1);
+  beyond = a, beyond[2].z = std::nextafter(a[2].z, 2.0f);
+  CHECK(compare_distances_exactly(ray, a, beyond) == -1);
+  for (const unsigned axis : {0u, 1u, 2u}) {  // walls
+    Corners wall = a, other = beyond;
+    for (Vec3f& p : wall) p[axis] = 0.3f;
+    for (Vec3f& p : other) p[axis] = 0.3f, p[(axis + 1) % 3] += 0.125f;
+    const Ray across{{0.4f, 0.3f, 0.2f}, 0.0f, {0.1f + 0.7f * float(axis == 0), 0.2f, 0.3f}, kInfinity};
+    CHECK(compare_distances_exactly(across, wall, other) == 0);
+    other[1][axis] = std::nextafter(0.3f, 1.0f);
+    const int order = compare_distances_exactly(across, wall, other);
+    CHECK(order == -compare_distances_exactly(across, other, wall));
+  }
+}
+
 TEST_CASE("hit arithmetic against rational arithmetic") {
   for (const Kind& kind : kinds()) {
     INFO(kind.name);
