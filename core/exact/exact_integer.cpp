@@ -150,6 +150,12 @@ std::array<int, 3> exact_edge_signs(const ExactLine& line, const Corners& corner
           sign_of(determinant(s.c, s.a, s.direction))};
 }
 
+ExactFraction exact_t(const ExactLine& line, const Corners& corners) {
+  const Scaled s(line, corners);
+  const IntegerTriple normal = cross(difference(s.b, s.a), difference(s.c, s.a));
+  return fraction(dot(normal, s.a), dot(normal, s.direction), s.point_exponent - s.direction_exponent);
+}
+
 ExactPoint exact_point(const ExactLine& line, const Corners& corners) {
   const Scaled s(line, corners);
   const IntegerTriple normal = cross(difference(s.b, s.a), difference(s.c, s.a));

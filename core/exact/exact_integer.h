@@ -44,7 +44,10 @@ struct ExactLine {
 /// Signs of E_ab, E_bc, E_ca, where E_ij = det[p_i - o, p_j - o, d].
 [[nodiscard]] std::array<int, 3> exact_edge_signs(const ExactLine& line, const Corners& corners);
 
-/// t and the weights of the second and third corner. The line must not be parallel to the triangle's plane.
+/// t alone. The line must not be parallel to the triangle's plane.
+[[nodiscard]] ExactFraction exact_t(const ExactLine& line, const Corners& corners);
+
+/// t and the weights of the second and third corner, under the same condition.
 struct ExactPoint {
   ExactFraction t, u, v;
 };

@@ -53,6 +53,16 @@ bool equal_products(double a, double b, double c, double d) {
   return p.hi == q.hi && p.lo == q.lo;
 }
 
+/// Whether two triangles lie in one plane as their corners say without arithmetic: all across one axis, or the same in
+/// whatever order. Models have walls of many triangles, and triangles twice.
+bool clearly_in_one_plane(const Corners& first, const Corners& second) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto there = [&](Vec3f p) { return p[axis] == first[0][axis]; };
+    if (std::ranges::all_of(first, there) && std::ranges::all_of(second, there)) return true;
+  }
+  return std::ranges::is_permutation(first, second);
+}
+
 double down(double x) { return std::nextafter(x, -kInfinity); }
 double up(double x) { return std::nextafter(x, kInfinity); }
 
@@ -185,7 +195,7 @@ bool ExactPredicate::within_interval(const Corners& corners, Enclosure& t) {
     if (decided(t, inside)) return ++counts_.in_double_double, inside;
   }
   ++counts_.in_integers;
-  const ExactFraction exact = exact_point(line_, corners).t;
+  const ExactFraction exact = exact_t(line_, corners);
   const double rounded = to_double(exact);
   t = rounded == 0.0 ? Enclosure{0.0, 0.0} : Enclosure{down(rounded), up(rounded)};
   const auto not_below = [&](double limit) { return std::isinf(limit) ? limit < 0 : compare(exact, limit) >= 0; };
@@ -194,7 +204,7 @@ bool ExactPredicate::within_interval(const Corners& corners, Enclosure& t) {
 }
 
 int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
-  if (first == second) return 0;
+  if (clearly_in_one_plane(first, second)) return 0;
   // A corner of both on the line is where it meets both.
   for (const Vec3f& corner : first)
     if (std::find(second.begin(), second.end(), corner) != second.end() && surely_on_line(corner))
@@ -207,7 +217,7 @@ int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
     if (const int sign = sign_beyond(difference.hi, bound)) return ++counts_.in_double_double, sign;
   }
   ++counts_.in_integers;
-  return compare(exact_point(line_, first).t, exact_point(line_, second).t);
+  return compare(exact_t(line_, first), exact_t(line_, second));
 }
 
 RoundedPoint ExactPredicate::round(const Corners& corners) {

@@ -78,16 +78,6 @@ inline DoublePoint point_in_double(const Ray& ray, const Corners& corners) {
           high(uv), scale * size_d * size_s * std::max(size_1, size_2) + det_error + double_bounds::kRounding};
 }
 
-/// Whether two triangles lie in one plane as their corners say without arithmetic: all across one axis, or the same in
-/// whatever order. Models have walls of many triangles, and triangles twice.
-bool clearly_in_one_plane(const Corners& first, const Corners& second) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto there = [&](Vec3f p) { return p[axis] == first[0][axis]; };
-    if (std::ranges::all_of(first, there) && std::ranges::all_of(second, there)) return true;
-  }
-  return std::ranges::is_permutation(first, second);
-}
-
 /// Of zeros the one without a sign.
 float weight(double w) { return w > 0.0 ? static_cast<float>(std::min(w, 1.0)) : 0.0f; }
 
@@ -105,7 +95,6 @@ int compare_distances_exactly(const Ray& ray, const Corners& first, const Corner
   const DoublePoint p = point_in_double(ray, first), q = point_in_double(ray, second);
   // 2^-50 of each t is in its radius, more than what this sum and this difference round by.
   if (std::fabs(p.t - q.t) > p.radius + q.radius) return p.t < q.t ? -1 : 1;
-  if (clearly_in_one_plane(first, second)) return 0;
   return ExactPredicate(ray).compare_t(first, second);
 }
 
