@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
+#include <initializer_list>
 #include <limits>
 
 #include "core/exact/determinant.h"
@@ -11,12 +13,17 @@
 namespace arboretum {
 namespace {
 
-using IntegerTriple = Triple<ExactInteger>;
+/// What ordinary scenes get by with: a quarter of the bytes to move.
+using NarrowInteger = boost::multiprecision::number<
+    boost::multiprecision::cpp_int_backend<512, 512, boost::multiprecision::signed_magnitude,
+                                           boost::multiprecision::unchecked, void>,
+    boost::multiprecision::et_off>;
+constexpr int kNarrowBits = 512;
 
-/// x == mantissa * 2^exponent with a whole mantissa; exponent is INT_MAX for 0.
+/// x == mantissa * 2^exponent with a whole odd mantissa, or 0.
 struct Parts {
   long long mantissa = 0;
-  int exponent = std::numeric_limits<int>::max();
+  int exponent = 0;
 };
 
 Parts parts_of(double x) {
@@ -30,53 +37,97 @@ Parts parts_of(double x) {
   return {x < 0 ? -mantissa : mantissa, std::max(field, 1) - 1075 + zeros};
 }
 
-ExactInteger shifted(ExactInteger x, int bits) {
+template <class Integer>
+Integer shifted(Integer x, int bits) {
   x <<= static_cast<unsigned>(bits);
   return x;
 }
 
-/// `Point`: of float32 numbers or doubles.
-template <class Point>
-void lower_exponent(int& exponent, const Point& p) {
-  for (std::size_t k = 0; k < 3; ++k) exponent = std::min(exponent, parts_of(double(p[k])).exponent);
-}
+/// A common scale of points or directions: all are multiples of 2^exponent. Small ones keep the integers of ordinary
+/// scenes within a few machine words.
+struct Scale {
+  int exponent = 0, top = 0;
+  bool empty = true;
 
-template <class Point>
-IntegerTriple to_integers(const Point& p, int exponent) {
-  IntegerTriple r;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Parts x = parts_of(double(p[k]));
-    r[k] = x.mantissa == 0 ? ExactInteger(0) : shifted(ExactInteger(x.mantissa), x.exponent - exponent);
+  /// `Point`: of float32 numbers or doubles.
+  template <class Point>
+  void include(const Point& p) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Parts x = parts_of(double(p[k]));
+      if (x.mantissa == 0) continue;
+      const int above = x.exponent + std::bit_width(static_cast<std::uint64_t>(std::abs(x.mantissa)));
+      exponent = empty ? x.exponent : std::min(exponent, x.exponent), top = empty ? above : std::max(top, above);
+      empty = false;
+    }
   }
-  return r;
-}
+  /// Every coordinate is below 2^bits() times the scale.
+  [[nodiscard]] int bits() const { return top - exponent; }
 
-IntegerTriple difference(const IntegerTriple& a, const IntegerTriple& b) {
+  template <class Integer, class Point>
+  [[nodiscard]] Triple<Integer> to_integers(const Point& p) const {
+    Triple<Integer> r;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Parts x = parts_of(double(p[k]));
+      if (x.mantissa != 0) r[k] = shifted(Integer(x.mantissa), x.exponent - exponent);
+    }
+    return r;
+  }
+};
+
+/// Those of a line and of the triangles that it is asked about.
+struct Scales {
+  Scale points, directions;
+
+  explicit Scales(const ExactLine& line, std::initializer_list<const Corners*> triangles) {
+    points.include(line.origin), directions.include(line.direction);
+    for (const Corners* corners : triangles)
+      for (const Vec3f& p : *corners) points.include(p);
+  }
+  /// Bits of what is of degree `points` in differences of differences of points, and of degree 1 in the direction: a
+  /// difference takes one more bit, a component of a normal one more, a sum of three two.
+  [[nodiscard]] int bits_of(int degree) const { return degree * points.bits() + directions.bits() + 2 * degree + 1; }
+};
+
+template <class Integer>
+Triple<Integer> difference(const Triple<Integer>& a, const Triple<Integer>& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-int sign_of(const ExactInteger& x) { return x.sign() > 0 ? 1 : x.sign() < 0 ? -1 : 0; }
+template <class Integer>
+int sign_of(const Integer& x) {
+  return x.sign() > 0 ? 1 : x.sign() < 0 ? -1 : 0;
+}
 
-/// Points in multiples of 2^point_exponent, the direction in multiples of 2^direction_exponent: small common
-/// scales keep the integers of ordinary scenes within a few machine words.
+/// Points in multiples of their scale, the direction of its own.
+template <class Integer>
 struct Scaled {
-  int point_exponent = std::numeric_limits<int>::max();
-  int direction_exponent = std::numeric_limits<int>::max();
-  IntegerTriple direction, a, b, c;  // corners as seen from the origin
+  Triple<Integer> direction, a, b, c;  // corners as seen from the origin
 
-  Scaled(const ExactLine& line, const Corners& corners) {
-    lower_exponent(direction_exponent, line.direction);
-    lower_exponent(point_exponent, line.origin);
-    for (const Vec3f& p : corners) lower_exponent(point_exponent, p);
-    if (point_exponent == std::numeric_limits<int>::max()) point_exponent = 0;
-    if (direction_exponent == std::numeric_limits<int>::max()) direction_exponent = 0;
-    direction = to_integers(line.direction, direction_exponent);
-    const IntegerTriple origin = to_integers(line.origin, point_exponent);
-    a = difference(to_integers(corners[0], point_exponent), origin);
-    b = difference(to_integers(corners[1], point_exponent), origin);
-    c = difference(to_integers(corners[2], point_exponent), origin);
+  Scaled(const Scales& scales, const ExactLine& line, const Corners& corners)
+      : direction(scales.directions.to_integers<Integer>(line.direction)) {
+    const auto seen = [&, origin = scales.points.to_integers<Integer>(line.origin)](const Vec3f& p) {
+      return difference(scales.points.to_integers<Integer>(p), origin);
+    };
+    a = seen(corners[0]), b = seen(corners[1]), c = seen(corners[2]);
   }
 };
+
+/// t is numerator / denominator, in units of the points' scale over the direction's.
+template <class Integer>
+struct Quotient {
+  Integer numerator, denominator;
+
+  explicit Quotient(const Scaled<Integer>& s) {
+    const Triple<Integer> normal = cross(difference(s.b, s.a), difference(s.c, s.a));
+    numerator = dot(normal, s.a), denominator = dot(normal, s.direction);
+  }
+};
+
+/// f(Integer()) with the narrow integers where numbers of so many bits fit them.
+template <class F>
+auto with_integers_of(int bits, const F& f) {
+  return bits <= kNarrowBits ? f(NarrowInteger()) : f(ExactInteger());
+}
 
 ExactFraction fraction(ExactInteger numerator, ExactInteger denominator, int exponent) {
   if (denominator.sign() < 0) numerator = -numerator, denominator = -denominator;
@@ -89,13 +140,6 @@ int compare_scaled(const ExactInteger& a, int a_exponent, const ExactInteger& b,
 }
 
 }  // namespace
-
-int compare(const ExactFraction& a, const ExactFraction& b) {
-  const int sign_a = sign_of(a.numerator), sign_b = sign_of(b.numerator);
-  if (sign_a != sign_b) return sign_a < sign_b ? -1 : 1;
-  const int c = compare_scaled(a.numerator * b.denominator, a.exponent, b.numerator * a.denominator, b.exponent);
-  return c > 0 ? 1 : c < 0 ? -1 : 0;
-}
 
 int compare(const ExactFraction& a, double x) {
   const int sign_a = sign_of(a.numerator), sign_x = x > 0 ? 1 : x < 0 ? -1 : 0;
@@ -145,24 +189,36 @@ float round_to_float(const ExactFraction& a) {
 }
 
 std::array<int, 3> exact_edge_signs(const ExactLine& line, const Corners& corners) {
-  const Scaled s(line, corners);
-  return {sign_of(determinant(s.a, s.b, s.direction)), sign_of(determinant(s.b, s.c, s.direction)),
-          sign_of(determinant(s.c, s.a, s.direction))};
+  const Scales scales(line, {&corners});
+  return with_integers_of(scales.bits_of(2), [&]<class Integer>(const Integer&) -> std::array<int, 3> {
+    const Scaled<Integer> s(scales, line, corners);
+    return {sign_of(determinant(s.a, s.b, s.direction)), sign_of(determinant(s.b, s.c, s.direction)),
+            sign_of(determinant(s.c, s.a, s.direction))};
+  });
+}
+
+int compare_exact_t(const ExactLine& line, const Corners& first, const Corners& second) {
+  const Scales scales(line, {&first, &second});
+  return with_integers_of(scales.bits_of(5), [&]<class Integer>(const Integer&) {
+    const Quotient<Integer> p(Scaled<Integer>(scales, line, first)), q(Scaled<Integer>(scales, line, second));
+    const int order = (p.numerator * q.denominator).compare(q.numerator * p.denominator);
+    return (order > 0 ? 1 : order < 0 ? -1 : 0) * sign_of(p.denominator) * sign_of(q.denominator);
+  });
 }
 
 ExactFraction exact_t(const ExactLine& line, const Corners& corners) {
-  const Scaled s(line, corners);
-  const IntegerTriple normal = cross(difference(s.b, s.a), difference(s.c, s.a));
-  return fraction(dot(normal, s.a), dot(normal, s.direction), s.point_exponent - s.direction_exponent);
+  const Scales scales(line, {&corners});
+  const Quotient<ExactInteger> t(Scaled<ExactInteger>(scales, line, corners));
+  return fraction(t.numerator, t.denominator, scales.points.exponent - scales.directions.exponent);
 }
 
 ExactPoint exact_point(const ExactLine& line, const Corners& corners) {
-  const Scaled s(line, corners);
-  const IntegerTriple normal = cross(difference(s.b, s.a), difference(s.c, s.a));
-  const ExactInteger denominator = dot(normal, s.direction);
-  return {fraction(dot(normal, s.a), denominator, s.point_exponent - s.direction_exponent),
-          fraction(determinant(s.c, s.a, s.direction), denominator, 0),
-          fraction(determinant(s.a, s.b, s.direction), denominator, 0)};
+  const Scales scales(line, {&corners});
+  const Scaled<ExactInteger> s(scales, line, corners);
+  const Quotient<ExactInteger> t(s);
+  return {fraction(t.numerator, t.denominator, scales.points.exponent - scales.directions.exponent),
+          fraction(determinant(s.c, s.a, s.direction), t.denominator, 0),
+          fraction(determinant(s.a, s.b, s.direction), t.denominator, 0)};
 }
 
 }  // namespace arboretum

@@ -25,8 +25,6 @@ struct ExactFraction {
   int exponent = 0;
 };
 
-/// Sign of a - b.
-[[nodiscard]] int compare(const ExactFraction& a, const ExactFraction& b);
 /// Sign of a - x for a finite x.
 [[nodiscard]] int compare(const ExactFraction& a, double x);
 /// Within one unit in the last place of the exact value. |value| must be within 2^-1000 .. 2^1000, or 0.
@@ -43,6 +41,9 @@ struct ExactLine {
 
 /// Signs of E_ab, E_bc, E_ca, where E_ij = det[p_i - o, p_j - o, d].
 [[nodiscard]] std::array<int, 3> exact_edge_signs(const ExactLine& line, const Corners& corners);
+
+/// Sign of t(first) - t(second). The line must be parallel to neither triangle's plane.
+[[nodiscard]] int compare_exact_t(const ExactLine& line, const Corners& first, const Corners& second);
 
 /// t alone. The line must not be parallel to the triangle's plane.
 [[nodiscard]] ExactFraction exact_t(const ExactLine& line, const Corners& corners);

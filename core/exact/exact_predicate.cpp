@@ -217,7 +217,7 @@ int ExactPredicate::compare_t(const Corners& first, const Corners& second) {
     if (const int sign = sign_beyond(difference.hi, bound)) return ++counts_.in_double_double, sign;
   }
   ++counts_.in_integers;
-  return compare(exact_t(line_, first), exact_t(line_, second));
+  return compare_exact_t(line_, first, second);
 }
 
 RoundedPoint ExactPredicate::round(const Corners& corners) {
