@@ -40,6 +40,12 @@ const KernelRow* find(const TracerSettings& s, std::string_view traversal, Isa i
   return row || traversal != kAuto ? row : find_kernel(s.structure, leaf, s.intersector, s.box, "single", isa);
 }
 
+/// In this order: instances are looked at through indices.
+void check_mesh(const TriangleMesh& mesh) {
+  check_triangles(mesh);
+  check_instances(mesh);
+}
+
 /// The instruction sets that the settings allow, the best first.
 std::vector<Isa> allowed_isas(const TracerSettings& s) {
   const std::span<const Isa> available = available_isas();
@@ -108,8 +114,7 @@ TriangleMesh make_mesh(std::span<const Vec3f> vertices, std::span<const Triangle
 
 Tracer::Tracer(TriangleMesh mesh, TracerSettings settings, NotBuiltYet)
     : mesh_(std::make_unique<const TriangleMesh>(std::move(mesh))), settings_(std::move(settings)) {
-  check_triangles(*mesh_);
-  check_instances(*mesh_);
+  check_mesh(*mesh_);
   settings_.structure = std::string(resolve_structure(settings_.structure, mesh_->moves()));
   const StructureEntry* entry = find_structure(settings_.structure);
   if (!entry) {
@@ -154,7 +159,7 @@ void Tracer::save(const std::filesystem::path& file) const { save_structure(*acc
 
 void Tracer::refit(TriangleMesh mesh) {
   auto moved = std::make_unique<const TriangleMesh>(std::move(mesh));
-  check_instances(*moved);
+  check_mesh(*moved);
   tbb::task_arena(int(allowed_threads(settings_.threads)), 1).execute([&] { accel_->refit(*moved); });
   mesh_ = std::move(moved);
 }

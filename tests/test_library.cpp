@@ -290,6 +290,10 @@ TEST_CASE("a refitted tracer answers as one built over the moved mesh, and refus
   TriangleMesh infinite = mesh;
   infinite.vertices[0].y = kInfinity;
   CHECK_THAT(error_of([&] { tracer.refit(infinite); }), Catch::Contains("is not finite"));
+  TriangleMesh placed = mesh;  // instances whose flat mesh names a vertex that there is not
+  placed.instancing = std::make_shared<Instancing>(Instancing{{mesh}, {Instance{}}});
+  placed.triangles[5].b = 1u << 30;
+  CHECK_THAT(error_of([&] { tracer.refit(placed); }), Catch::Contains("names vertex 1073741824"));
   CHECK(same_bits(hits, check_three_ways(tracer, rays)));
   Tracer grid(mesh, with(&TracerSettings::structure, "grid"));
   CHECK(error_of([&] { grid.refit(moved); }) == "grid cannot be refitted; build it anew");
