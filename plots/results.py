@@ -171,6 +171,11 @@ def swept_axes(cells):
     return found
 
 
+def telling_axes(cells, given, asked):
+    """Those of `asked` that the axes `given` and the ones before do not settle: what must be said besides to tell the cells apart."""
+    return [axis for axis in undetermined_axes(cells, (*given, *asked)) if axis in asked]
+
+
 def undetermined_axes(cells, axes):
     """Those of `axes` that the ones before them do not settle: what must be said to tell the cells apart."""
     kept = []

@@ -1,7 +1,7 @@
 """Horizontal bars, one a built structure, one panel a scene: what sah_cost and build_time have in common."""
 
 from figures import squares
-from results import Cell, NoData, axis_sort_key, ordered, undetermined_axes
+from results import Cell, NoData, axis_sort_key, ordered, telling_axes
 from style import colour, hatch, legends_right, panels, part_colour, part_legend, short
 
 
@@ -46,7 +46,7 @@ def distinct(results, shown_of, label_axes):
     cells = without_doubles([c for c in results.structures if shown_of(c)], shown_of)
     if not cells:
         raise NoData("no structure has this figure")
-    return cells, [a for a in undetermined_axes(cells, ("scene", "structure", *label_axes)) if a in label_axes]
+    return cells, telling_axes(cells, ("scene", "structure"), label_axes)
 
 
 def without_doubles(cells, shown_of):

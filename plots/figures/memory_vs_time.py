@@ -2,7 +2,7 @@
 
 from figures.bars import digits
 from figures.trade_offs import MOST_NAMES, draw_panels, fastest_points, of_places, pareto_front
-from results import Estimate
+from results import estimate
 
 TITLE = "Memory against time"
 CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. Memory is what tracing needs besides the mesh, a triangle of the mesh. "
@@ -16,7 +16,7 @@ def draw(results):
 
     def size(cell):
         found = results.structure_value(cell, "bytes_per_triangle")
-        return Estimate(found, found, found, 1) if found else None
+        return estimate([found]) if found else None
 
     timed = unit.partition(", ")[2]
     points = fastest_points(results, metric, size)

@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from textwrap import fill
 
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -57,18 +58,11 @@ def draw(results):
     for (comparison, rows), axis in zip(shown, axes.flat):
         draw_panel(axis, [s for s in series_of(comparison) if any(s["name"] in row.ours for row in rows)], rows, most)
         name_places(axis, rows, slanted)
-        axis.set_title(wrapped(comparison["name"] + (f" ({comparison['claim']})" if "claim" in comparison else ""), across), fontsize=9.5)
+        axis.set_title(fill(comparison["name"] + (f" ({comparison['claim']})" if "claim" in comparison else ""), across), fontsize=9.5)
         axis.set_ylabel(label_of(results, comparison))
     legends_right(figure, [("measured here", series_legend(shown)), *published_legend(shown)])
-    figure.supxlabel("Published: " + wrapped(table["source"], columns * across), fontsize=8.5, color="#555555")
+    figure.supxlabel("Published: " + fill(table["source"], columns * across), fontsize=8.5, color="#555555")
     return figure
-
-
-def wrapped(text, width):
-    lines = [""]
-    for word in text.split():
-        lines = lines[:-1] + [f"{lines[-1]} {word}".strip()] if len(lines[-1]) + len(word) < width else [*lines, word]
-    return "\n".join(lines)
 
 
 def series_of(comparison):
@@ -100,7 +94,7 @@ def label_of(results, comparison):
 
 def rows_of(results, comparison):
     """The rows of a comparison: of each published place those scenes and workloads of which a series was measured; a place that names none stands for all."""
-    rows = []
+    rows, series = [], series_of(comparison)
     for place in comparison["published"]:
         quantity, inverted = quantity_of(results, {**comparison, **place})
         cells = [c for c in (results.structures if quantity in BUILT else results.traces) if value_of(c, quantity, place)]
@@ -109,7 +103,7 @@ def rows_of(results, comparison):
         for scene in scenes:
             for workload in workloads:
                 here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
-                ours = {s["name"]: found for s in series_of(comparison) if (found := ours_of(here, s, quantity, inverted, place))}
+                ours = {s["name"]: found for s in series if (found := ours_of(here, s, quantity, inverted, place))}
                 if ours:
                     name = "\n".join(n for n in (place.get("label", ""), short(scene, 17), workload.replace("_", " ")) if n)
                     rows.append(Row(name, published_of(place), ours))

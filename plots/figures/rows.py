@@ -43,34 +43,34 @@ def groups_of(cells, varied, shown_of):
             for names in groups.values()]
 
 
+def lines_of(groups):
+    """A heading, or a Row, for each place from the top; a group's heading takes the place above its rows."""
+    return [line for heading, rows in groups for line in ([heading] if heading else []) + rows]
+
+
 def places_of(groups):
-    """[(place from the top, Row)]; a group's heading takes the place above it."""
-    found, place = [], 0
-    for heading, rows in groups:
-        place += bool(heading)
-        found += [(place + i, row) for i, row in enumerate(rows)]
-        place += len(rows)
-    return found
+    """[(place from the top, Row)]."""
+    return [(place, line) for place, line in enumerate(lines_of(groups)) if isinstance(line, Row)]
 
 
 def row_panels(groups, scenes, widths, room=0.0, title_of=short, together=1):
     """For each scene as many panels side by side as there are `widths` (inches, at least; `room` besides, of each, for what stands to its right), all with
     the same rows; so many neighbours as are `together` stay in one band of them. Gives the figure and {scene: [axis, ...]}."""
-    height = sum(len(rows) + bool(heading) for heading, rows in groups)
+    lines = lines_of(groups)
     labels = 0.3 + CHARACTER * max(len(row.label) for _, rows in groups for row in rows)
     stretch = min(MOST_STRETCH, max(1.0, (WIDEST / len(scenes) - len(widths) * room) / sum(widths)))
     one = stretch * sum(widths) + len(widths) * room
     bands = -(-len(scenes) // max(together, int(WIDEST / one) // together * together))
     beside = -(-len(scenes) // (bands * together)) * together
     columns = beside * len(widths)
-    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * height, sharey=True, gridspec_kw={"width_ratios": widths * beside})
+    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True, gridspec_kw={"width_ratios": widths * beside})
     found = {}
     for place in range(bands * beside):
         first = place % beside * len(widths)
         own = list(axes[place // beside][first:first + len(widths)])
         for axis in own:
             if place < len(scenes):
-                prepare(axis, groups, height)
+                prepare(axis, lines)
             else:
                 axis.set_visible(False)
         if place < len(scenes):
@@ -79,19 +79,12 @@ def row_panels(groups, scenes, widths, room=0.0, title_of=short, together=1):
     return figure, found
 
 
-def prepare(axis, groups, height):
+def prepare(axis, lines):
     """The labels of the rows, and the headings above their groups."""
-    ticks, place = [], 0
-    for heading, rows in groups:
-        ticks += [(place, heading)] if heading else []
-        place += bool(heading)
-        ticks += [(place + i, row.label) for i, row in enumerate(rows)]
-        place += len(rows)
-    headings = {heading for heading, _ in groups if heading}
-    axis.set_yticks([y for y, _ in ticks], [text for _, text in ticks], fontsize=FONT)
-    for (_, text), tick in zip(ticks, axis.get_yticklabels()):
-        tick.set_fontweight("bold" if text in headings else "normal")
-    axis.set_ylim(height - 0.4, -0.6)
+    axis.set_yticks(range(len(lines)), [line.label if isinstance(line, Row) else line for line in lines], fontsize=FONT)
+    for line, tick in zip(lines, axis.get_yticklabels()):
+        tick.set_fontweight("normal" if isinstance(line, Row) else "bold")
+    axis.set_ylim(len(lines) - 0.4, -0.6)
     axis.tick_params(axis="x", labelsize=FONT, top=True, labeltop=True)
     axis.tick_params(axis="y", length=0)
     axis.grid(axis="y", visible=False)

@@ -4,7 +4,7 @@ that one of them would decide every fit."""
 import numpy as np
 
 from figures import trade_offs
-from results import Estimate, NoData, ordered
+from results import NoData, estimate, ordered
 from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panel_grid, panels, structure_legend,
                    wrong_legend, wrong_marker)
 from tables import SAH_STEP
@@ -43,7 +43,7 @@ def fastest_points(results, metric):
     """(cell, SAH cost, ns a ray, EPO or None) of the fastest mode of each structure as built, scene, workload and ISA."""
     def cost(cell):
         found = results.structure_value(cell, "sah_cost")
-        return None if found is None else Estimate(found, found, found, 1)
+        return None if found is None else estimate([found])
 
     return [(p.cell, p.x.median, p.y.median, results.structure_value(p.cell, "epo")) for p in trade_offs.fastest_points(results, metric, cost)]
 
@@ -109,8 +109,12 @@ def linear_fit(x, y):
     if x.size < 3 or np.ptp(x) == 0 or np.ptp(y) == 0:
         return None
     slope, offset = np.polyfit(x, y, 1)
-    residual = y - (slope * x + offset)
-    return slope, offset, 1.0 - float(residual @ residual) / float(((y - y.mean()) ** 2).sum())
+    return slope, offset, explained(y, slope * x + offset)
+
+
+def explained(y, fit):
+    """R²: the share of the variance of `y` that `fit` explains."""
+    return 1.0 - float(((y - fit) ** 2).sum()) / float(((y - y.mean()) ** 2).sum())
 
 
 def plane_fit(x1, x2, y):
@@ -122,5 +126,4 @@ def plane_fit(x1, x2, y):
     weights, _, rank, _ = np.linalg.lstsq(columns, y, rcond=None)
     if rank < 3 or np.ptp(y) == 0:
         return None
-    residual = y - columns @ weights
-    return 1.0 - float(residual @ residual) / float(((y - y.mean()) ** 2).sum())
+    return explained(y, columns @ weights)

@@ -10,10 +10,10 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import ScaledTranslation
 
 from figures.bars import bar_label, label
-from results import Estimate, NoData, ordered, undetermined_axes
+from results import STRUCTURE_AXES, Estimate, NoData, axis_sort_key, ordered, telling_axes
 from style import MARKERS, WRONG, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend, wrong_marker
 
-BUILT = ("scene", "structure", "builder", "leaf", "isa", "workload", "threads")
+TRACED = (*STRUCTURE_AXES, "workload")
 PLACE = ("scene", "workload", "isa", "threads")
 NAMED_BY = ("builder", "leaf")
 # Inches: of a panel at least; left of its axes; of a line of the names below it, and of a character there; from the axes' left edge to their numbers, markers and words.
@@ -40,7 +40,7 @@ def fastest_points(results, metric, x_of):
         rate, x = cell.estimate(metric), x_of(cell)
         if rate is None or rate.low <= 0 or x is None:
             continue
-        key, time = tuple(cell[a] for a in BUILT), Estimate(1e9 / rate.median, 1e9 / rate.high, 1e9 / rate.low, rate.samples)
+        key, time = tuple(cell[a] for a in TRACED), Estimate(1e9 / rate.median, 1e9 / rate.high, 1e9 / rate.low, rate.samples)
         if key not in best or time.median < best[key].y.median:
             best[key] = Point(cell, x, time)
     return list(best.values())
@@ -77,8 +77,8 @@ def draw_panels(places, x_label, y_label, named_of):
     """A panel for each of `places`, as of_places() gives them. `x_label(threads)` and `y_label(threads)` name the axes; `named_of(points)` gives (point, text) of those
     that get a number, by x, the text what is said of it."""
     points = [p for here in places.values() for p in here]
-    varied = [a for a in undetermined_axes([p.cell for p in points], ("scene", "structure", "isa", "threads", *NAMED_BY)) if a in NAMED_BY]
-    columns = sorted({place[1:] for place in places}, key=lambda rest: [ordered({p[1 + i] for p in places}, a).index(rest[i]) for i, a in enumerate(PLACE[1:])])
+    varied = telling_axes([p.cell for p in points], ("scene", "structure", "isa", "threads"), NAMED_BY)
+    columns = sorted({place[1:] for place in places}, key=lambda rest: [axis_sort_key(a)(v) for a, v in zip(PLACE[1:], rest)])
     several = len({threads for *_, threads in places}) > 1
     titles = {(workload, isa, threads): ", ".join([workload, isa] + ([label("threads", threads)] if several else [])) for workload, isa, threads in columns}
     named = {place: named_of(here) for place, here in places.items()}

@@ -3,7 +3,7 @@
 from matplotlib.lines import Line2D
 
 from figures.rows import FONT, groups_of, places_of, row_panels, rows_are_due
-from results import Cell, NoData, ordered, undetermined_axes
+from results import Cell, NoData, ordered, telling_axes
 from style import legends_right, log_axis, panel_title
 
 TITLE = "Visits and tests of a ray"
@@ -26,16 +26,15 @@ def draw(results):
     isa = ordered((c["isa"] for c in cells), "isa")[-1]
     workloads = chosen(ordered((c["workload"] for c in cells), "workload"))
     cells = [c for c in cells if c["isa"] == isa and c["workload"] in workloads]
-    panels = {panel_of(c): panel_title(c["scene"], c["workload"], WIDTH + COLUMN * len(COUNTS)) for s in ordered((c["scene"] for c in cells), "scene") for w in workloads
-              for c in cells if (c["scene"], c["workload"]) == (s, w)}
-    cells = without_doubles([Cell({**c.axes, "scene": panel_of(c)}, c.rows) for c in cells])
+    titles = {panel_of(s, w): panel_title(s, w, WIDTH + COLUMN * len(COUNTS)) for s in ordered((c["scene"] for c in cells), "scene") for w in workloads}
+    cells = without_doubles([Cell({**c.axes, "scene": panel_of(c["scene"], c["workload"])}, c.rows) for c in cells])
     if rows_are_due(cells):
         cells = without_doubles([c for c in cells if c["workload"] == workloads[-1]])
-    varied = [a for a in undetermined_axes(cells, ("scene", "structure", *AXES)) if a in AXES]
+    varied = telling_axes(cells, ("scene", "structure"), AXES)
     groups = groups_of(cells, varied, shown)
     places = places_of(groups)
     used = {c["scene"] for c in cells}
-    figure, axes = row_panels(groups, [p for p in panels if p in used], [WIDTH], COLUMN * len(COUNTS) + 0.1, panels.get, len({c["workload"] for c in cells}))
+    figure, axes = row_panels(groups, [p for p in titles if p in used], [WIDTH], COLUMN * len(COUNTS) + 0.1, titles.get, len({c["workload"] for c in cells}))
     for panel, (axis,) in axes.items():
         strip(axis, [(place, counts(row.cells[panel])) for place, row in places if panel in row.cells])
     handles = [Line2D([], [], linestyle="", marker=marker, color=shade, markersize=5, label=label) for _, label, marker, shade in COUNTS]
@@ -43,8 +42,8 @@ def draw(results):
     return figure
 
 
-def panel_of(cell):
-    return f"{cell['scene']}, {cell['workload']}"
+def panel_of(scene, workload):
+    return f"{scene}, {workload}"
 
 
 def counts(cell):
