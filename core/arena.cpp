@@ -9,7 +9,7 @@ Arena::Arena(std::size_t bytes) : bytes_(bytes) {
   if (bytes > 0) data_ = static_cast<std::byte*>(allocate_metered(bytes));
 }
 
-Arena::Arena(ReservedArray<std::byte>&& array) noexcept : bytes_(array.handed_out()) { data_ = array.release(); }
+Arena::Arena(ReservedArray<std::byte>&& array) noexcept : bytes_(array.counted()) { data_ = array.release(); }
 
 Arena::~Arena() {
   if (data_) release_metered(data_, bytes_);

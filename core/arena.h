@@ -2,9 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdlib>
-#include <memory>
-#include <new>
 #include <utility>
 
 namespace arboretum {
@@ -17,7 +14,7 @@ class Arena {
  public:
   Arena() = default;
   explicit Arena(std::size_t bytes);
-  /// Those that the array has handed out.
+  /// Those of the array that count.
   explicit Arena(ReservedArray<std::byte>&& array) noexcept;
   Arena(Arena&& other) noexcept : data_(std::exchange(other.data_, nullptr)), bytes_(std::exchange(other.bytes_, 0)) {}
   Arena& operator=(Arena&& other) noexcept {

@@ -44,7 +44,7 @@ class ReservedArray {
     counted_bytes_.fetch_add(n * sizeof(T), std::memory_order_relaxed);
     MemoryMeter::add(n * sizeof(T));
   }
-  /// Gives up the elements, which count on, to whoever calls release_metered() with the bytes of those handed out.
+  /// Gives up the elements, which count on, to whoever calls release_metered() with the bytes of those that count.
   [[nodiscard]] T* release() noexcept {
     counted_bytes_ = 0, size_ = 0;
     return std::exchange(data_, nullptr);
@@ -75,8 +75,8 @@ class ReservedArray {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  /// How many count.
-  [[nodiscard]] std::size_t handed_out() const noexcept { return counted_bytes_ / sizeof(T); }
+  /// How many count: were handed out and not given back.
+  [[nodiscard]] std::size_t counted() const noexcept { return counted_bytes_ / sizeof(T); }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] T* data() noexcept { return data_; }
   [[nodiscard]] const T* data() const noexcept { return data_; }

@@ -123,7 +123,7 @@ Json promise_entries(const Registry& registry) {
                     {"intersector", intersector},
                     {"box", box}};
       entry["crack_free_at_edges"] = promise.coverage != Coverage::none;
-      entry["crack_free"] = promise.coverage == Coverage::closed || promise.coverage == Coverage::exact;
+      entry["crack_free"] = promise.coverage >= Coverage::closed;
       entry["exact"] = promise.coverage == Coverage::exact;
       entry["t_error_ulp"] = promise.t_ulp > 0 ? Json(promise.t_ulp) : Json(nullptr);
       const std::string_view conditioning = to_string(promise.conditioning);

@@ -24,6 +24,7 @@ std::string impossible_below(const Cell& cell, const Registry& registry) {
   const StructureEntry* below = registry.structure(name);
   std::string why = below ? why_not_below(below->info) : "this build has no structure of that name";
   if (why.empty()) why = lacks_builder(*below, cell.builder);
+  if (why.empty()) why = below->info.why_not_built(cell.builder, cell.leaf);
   if (why.empty() && !registry.kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa)) {
     why = registry.why_no_kernel(name, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
     if (why.empty()) why = "no such kernel in this build";
@@ -45,9 +46,7 @@ std::string why_impossible(Cell& cell, bool moves, const Registry& registry) {
     if (std::string why = impossible_below(cell, registry); !why.empty()) return why;
   }
   if (const std::string why = lacks_builder(*entry, cell.builder); !why.empty()) return why;
-  if (entry->info.why_no_build) {
-    if (std::string why = entry->info.why_no_build(cell.builder, cell.leaf); !why.empty()) return why;
-  }
+  if (std::string why = entry->info.why_not_built(cell.builder, cell.leaf); !why.empty()) return why;
   cell.kernel = registry.kernel(cell.structure, cell.leaf, cell.intersector, cell.box, cell.traversal, cell.isa);
   if (!cell.kernel) {
     const std::string why =

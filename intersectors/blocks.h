@@ -175,6 +175,14 @@ constexpr std::size_t largest_of(TypeList<Blocks...>) {
   return most;
 }
 inline constexpr std::size_t kLargestBlock = largest_of(AllBlocks{});
+/// Triangles that the widest holds.
+template <class... Blocks>
+constexpr int widest_of(TypeList<Blocks...>) {
+  int most = 0;
+  ((most = Blocks::kWidth > most ? Blocks::kWidth : most), ...);
+  return most;
+}
+inline constexpr int kWidestBlock = widest_of(AllBlocks{});
 
 /// Calls f with the std::type_identity of the block of that key; false where there is none.
 template <class F>

@@ -128,7 +128,8 @@ struct Promise {
   return promise_of("", intersector, "padded").coverage == Coverage::none ? "fast" : "padded";
 }
 
-/// With padded boxes its hits are the same, bit for bit, in every structure and way of traversal (docs/numerics.md).
+/// With padded boxes its hits are the same, bit for bit, in every structure and way of traversal, but of rays in a
+/// triangle's plane (docs/numerics.md).
 [[nodiscard]] constexpr bool is_structure_independent(std::string_view intersector) noexcept {
   return promise_of("", intersector, "padded").coverage >= Coverage::closed;
 }

@@ -1,5 +1,6 @@
-// Moving lanes: within groups of four, from one group to all, and bytes in memory to lanes. What nodes need that are not
-// plain arrays of floats (bvh4_aos, quantised boxes). Include only between simd/target_begin.h and simd/target_end.h.
+// Moving lanes: within groups of four, from one group to all, and bytes in memory to lanes. What is not plain arrays of
+// floats needs it (bvh4_aos and its leaves, quantised boxes, rays in memory). Include only between simd/target_begin.h and
+// simd/target_end.h.
 #pragma once
 
 #include "simd/simd.h"

@@ -69,10 +69,8 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   };
   check("builder", settings.builder, entry->info.builders);
   check("leaf", settings.leaf, entry->info.leaves);
-  if (entry->info.why_no_build) {
-    if (const std::string why = entry->info.why_no_build(settings.builder, settings.leaf); !why.empty())
-      throw UserError(why);
-  }
+  if (const std::string why = entry->info.why_not_built(settings.builder, settings.leaf); !why.empty())
+    throw UserError(why);
 
   check_parameters(settings.parameters);
   check_triangles(mesh, Largest::finite);

@@ -115,6 +115,10 @@ struct StructureInfo {
   /// Why a builder of the structure does not make a leaf of it, empty where it does: what skipped cells and refused
   /// builds say. None: each makes every leaf.
   std::string (*why_no_build)(std::string_view builder, std::string_view leaf) = nullptr;
+
+  [[nodiscard]] std::string why_not_built(std::string_view builder, std::string_view leaf) const {
+    return why_no_build ? why_no_build(builder, leaf) : std::string();
+  }
 };
 
 class Accel {

@@ -125,7 +125,7 @@ TEST_CASE("a reserved array becomes an arena of what it has handed out") {
     ReservedArray<std::byte> array;
     array.reserve(3 << 20);
     array.hand_out(900), array.hand_out(100);
-    CHECK(array.handed_out() == 1000);
+    CHECK(array.counted() == 1000);
     const std::byte* const data = array.data();
     const Arena arena(std::move(array));
     CHECK(array.empty());

@@ -5,6 +5,8 @@
 namespace arboretum::double_bounds {
 
 /// A determinant of three rounded differences is off by less than this times the product of their largest components.
+/// For roundings of the nearest hit, which is seldom next to where a ray starts; what has to be told from tnear takes
+/// kTripleProducts.
 inline constexpr double kDeterminant = 56 * 0x1p-53;
 /// Of the sum of the magnitudes of its six triple products, which carry at most eight roundings each.
 inline constexpr double kTripleProducts = 9 * 0x1p-53;

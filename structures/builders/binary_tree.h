@@ -35,8 +35,9 @@ struct BinaryTree {
   MeteredVector<std::uint32_t> primitives;
   ReservedArray<std::uint32_t> first;  ///< one a node; set for leaves
   bool duplicates = false;             ///< a primitive may be referenced by several leaves
-  bool in_blocks = false;  ///< leaf blocks are filled (structures/leaves/leaf_blocks.h), in the leaves' order:
-                           ///< references are all their lanes, which neither `primitives` nor `first` holds
+  bool in_blocks =
+      false;  ///< leaf blocks are filled (structures/leaves/leaf_blocks.h), in the leaves' order:
+              ///< references, `count` too, are all their lanes, which neither `primitives` nor `first` holds
 
   /// Where the references below `node` begin.
   [[nodiscard]] std::uint32_t begin_of(std::uint32_t node) const noexcept {

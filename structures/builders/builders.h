@@ -15,8 +15,8 @@ namespace arboretum {
 class LeafBlocks;
 
 /// Builds a binary tree with leaves of at most `leaf_width` references. Deterministic: the tree depends on the mesh,
-/// the parameters and `leaf_width`, not on threads or ISA. Runs in the caller's TBB arena. The mesh may be empty: then
-/// the tree is, too.
+/// the parameters, `leaf_width` and whether leaf blocks are filled (TreeUse::blocks), not on threads or ISA. Runs in
+/// the caller's TBB arena. The mesh may be empty: then the tree is, too.
 using BinaryBuilder = void (*)(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
                                BinaryTree& tree, BuildReport& report);
 

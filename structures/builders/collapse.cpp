@@ -251,24 +251,22 @@ class Collapse::Writer {
     }
     Below all{settings.traversal_cost, granules(settings.node_bytes)};
     const float area = node.half_area();
-    float costs[kMaxBranching];
     for (unsigned i = 0; i < slots.size; ++i) {
-      costs[i] = below[i].cost;
       all.granules += below[i].granules;
-      all.cost += costs[i] * (area > 0.0f ? tree_.nodes[slots.node[i]].half_area() / area : 1.0f);
+      all.cost += below[i].cost * (area > 0.0f ? tree_.nodes[slots.node[i]].half_area() / area : 1.0f);
     }
     out_[place] = WideNode::inner(box, first, slots.size, large, all.granules);
-    order(&out_[first], costs, slots.size);
+    order(&out_[first], below, slots.size);
     return all;
   }
 
   /// Puts children that cost little, such as leaves, last, where any hit looks first; others of much the same cost,
   /// within a factor of eight, stay as the builder has them, next to each other in space.
-  static void order(WideNode* children, const float* costs, unsigned size) noexcept {
+  static void order(WideNode* children, const Below* below, unsigned size) noexcept {
     int cost[kMaxBranching];
     // round(log8(cost)): of at least 1, but for settings of one's own; the exponent as the bits have it
     for (unsigned i = 0; i < size; ++i)
-      cost[i] = ((std::bit_cast<std::int32_t>(costs[i] * 0x1.6a09e6p1f) >> 23) - 127) / 3;
+      cost[i] = ((std::bit_cast<std::int32_t>(below[i].cost * 0x1.6a09e6p1f) >> 23) - 127) / 3;
     for (unsigned i = 1; i < size; ++i) {
       const WideNode moved = children[i];
       const int its = cost[i];

@@ -12,6 +12,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
+#include "intersectors/blocks.h"
 #include "structures/builders/box4.h"
 #include "structures/builders/portable_builders.h"
 #include "structures/builders/morton_order.h"
@@ -30,22 +31,20 @@ constexpr std::size_t kSmall = 1u << 17;  ///< so many triangles are sorted by 2
 /// Leaves as ranges of BinaryTree::primitives.
 class RangesOfIds {
  public:
-  RangesOfIds(const TriangleMesh& mesh, const MortonOrder& order, BinaryTree& tree)
-      : boxes_(mesh), order_(order), tree_(tree) {}
+  RangesOfIds(const MortonOrder& order, BinaryTree& tree) : order_(order), tree_(tree) {}
   /// How many places a leaf takes.
   [[nodiscard]] std::size_t places(std::size_t triangles) const noexcept { return triangles; }
   void make(std::size_t places) const { tree_.primitives.resize(places); }
   /// Makes a leaf of [begin, end) of the order, from `place` on; returns its box.
-  Box4 leaf(std::uint32_t index, std::size_t begin, std::size_t end, std::size_t place) const noexcept {
-    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, order_.size() - 1);
+  Box4 leaf(const TriangleBoxes& boxes, std::uint32_t index, std::size_t begin, std::size_t end,
+            std::size_t place) const noexcept {
     tree_.first[index] = std::uint32_t(place);
     Box4 box;
-    for (std::size_t i = begin; i < end; ++i) box.extend(boxes_.box(tree_.primitives[place++] = order_.id(i)));
+    for (std::size_t i = begin; i < end; ++i) box.extend(boxes.box(tree_.primitives[place++] = order_.id(i)));
     return box;
   }
 
  private:
-  const TriangleBoxes boxes_;
   const MortonOrder& order_;
   BinaryTree& tree_;
 };
@@ -54,12 +53,11 @@ class RangesOfIds {
 class FilledBlocks {
  public:
   FilledBlocks(const TriangleMesh& mesh, const MortonOrder& order, unsigned width, LeafBlocks& blocks)
-      : mesh_(mesh), boxes_(mesh), order_(order), width_(width), blocks_(blocks) {}
+      : mesh_(mesh), order_(order), width_(width), blocks_(blocks) {}
   [[nodiscard]] std::size_t places(std::size_t) const noexcept { return width_; }
   void make(std::size_t places) const { blocks_.make(places / width_); }
-  Box4 leaf(std::uint32_t, std::size_t begin, std::size_t end, std::size_t place) const noexcept {
-    boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, order_.size() - 1);
-    std::uint32_t ids[kMostWidth];
+  Box4 leaf(const TriangleBoxes&, std::uint32_t, std::size_t begin, std::size_t end, std::size_t place) const noexcept {
+    std::uint32_t ids[kWidestBlock];
     for (std::size_t i = begin; i < end; ++i) ids[i - begin] = order_.id(i);
     Box4 box;
     blocks_.fill(place / width_, mesh_, {ids, end - begin}, box);
@@ -67,9 +65,7 @@ class FilledBlocks {
   }
 
  private:
-  static constexpr std::size_t kMostWidth = 16;
   const TriangleMesh& mesh_;
-  const TriangleBoxes boxes_;
   const MortonOrder& order_;
   const unsigned width_;
   LeafBlocks& blocks_;
@@ -79,11 +75,12 @@ class FilledBlocks {
 template <class Leaves>
 class Lbvh {
  public:
-  Lbvh(MortonOrder& order, unsigned leaf_width, const Leaves& leaves, BinaryTree& tree)
-      : order_(order), leaf_width_(leaf_width), leaves_(leaves), tree_(tree), pool_(tree, order.size(), kOneTask) {}
+  Lbvh(const TriangleMesh& mesh, MortonOrder& order, unsigned leaf_width, const Leaves& leaves, BinaryTree& tree)
+      : boxes_(mesh), order_(order), leaf_width_(leaf_width), leaves_(leaves), tree_(tree),
+        pool_(tree, order.size(), kOneTask) {}
 
   void build() {
-    cut_into_tasks({0, 0, order_.size(), order_.sorted_bits(), {}, {}, false});
+    cut_into_tasks({0, 0, order_.size(), order_.sorted_bits()});
     std::vector<Task*> tasks;
     for (Task& task : tasks_) tasks.push_back(&task);
     std::ranges::sort(tasks, {}, &Task::begin);
@@ -91,10 +88,10 @@ class Lbvh {
       tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t i) { f(*tasks[i]); });
     };
     for_tasks([this](Task& t) {
-      if (!t.is_cut) t.place = cut(t.index, t.begin, t.end, t.sorted, t.share);
+      if (t.places == 0) t.places = cut(t.index, t.begin, t.end, t.sorted, t.share);
     });
     std::size_t all = 0;
-    for (Task* t : tasks) all += std::exchange(t->place, all);
+    for (Task* t : tasks) t->place = std::exchange(all, all + t->places);
     leaves_.make(all);
     for_tasks([this](Task& t) { (void)fill(t.index, t.begin, t.place); });
     pool_.finish();
@@ -108,9 +105,9 @@ class Lbvh {
     std::uint32_t index;
     std::size_t begin, end;
     unsigned sorted;  ///< bits that the range is sorted by
-    NodePool::Share share;
-    std::size_t place;  ///< how many places its leaves take, then which is the first
-    bool is_cut;        ///< at once, being small beside a large sister, so that shares are as few as NodePool reckons
+    NodePool::Share share{};
+    std::size_t places = 0;  ///< that its leaves take; 0 until it is cut
+    std::size_t place = 0;   ///< the first of them
   };
 
   std::size_t split(std::size_t begin, std::size_t end, unsigned& sorted) {
@@ -119,7 +116,8 @@ class Lbvh {
                                                    : order_.split(begin, end);
   }
 
-  /// The upper nodes: those of which a side is too large for a task.
+  /// The upper nodes: those of which a side is too large for a task. A small side beside a large one is cut at once, so
+  /// that shares are as few as NodePool reckons.
   void cut_into_tasks(Task task) {
     if (task.end - task.begin <= 2 * kOneTask) {
       tasks_.push_back(task);
@@ -127,8 +125,7 @@ class Lbvh {
     }
     const std::size_t middle = split(task.begin, task.end, task.sorted);
     const std::uint32_t left = tree_.nodes[task.index].left = pool_.take_pair(task.share);
-    Task sides[2] = {{left, task.begin, middle, task.sorted, {}, {}, false},
-                     {left + 1, middle, task.end, task.sorted, {}, {}, false}};
+    Task sides[2] = {{left, task.begin, middle, task.sorted}, {left + 1, middle, task.end, task.sorted}};
     const bool large[2] = {middle - task.begin > kOneTask, task.end - middle > kOneTask};
     if (large[0] && large[1]) {
       sides[1].share = task.share;
@@ -136,7 +133,7 @@ class Lbvh {
       return;
     }
     Task& small = sides[large[0] ? 1 : 0];
-    small.place = cut(small.index, small.begin, small.end, small.sorted, task.share), small.is_cut = true;
+    small.places = cut(small.index, small.begin, small.end, small.sorted, task.share);
     tasks_.push_back(small);
     Task& rest = sides[large[0] ? 0 : 1];
     rest.share = task.share;
@@ -156,24 +153,21 @@ class Lbvh {
     return before + cut(left + 1, middle, end, sorted, share);
   }
 
-  void put(std::uint32_t index, const Box4& box, std::size_t places) noexcept {
-    BinaryNode& node = tree_.nodes[index];
-    node.lower = to_vec3f(box.lower), node.upper = to_vec3f(box.upper), node.count = std::uint32_t(places);
-  }
-
   /// Makes the leaves of a subtree that was cut, from `begin` of the order and `place` on; both go on behind it.
   Box4 fill(std::uint32_t index, std::size_t& begin, std::size_t& place) noexcept {
-    const BinaryNode node = tree_.nodes[index];
+    BinaryNode& node = tree_.nodes[index];
     const std::size_t first = place;
     Box4 box;
     if (node.is_leaf()) {
-      box = leaves_.leaf(index, begin, begin + node.count, place);
-      begin += node.count, place += leaves_.places(node.count);
+      const std::size_t end = begin + node.count;
+      boxes_.prefetch([&](std::size_t i) { return order_.id(i); }, begin, end, order_.size() - 1);
+      box = leaves_.leaf(boxes_, index, begin, end, place);
+      begin = end, place += leaves_.places(node.count);
     } else {
       box = fill(node.left, begin, place);
       box.extend(fill(node.left + 1, begin, place));
     }
-    put(index, box, place - first);
+    node.lower = to_vec3f(box.lower), node.upper = to_vec3f(box.upper), node.count = std::uint32_t(place - first);
     return box;
   }
 
@@ -191,6 +185,7 @@ class Lbvh {
     return {node.lower, node.upper};
   }
 
+  const TriangleBoxes boxes_;
   MortonOrder& order_;
   const unsigned leaf_width_;
   const Leaves leaves_;
@@ -208,7 +203,7 @@ void build(const TriangleMesh& mesh, const BuilderParameters& parameters, unsign
   PhaseClock phase(report);
   MortonOrder order(mesh, parameters.morton_bits, mesh.size() <= kSmall ? 21 : MortonOrder::kAtOnce);
   phase.ends("order");
-  Lbvh(order, leaf_width, make_leaves(order), tree).build();
+  Lbvh(mesh, order, leaf_width, make_leaves(order), tree).build();
   phase.ends("tree");
 }
 
@@ -216,8 +211,7 @@ void build(const TriangleMesh& mesh, const BuilderParameters& parameters, unsign
 
 void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
                   BuildReport& report) {
-  build(mesh, parameters, leaf_width, tree, report,
-        [&](const MortonOrder& order) { return RangesOfIds(mesh, order, tree); });
+  build(mesh, parameters, leaf_width, tree, report, [&](const MortonOrder& order) { return RangesOfIds(order, tree); });
 }
 
 void build_morton_in_blocks(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,

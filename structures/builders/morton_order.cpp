@@ -132,7 +132,7 @@ void check_morton_bits(unsigned bits) {
 
 MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorted)
     : boxes_(mesh), bits_(bits), sorted_(sorted), id_bits_(unsigned(std::bit_width(mesh.size()))),
-      held_(std::min(bits, boxes_.are_far() ? (64 - id_bits_) / 3 * 3 : 30)), keys_(mesh.size()) {
+      held_(std::min(bits, boxes_.are_far() ? (64 - id_bits_) / 3 * 3 : kAtOnce)), keys_(mesh.size()) {
   check_morton_bits(bits);
   const std::size_t n = mesh.size();
   if (n == 0) return;
@@ -188,7 +188,6 @@ void MortonOrder::next_codes(std::size_t begin, std::size_t end, std::uint64_t* 
 
 unsigned MortonOrder::refine(std::size_t begin, std::size_t end, unsigned sorted) {
   const std::size_t n = end - begin;
-  const auto first = keys_.begin() + std::ptrdiff_t(begin);
   // A surface of n triangles is in some 2^(2/3 b) of the cells that b bits tell apart; the rest is left for where it is
   // asked for.
   const unsigned enough = 3 * ((unsigned(std::bit_width(n)) + 1) / 2);
@@ -196,24 +195,25 @@ unsigned MortonOrder::refine(std::size_t begin, std::size_t end, unsigned sorted
   const unsigned now = sorted + std::min((sorted < held_ ? held_ : bits_) - sorted, enough), low = below(now);
   if (n <= kFew) {
     std::array<std::uint64_t, kFew + 3> run, room;
-    if (anew) {
-      next_codes(begin, end, run.data());
-    } else {
-      std::copy_n(first, n, run.data());
-    }
-    std::copy_n(sort_few(run.data(), room.data(), n, low, now - sorted), n, first);
+    std::uint64_t* const keys = &keys_[begin];
+    std::uint64_t* const from = anew ? run.data() : keys;
+    if (anew) next_codes(begin, end, from);
+    if (const std::uint64_t* sorted_keys = sort_few(from, room.data(), n, low, now - sorted); sorted_keys != keys)
+      std::copy_n(sorted_keys, n, keys);
   } else {
     MeteredVector<std::uint64_t> run((n + 3) / 4 * 4);
     for_chunks(n, [&](std::size_t, std::size_t b, std::size_t e) {
       if (anew) {
         next_codes(begin + b, begin + e, &run[b]);
       } else {
-        std::copy(first + std::ptrdiff_t(b), first + std::ptrdiff_t(e), &run[b]);
+        std::copy(&keys_[begin] + b, &keys_[begin] + e, &run[b]);
       }
     });
     run.resize(n);
     radix_sort(run, low, low + now - sorted);
-    std::copy(run.begin(), run.end(), first);
+    for_chunks(n, [&](std::size_t, std::size_t b, std::size_t e) {
+      std::copy(run.begin() + std::ptrdiff_t(b), run.begin() + std::ptrdiff_t(e), &keys_[begin] + b);
+    });
   }
   return now;
 }

@@ -3,7 +3,8 @@
 //
 // Only a code's first bits are sorted by; the next ones are looked at where triangles that share those have to be told
 // apart. So a sort takes two or three passes, and whoever cuts the order asks for more bits where he is to cut between
-// equals. A key of 64 bits holds as much of a code as the triangle's number leaves; what is beyond is computed anew.
+// equals. A key of 64 bits holds as much of a code as the triangle's number leaves, of meshes that the caches hold,
+// where codes are soon made, 30 bits; what is beyond is computed anew.
 #pragma once
 
 #include <cstdint>

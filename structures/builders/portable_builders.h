@@ -9,7 +9,8 @@ namespace arboretum {
 /// `morton`: linear BVH. Reads morton_bits.
 void build_morton(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
                   BuildReport& report);
-/// The same tree, with the leaf blocks filled while it is made.
+/// The same cuts, with the leaf blocks filled while they are made. References are the blocks' lanes, empty ones too:
+/// leaves merged from several are not packed anew, so what collapse() merges may be another thing.
 void build_morton_in_blocks(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width,
                             LeafBlocks& blocks, BinaryTree& tree, BuildReport& report);
 

@@ -99,12 +99,13 @@ class Emitter {
     return NodeReference(offset) | (node.is_leaf() ? kLeafBit | NodeReference(node.blocks() - 1) : 0u);
   }
 
- private:
-  /// Where a child lies; `next`, where the next one may, goes on behind it. A leaf that is filled has its place.
-  [[nodiscard]] std::size_t place(const WideNode& child, std::size_t& next) const noexcept {
-    if (child.is_leaf() && tree_.in_blocks) return child.first() / form_.width * form_.bytes;
-    return std::exchange(next, next + bytes(child));
+  /// Where a node lies; `next`, where the next one may, goes on behind it. A leaf that is filled has its place.
+  [[nodiscard]] std::size_t place(const WideNode& node, std::size_t& next) const noexcept {
+    if (node.is_leaf() && tree_.in_blocks) return node.first() / form_.width * form_.bytes;
+    return std::exchange(next, next + bytes(node));
   }
+
+ private:
   /// Of a node with all below, or of a leaf.
   [[nodiscard]] std::size_t bytes(const WideNode& node) const noexcept {
     return node.is_leaf() ? round_up<Format>(node.blocks() * form_.bytes) : node.granules() * Format::kGranule;
@@ -153,11 +154,12 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
                              Format::kGranule};
   BinaryTree tree;
   LeafBlocks blocks(form, round_up<Format>(sizeof(typename Format::Node)));
-  const bool in_blocks =
-      form.fill_and_extend && form.bytes % Format::kGranule == 0 && mesh.size() / form.width * form.bytes <= kReach;
+  // Indices are filled without a look at vertices, so nothing is gained, and more held beside their small blocks.
+  const bool may_fill =
+      !form.indices && form.bytes % Format::kGranule == 0 && mesh.size() / form.width * form.bytes <= kReach;
   build_binary_tree(
       mesh, settings, form.width, tree, report,
-      {how.branching, [&](const BinaryTree& t) { return sah_cost(t, how); }, in_blocks ? &blocks : nullptr});
+      {how.branching, [&](const BinaryTree& t) { return sah_cost(t, how); }, may_fill ? &blocks : nullptr});
 
   double start = wall_seconds();
   const WideTree wide = collapse(std::move(tree), how);
@@ -181,12 +183,14 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   }
   arena_ = wide.in_blocks ? blocks.take(node_bytes) : Arena(node_bytes);
   const Emitter<Format> emitter(mesh, form, wide, arena_.data());
-  root_ = emitter.reference(root, root.is_leaf() ? 0 : nodes_begin);
+  std::size_t next = nodes_begin;
+  const std::size_t at = emitter.place(root, next);
+  root_ = emitter.reference(root, at);
   unsigned depth = 0;
   if (is_leaf(root_)) {
-    emitter.leaf(root, 0);
+    emitter.leaf(root, at);
   } else {
-    depth = emitter.subtree(root, nodes_begin);
+    depth = emitter.subtree(root, at);
   }
   stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
   set_scene(mesh, root.box);

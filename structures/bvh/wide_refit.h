@@ -48,15 +48,14 @@ class Refitter {
 
   /// Block by block, since any of a leaf's blocks may have empty lanes.
   Bounds3f leaf(std::byte* at, unsigned blocks) const {
-    Bounds3f box;
+    Box4 box;
     std::vector<std::uint32_t> ids;
     for (unsigned b = 0; b < blocks; ++b, at += form_.bytes) {
       ids.clear();
       form_.append(at, 1, ids);
-      for (const std::uint32_t id : ids) box.extend(mesh_.bounds(id));
-      form_.fill(at, mesh_, ids);
+      form_.fill_and_extend(at, mesh_, ids, box);
     }
-    return box;
+    return {to_vec3f(box.lower), to_vec3f(box.upper)};
   }
 
   const TriangleMesh& mesh_;

@@ -23,9 +23,10 @@ struct GridSingle {
     }
     const grid::Level& outer = grid.levels()[0];
     const GridRay lanes(ray, AnyHit);
-    const float origin = -ray.tnear;
-    float t = AnyHit ? -best.t : ray.tnear, end = AnyHit ? origin : best.t;
-    const auto ends_before = [&](float leave) { return (AnyHit ? origin : best.t) < leave; };
+    // Of the reversed ray where any hit is asked for.
+    const float last_t = -ray.tnear;
+    float t = AnyHit ? -best.t : ray.tnear, end = AnyHit ? last_t : best.t;
+    const auto ends_before = [&](float leave) { return (AnyHit ? last_t : best.t) < leave; };
     GridWalk::clip(outer, lanes, t, end);
     if (!(t <= end)) return false;
     const LeafCode* const codes = grid.codes();

@@ -53,7 +53,7 @@ class KdQueuedWalk {
   ARBORETUM_INLINE Target node(State& s, Target node) const {
     Entry* top = s.top - 1;
     const float begin = top->begin, limit = top->end, end = limit < s.best.t ? limit : s.best.t;
-    const KdSides sides = sides_of(node, place_of(node), s.planes, begin, end);
+    const KdSides sides = sides_of(node, base_, s.planes, begin, end);
     const Entry near{sides.near, begin, sides.near_end}, far{sides.far, sides.far_begin, end};
     *top = AnyHit ? near : far;
     top += AnyHit ? sides.in_near : sides.in_far;
@@ -90,10 +90,7 @@ class KdQueuedWalk {
         max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f),
         leaves_(row, tree.vertices()), stack_entries_(tree.stack_entries() + 2) {}
 
-  /// A node's pair of children, or a leaf's blocks.
-  ARBORETUM_INLINE const std::byte* place_of(Target node) const {
-    return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
-  }
+  ARBORETUM_INLINE const std::byte* place_of(Target node) const { return place_in_kdtree(base_, node); }
 
   const std::byte* base_;
   std::uint64_t root_;

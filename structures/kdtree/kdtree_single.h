@@ -102,17 +102,24 @@ struct KdRay {
   ARBORETUM_INLINE float leaving(float plane, unsigned axis) const { return fused(plane, r[axis], leave[axis]); }
 };
 
+/// A node's pair of children, or a leaf's blocks.
+ARBORETUM_INLINE const std::byte* place_in_kdtree(const std::byte* base, std::uint64_t node) {
+  return base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
+}
+
 /// The two sides of a plane, of a cell that the ray is in within [begin, end]: near within [begin, near_end], far
-/// within [far_begin, end]. (As two entries they would go through memory.)
+/// within [far_begin, end]. (As two entries they would go through memory where one of them is
+/// gone on with.)
 struct KdSides {
   std::uint64_t near, far;
   float near_end, far_begin;
   bool in_near, in_far;  ///< whether the ray meets them
 };
-/// Those of the inner node with the bits `node`, whose children lie at `pair`. Both are loaded while t is computed.
-ARBORETUM_INLINE KdSides sides_of(std::uint64_t node, const std::byte* pair, const KdRay& planes, float begin,
+/// Those of the inner node with the bits `node`. Both children are loaded while t is computed.
+ARBORETUM_INLINE KdSides sides_of(std::uint64_t node, const std::byte* base, const KdRay& planes, float begin,
                                   float end) {
   const unsigned axis = std::uint32_t(node >> 32) & 3u;
+  const std::byte* const pair = place_in_kdtree(base, node);
   const float plane = __builtin_bit_cast(float, std::uint32_t(node));
   const std::uint32_t far_offset = planes.far[axis];
   std::uint64_t near, far;
@@ -138,10 +145,8 @@ ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t n
   typename Counting::Depths depths(depth);
   for (;;) {
     for (;;) {
-      const auto link = std::uint32_t(node >> 32);
-      const unsigned axis = link & 3u;
-      if (axis == 3) break;
-      const KdSides s = sides_of(node, base + std::size_t(link & ~3u) * 4, planes, begin, end);
+      if ((std::uint32_t(node >> 32) & 3u) == 3) break;
+      const KdSides s = sides_of(node, base, planes, begin, end);
       // A plane decides about two cells; a lane each.
       counting.node(2, 2, unsigned(s.in_near) + unsigned(s.in_far));
       counting.at_depth(depths.current(), 2, 2);
@@ -170,7 +175,7 @@ ARBORETUM_INLINE bool search_kdtree(const std::byte* const base, std::uint64_t n
       }
     }
     if (const auto count = std::uint32_t(node); count != 0) {  // an empty cell is no leaf
-      const std::byte* const blocks = base + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
+      const std::byte* const blocks = place_in_kdtree(base, node);
       if constexpr (AnyHit) {
         if (any_hit_in_leaf(leaves, data, form, counting, blocks, count, ray.tnear, ray.tfar)) return true;
       } else {

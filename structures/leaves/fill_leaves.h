@@ -76,7 +76,8 @@ void fill_four(Block& block, int lane, const TriangleMesh& mesh, const TriangleV
   }
 }
 
-/// fill_blocks(), by fours where the block allows it. `see` gets the corners of each triangle.
+/// fill_blocks(), by fours where the block allows it. `see` gets the corners of each triangle; where the block does
+/// not, from a look at them of its own.
 template <class Block, class See>
 void fill_leaf(Block* block, const TriangleMesh& mesh, std::span<const std::uint32_t> ids, const See& see) noexcept {
   const TriangleVertices vertices(mesh);

@@ -28,7 +28,7 @@ class LeafBlocks {
   void fill(std::size_t block, const TriangleMesh& mesh, std::span<const std::uint32_t> ids, Box4& box) noexcept {
     form_.fill_and_extend(bytes_.data() + block * form_.bytes, mesh, ids, box);
   }
-  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_.handed_out(); }
+  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_.counted(); }
   /// The blocks, and behind them so many bytes for all nodes.
   [[nodiscard]] Arena take(std::size_t all_nodes) noexcept {
     bytes_.hand_out(all_nodes);

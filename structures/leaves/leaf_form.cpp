@@ -13,28 +13,22 @@ std::span<const LeafForm> leaf_forms() {
   static const std::vector<LeafForm> forms = [] {
     std::vector<LeafForm> list;
     for_each_type(AllBlocks{}, [&]<class Block>(std::type_identity<Block>) {
-      LeafForm form{
-          Block::kName,
-          unsigned(Block::kWidth),
-          sizeof(Block),
-          [](std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids) noexcept {
-            fill_leaf(reinterpret_cast<Block*>(at), mesh, ids, [](__m128, __m128, __m128) {});
-          },
-          [](const std::byte* at, unsigned blocks, std::vector<std::uint32_t>& out) {
-            append_primitives(reinterpret_cast<const Block*>(at), blocks, out);
-          },
-          [](const std::byte* at) noexcept { return unsigned(triangles_in(*reinterpret_cast<const Block*>(at))); },
-          nullptr};
-      if constexpr (Block::kForm != TriangleForm::indices) {
-        form.fill_and_extend = [](std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids,
-                                  Box4& box) noexcept {
-          Box4 all = box;
-          fill_leaf(reinterpret_cast<Block*>(at), mesh, ids,
-                    [&all](__m128 a, __m128 b, __m128 c) { all.extend(a), all.extend(b), all.extend(c); });
-          box = all;
-        };
-      }
-      list.push_back(form);
+      list.push_back(
+          {Block::kName, unsigned(Block::kWidth), sizeof(Block),
+           [](std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids) noexcept {
+             fill_leaf(reinterpret_cast<Block*>(at), mesh, ids, [](__m128, __m128, __m128) {});
+           },
+           [](const std::byte* at, unsigned blocks, std::vector<std::uint32_t>& out) {
+             append_primitives(reinterpret_cast<const Block*>(at), blocks, out);
+           },
+           [](const std::byte* at) noexcept { return unsigned(triangles_in(*reinterpret_cast<const Block*>(at))); },
+           Block::kForm == TriangleForm::indices,
+           [](std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids, Box4& box) noexcept {
+             Box4 all = box;
+             fill_leaf(reinterpret_cast<Block*>(at), mesh, ids,
+                       [&all](__m128 a, __m128 b, __m128 c) { all.extend(a), all.extend(b), all.extend(c); });
+             box = all;
+           }});
     });
     return list;
   }();

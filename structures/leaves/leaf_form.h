@@ -23,7 +23,8 @@ struct LeafForm {
   void (*append)(const std::byte* at, unsigned blocks, std::vector<std::uint32_t>& out);
   /// How many triangles a block holds.
   unsigned (*triangles)(const std::byte* at) noexcept;
-  /// fill() that extends a box by those triangles as well; none of blocks of indices, which take no vertices.
+  bool indices;  ///< fill() looks at no vertex
+  /// fill() that extends a box by those triangles as well.
   void (*fill_and_extend)(std::byte* at, const TriangleMesh& mesh, std::span<const std::uint32_t> ids,
                           Box4& box) noexcept;
 };

@@ -47,7 +47,7 @@ bool is_searchable(std::string_view below) {
 
 /// Bounds of the box's image, computed in double and rounded outwards.
 Bounds3f image(const AffineMap& map, const Bounds3f& box) {
-  if (box.empty()) return box;
+  if (box.empty() || is_identity(map)) return box;
   Bounds3f result;
   for (int row = 0; row < 3; ++row) {
     double low = map.m[row][3], high = low;
@@ -258,6 +258,8 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
                     std::string(below.builders.front()));
   if (!has(below.leaves, settings.leaf))
     throw UserError(pair + std::string(below.name) + " has no leaf " + settings.leaf);
+  if (const std::string why = below.why_not_built(settings.builder, settings.leaf); !why.empty())
+    throw UserError(pair + why);
 
   mesh_ = &mesh, below_ = settings.parameters.below, leaf_ = settings.leaf;
   prototypes_.clear(), placed_.clear();

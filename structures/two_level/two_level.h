@@ -67,6 +67,10 @@ class TwoLevel final : public Accel {
   [[nodiscard]] const bvh::Bvh4& top() const noexcept { return top_; }
   /// The instances that have triangles; the top's leaves name them.
   [[nodiscard]] const MeteredVector<Placed>& placed() const noexcept { return placed_; }
+  /// The structure below, where the scene has no instances and is that structure; else nullptr.
+  [[nodiscard]] const Accel* only() const noexcept {
+    return mesh_->instancing || placed_.empty() ? nullptr : placed_[0].below;
+  }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
   [[nodiscard]] const std::string& below() const noexcept { return below_; }
   [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }

@@ -90,20 +90,16 @@ struct TwoLevelFunctions {
   template <class Counting, bool Padded>
   struct Rays : SingleRays<TwoLevelKernel<CalledLeaves, Padded, Counting>, Counting> {
     using Base = SingleRays<TwoLevelKernel<CalledLeaves, Padded, Counting>, Counting>;
-    static const Accel* only(const Accel& accel) {
-      const auto& two = static_cast<const two_level::TwoLevel&>(accel);
-      return two.mesh().instancing || two.placed().empty() ? nullptr : two.placed()[0].below;
-    }
     static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits,
                             Counters* counters) {
-      if (const Accel* below = only(accel))
-        return row_below(static_cast<const two_level::TwoLevel&>(accel), row).closest_hit(*below, rays, hits, counters);
+      const auto& two = static_cast<const two_level::TwoLevel&>(accel);
+      if (const Accel* below = two.only()) return row_below(two, row).closest_hit(*below, rays, hits, counters);
       Base::closest_hit(accel, row, rays, hits, counters);
     }
     static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded,
                         Counters* counters) {
-      if (const Accel* below = only(accel))
-        return row_below(static_cast<const two_level::TwoLevel&>(accel), row).any_hit(*below, rays, occluded, counters);
+      const auto& two = static_cast<const two_level::TwoLevel&>(accel);
+      if (const Accel* below = two.only()) return row_below(two, row).any_hit(*below, rays, occluded, counters);
       Base::any_hit(accel, row, rays, occluded, counters);
     }
   };
