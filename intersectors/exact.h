@@ -36,6 +36,9 @@
 // all others: it is taken where the filter stands.
 #pragma once
 
+#include <cstddef>
+#include <cstring>
+
 #include "core/exact/hit_arithmetic.h"
 #include "intersectors/leaf_block.h"
 #include "intersectors/round_later.h"
@@ -71,7 +74,6 @@ struct Exact {
   };
 
   struct PacketData : ShearedPacket {
-    static constexpr int kCost = 2;  ///< intervals are found for all lanes where one may be hit
     template <int W>
     ARBORETUM_INLINE void prepare(const PacketRays& rays, int k) {
       ShearedPacket::prepare<W>(rays, k);
@@ -120,7 +122,7 @@ struct Exact {
   template <int W>
   struct FilteredRays {
     unsigned hit, again;
-    alignas(64) float low[W], high[W];
+    vf<W> low, high;
   };
   /// Lanes are the W rays from k on, of group kz, all against triangle `i` of the block; only those of `in` count.
   template <bool AnyHit, int W, class Block>
@@ -134,19 +136,63 @@ struct Exact {
     const Intervals<W> t(edges, F::load(packet.sz + k));
     const F tnear = F::load(rays.tnear + k);
     const unsigned within = met & possible(t.low, t.high, tnear, tfar);
-    t.low.store(out.low), t.high.store(out.high);
+    out.low = t.low, out.high = t.high;
     out.hit = within & settled<AnyHit>(t.low, t.high, t.certain, tnear, tfar), out.again = within & ~out.hit;
-    if (__builtin_expect(out.again != 0, 0)) narrow_rays<AnyHit>(rays, k, block, i, t.certain.bits(), tnear, tfar, out);
+    if (__builtin_expect(out.again != 0, 0)) {
+      FilteredRays<W> narrowed = out;  // a reference to `out` would keep it in memory
+      narrow_rays<AnyHit>(rays, k, block, i, t.certain.bits(), tnear, tfar, narrowed);
+      out = narrowed;
+    }
   }
-  /// Such a hit becomes a ray's best where it is; false where the filter cannot tell.
+  /// The nearest hits of a packet's rays (traversal/packet_leaves.h): of the interval of each the low end, the high one
+  /// being the packet's t, and its triangle.
   template <class Block>
-  static ARBORETUM_INLINE bool take(RayData& ray, const Block& block, int i, float low, float high, NearestHit& best) {
-    if (low > best.t) return true;
-    if (!(high < ray.best_low && high <= best.t)) return false;
-    ray.has_best = true, ray.best = CornersInFours(block, i), ray.best_low = low;
-    best.t = high, best.primitive = std::int32_t(block.id[i]);
-    return true;
-  }
+  class PacketHits {
+   public:
+    template <int W>
+    ARBORETUM_INLINE void start(int k, vf<W> tfar) {
+      tfar.store(low_ + k);
+    }
+    /// Of the rays that triangle i of a block certainly hits, `found.hit`, those for which it is certainly the nearest
+    /// so far; sets their t.
+    template <int W>
+    ARBORETUM_INLINE unsigned take(int k, const FilteredRays<W>& found, const Block& block, int i, float* t) {
+      using F = vf<W>;
+      const F low = F::load(low_ + k), high = F::load(t + k);
+      const vm<W> nearer = vm<W>::from_bits(found.hit) & (found.high < low) & (found.high <= high);
+      select(nearer, found.low, low).store(low_ + k), select(nearer, found.high, high).store(t + k);
+      const auto address = reinterpret_cast<std::uintptr_t>(&block.v0[0][i]);
+      const auto put = [nearer](std::uint32_t* to, std::uint64_t half) {
+        select(nearer, vi<W>(std::int32_t(half)), vi<W>::load(to)).store(to);
+      };
+      put(first_[0] + k, address), put(first_[1] + k, std::uint64_t(address) >> 32);
+      return nearer.bits();
+    }
+    [[nodiscard]] ARBORETUM_INLINE NearestHit at(int i, float t) const {
+      std::int32_t id;
+      std::memcpy(&id, first(i) + (offsetof(Block, id) - offsetof(Block, v0)) / sizeof(float), sizeof id);
+      return {t, 0.0f, 0.0f, id};
+    }
+    [[nodiscard]] ARBORETUM_INLINE CornersInFours corners(int i) const {
+      return CornersInFours::of_rows([p = first(i)](int row) { return p[row * Block::kWidth]; });
+    }
+    /// What ray i has met so far, for its search to go on alone; and what it has met there, once it is back.
+    ARBORETUM_INLINE void bring(int i, RayData& ray) const {
+      ray.has_best = true, ray.best = corners(i), ray.best_low = low_[i];
+    }
+    ARBORETUM_INLINE void met_alone(int i, const RayData& ray) { low_[i] = ray.best_low; }
+
+   private:
+    static_assert(offsetof(Block, v1) == offsetof(Block, v0) + 3 * sizeof(float[Block::kWidth]) &&
+                  offsetof(Block, v2) == offsetof(Block, v1) + 3 * sizeof(float[Block::kWidth]));
+    /// The first coordinate of ray i's triangle; the others follow, a row of the block apart.
+    [[nodiscard]] ARBORETUM_INLINE const float* first(int i) const {
+      return reinterpret_cast<const float*>(std::uintptr_t(first_[0][i] | std::uint64_t(first_[1][i]) << 32));
+    }
+
+    alignas(64) float low_[PacketRays::kMost];
+    alignas(64) std::uint32_t first_[2][PacketRays::kMost];  ///< the halves of its address
+  };
 
   /// Rounds t, u and v of the nearest hit.
   static ARBORETUM_INLINE void finish(RayData& ray, NearestHit& best) {
@@ -342,9 +388,9 @@ struct Exact {
       };
       return DoubleDistances<D>(of_rays(rays.direction), a - of_rays(rays.origin), e1, e2);
     });
-    F low = F::load(out.low), high = F::load(out.high);
+    F low = out.low, high = out.high;
     t.narrow(low, high);
-    low.store(out.low), high.store(out.high);
+    out.low = low, out.high = high;
     const unsigned within = out.again & possible(low, high, tnear, tfar),
                    hit = within & settled<AnyHit>(low, high, vm<W>::from_bits(certain), tnear, tfar);
     out.hit |= hit, out.again = within & ~hit;

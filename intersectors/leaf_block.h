@@ -17,14 +17,13 @@
 //     block's place, with the same answers; streams, rays of a packet that go one by one;
 //   kDepthBetweenCorners: boxes may be tight along the ray (traversal/box_test.h); streams.
 // For packets, whose rays stand in lanes (traversal/packet_leaves.h):
-//   PacketData: what is kept for a packet: kGroups, rays of one group sharing a form of the test; kCost, what rays in
-//     lanes cost against triangles in lanes; clear(); prepare<W>(PacketRays&, k) of the W rays from k on; group(g): its
-//     rays as bits; alone(ray, i): RayData of ray i;
+//   PacketData: what is kept for a packet: kGroups, rays of one group sharing a form of the test; clear();
+//     prepare<W>(PacketRays&, k) of the W rays from k on; group(g): its rays as bits; alone(ray, i): RayData of ray i;
 //   intersect_rays<W>(PacketRays&, PacketData&, g, k, in, Block&, i, TriangleHits<W>&, again): those of the W rays from
 //     k on that `in` names, a bit each, against triangle i: the ones inside, `again` those that it leaves to
 //     intersect();
-//   FilteredRays<W>, filter_rays<AnyHit, W>(...), take(...): in intersect_rays()'s place where a hit is an interval and
-//     the search has a state (exact.h);
+//   FilteredRays<W>, filter_rays<AnyHit, W>(...), PacketHits<Block>: in intersect_rays()'s place where a hit is an
+//     interval and the search has a state, which rays in lanes keep in lanes (exact.h);
 //   FromOrigin<M>(const Block&, Vec3f origin): a block as seen from a common origin, taken in the block's place by
 //     intersect() and intersect_rays(), with the same answers.
 #pragma once

@@ -95,7 +95,7 @@ struct MollerTrumbore {
 
   /// What a packet keeps beside its rays: nothing.
   struct PacketData {
-    static constexpr int kGroups = 1, kCost = 1;
+    static constexpr int kGroups = 1;
     void clear() {}
     template <int W>
     void prepare(const PacketRays&, int /*k*/) {}

@@ -22,6 +22,13 @@ struct CornersInFours {
     put(1, block.v1[0][i], block.v1[1][i], block.v1[2][i]);
     put(2, block.v2[0][i], block.v2[1][i], block.v2[2][i]);
   }
+  /// row(0) to row(8): x, y and z of the first corner, then of the others.
+  template <class Row>
+  static ARBORETUM_INLINE CornersInFours of_rows(const Row& row) {
+    CornersInFours corners;
+    for (int k = 0; k < 3; ++k) corners.put(k, row(3 * k), row(3 * k + 1), row(3 * k + 2));
+    return corners;
+  }
   explicit CornersInFours(const std::array<Vec3f, 3>& corners) {
     for (int k = 0; k < 3; ++k) put(k, corners[std::size_t(k)].x, corners[std::size_t(k)].y, corners[std::size_t(k)].z);
   }

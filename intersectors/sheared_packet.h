@@ -10,8 +10,6 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Rays of a group have the same axis along which their direction is largest.
 struct ShearedPacket {
   static constexpr int kGroups = 3;
-  /// Of rays in lanes, in triangles in lanes.
-  static constexpr int kCost = 1;
   alignas(64) float sx[PacketRays::kMost], sy[PacketRays::kMost], sz[PacketRays::kMost];
   std::uint64_t of_axis[3];
 

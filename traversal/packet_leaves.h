@@ -62,8 +62,11 @@ class PacketLeaves {
       const int i = __builtin_ctzll(mask);
       auto&& ray = data(i);
       const bool hit = search(i, ray);
-      if (AnyHit && hit) occluded(i);
-      lanes_.t[i] = best_[i].t;
+      if constexpr (AnyHit) {
+        if (hit) occluded(i);
+      } else {
+        met_alone(i);
+      }
     }
   }
 
@@ -71,7 +74,7 @@ class PacketLeaves {
   /// None of the rays has met anything.
   template <class Prepare>
   ARBORETUM_INLINE void load(const Ray* rays, int count, const Prepare& prepare) {
-    rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0}, prepared_ = 0;
+    rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0}, prepared_ = 0, in_lanes_ = 0;
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
     prepare([this](int i) -> const Ray& { return rays_[i]; }, [this](int k) { prepare_lanes(k); });
     for (int i = 0; i < count; ++i) best_[i] = NearestHit{lanes_.t[i]};
@@ -86,14 +89,27 @@ class PacketLeaves {
 
   ARBORETUM_INLINE void prepare_lanes([[maybe_unused]] int k) {
     if constexpr (Leaves::kRaysInLanes) packet_.template prepare<W>(lanes_.rays, k);
+    if constexpr (kHitsInLanes) hits_.template start<W>(k, F::load(lanes_.t + k));
   }
 
   void finish() {
-    if constexpr (!AnyHit) {
-      finish_hits(
-          leaves_, lanes_.valid, [this](int i) -> const Ray& { return rays_[i]; },
-          [this](int i) -> decltype(auto) { return data(i); }, [this](int i) -> NearestHit& { return best_[i]; });
+    if constexpr (AnyHit) return;
+    Mask rays = lanes_.valid;
+    if constexpr (kHitsInLanes) {
+      // Straight from the lanes to where they are finished.
+      static_assert(kFinishesLater<Leaves>);
+      typename UnfinishedOf<Leaves, NearestHit>::Type unfinished;
+      for (Mask rest = in_lanes_; rest; rest &= rest - 1) {
+        const int i = __builtin_ctzll(rest);
+        best_[i] = hits_.at(i, lanes_.t[i]);
+        unfinished.add(rays_[i], hits_.corners(i)), unfinished.settle(best_[i]);
+      }
+      unfinished.finish_all();
+      rays &= ~in_lanes_;
     }
+    finish_hits(
+        leaves_, rays, [this](int i) -> const Ray& { return rays_[i]; },
+        [this](int i) -> decltype(auto) { return data(i); }, [this](int i) -> NearestHit& { return best_[i]; });
   }
 
  protected:
@@ -132,20 +148,41 @@ class PacketLeaves {
   /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever
   /// it is asked for.
   ARBORETUM_INLINE decltype(auto) data(int i) {
+    if constexpr (kHitsInLanes) {
+      if (in_lanes_ >> i & 1u) fetch(i);
+    }
     if constexpr (kMadeWhenNeeded) {
       return packet_.alone(rays_[i], i);
     } else {
-      if constexpr (Leaves::kRaysInLanes) {
-        if ((prepared_ >> i & 1u) == 0) {
-          prepared_ |= Mask{1} << i;
-          new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData))) RayData(packet_.alone(rays_[i], i));
-        }
-      }
-      return (*reinterpret_cast<RayData*>(data_ + std::size_t(i) * sizeof(RayData)));
+      return (prepared_data(i));
     }
   }
+  ARBORETUM_INLINE typename Leaves::RayData& prepared_data(int i) {
+    if constexpr (Leaves::kRaysInLanes) {
+      if ((prepared_ >> i & 1u) == 0) {
+        prepared_ |= Mask{1} << i;
+        new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData))) RayData(packet_.alone(rays_[i], i));
+      }
+    }
+    return *reinterpret_cast<RayData*>(data_ + std::size_t(i) * sizeof(RayData));
+  }
 
-  void occluded(int i) { best_[i].primitive = 0, active_ &= ~(Mask{1} << i); }
+  void occluded(int i) { all_occluded(Mask{1} << i); }
+  ARBORETUM_INLINE void all_occluded(Mask rays) {
+    active_ &= ~rays;
+    for (; rays; rays &= rays - 1) best_[__builtin_ctzll(rays)].primitive = 0;
+  }
+
+  /// Ray i has met something alone, which is in best_[i].
+  ARBORETUM_INLINE void met_alone(int i) {
+    lanes_.t[i] = best_[i].t;
+    if constexpr (kHitsInLanes) hits_.met_alone(i, prepared_data(i));
+  }
+  /// What ray i has met in lanes comes to where it is looked for when the ray is alone.
+  ARBORETUM_INLINE void fetch(int i) {
+    in_lanes_ &= ~(Mask{1} << i);
+    best_[i] = hits_.at(i, lanes_.t[i]), hits_.bring(i, prepared_data(i));
+  }
 
   /// Before leaves are met by rays of `group`: whether their origins are the same, bit for bit.
   void look_for_common_origin([[maybe_unused]] Mask group) {
@@ -195,6 +232,14 @@ class PacketLeaves {
       return false;
     }
   }();
+  /// What rays in lanes meet is kept in lanes.
+  static constexpr bool kHitsInLanes = [] {
+    if constexpr (Leaves::kRaysInLanes && !AnyHit) {
+      return requires { typename Leaves::Intersector::template PacketHits<typename Leaves::Block>; };
+    } else {
+      return false;
+    }
+  }();
   /// From so many rays on the triangles of a leaf are looked at together.
   static constexpr int kWorthLanes = 16;
   /// The intersector has a form of a block for rays of one origin.
@@ -211,7 +256,7 @@ class PacketLeaves {
       if constexpr (AnyHit) {
         occluded(i);
       } else {
-        lanes_.t[i] = best_[i].t;
+        met_alone(i);
       }
     };
     test_leaf<AnyHit>(
@@ -232,8 +277,7 @@ class PacketLeaves {
           for (; rays; rays &= rays - 1) {
             const int i = __builtin_ctzll(rays);
             auto&& ray = data(i);
-            if (closest_hit_block<typename Leaves::Intersector>(ray, seen, rays_[i].tnear, best_[i]))
-              lanes_.t[i] = best_[i].t;
+            if (closest_hit_block<typename Leaves::Intersector>(ray, seen, rays_[i].tnear, best_[i])) met_alone(i);
           }
         });
       }
@@ -247,8 +291,7 @@ class PacketLeaves {
   ARBORETUM_INLINE void test_triangles(const Block& block, unsigned triangles, Mask mask, const OneByOne& each_alone) {
     int chunks = 0;
     for (int c = 0; c < chunks_; ++c) chunks += lanes_of(mask, c) != 0;
-    if (Packet::kCost * __builtin_popcount(triangles) * chunks * W >=
-        __builtin_popcountll(mask) * std::max(W, Block::kWidth))
+    if (__builtin_popcount(triangles) * chunks * W >= __builtin_popcountll(mask) * std::max(W, Block::kWidth))
       return each_alone(mask);
     Mask again = 0;
     for (; triangles; triangles &= triangles - 1) {
@@ -279,7 +322,6 @@ class PacketLeaves {
   /// Lanes `in` of the W rays from k on, with an intersector that decides all but `again` itself.
   template <class Block>
   ARBORETUM_INLINE void intersect(const Block& block, int triangle, int group, int k, unsigned in, Mask& again) {
-    const auto id = std::int32_t(block.id[triangle]);
     TriangleHits<W> hits;
     unsigned redo;
     const unsigned inside = Leaves::Intersector::template intersect_rays<W>(lanes_.rays, packet_, group, k, in, block,
@@ -288,17 +330,16 @@ class PacketLeaves {
     if (inside == 0) return;
     unsigned hit = inside & ((hits.t <= F::load(lanes_.t + k)) & (hits.t >= F::load(lanes_.rays.tnear + k))).bits();
     if (hit == 0) return;
+    if constexpr (AnyHit) return all_occluded(Mask(hit) << k);
+    // One by one: as a rule few rays meet one triangle, and to take hits in lanes costs more than that.
+    const auto id = std::int32_t(block.id[triangle]);
     alignas(64) float t[W], u[W], v[W], denominator[W];
     hits.t.store(t), hits.u_numerator.store(u), hits.v_numerator.store(v), hits.denominator.store(denominator);
     for (; hit; hit &= hit - 1) {
       const int lane = __builtin_ctz(hit), i = k + lane;
-      if constexpr (AnyHit) {
-        occluded(i);
-      } else {
-        NearestHit& best = best_[i];
-        if (t[lane] < best.t || id < best.primitive)
-          best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, lanes_.t[i] = t[lane];
-      }
+      NearestHit& best = best_[i];
+      if (t[lane] < best.t || id < best.primitive)
+        best = {t[lane], u[lane] / denominator[lane], v[lane] / denominator[lane], id}, lanes_.t[i] = t[lane];
     }
   }
 
@@ -308,17 +349,13 @@ class PacketLeaves {
     typename Leaves::Intersector::template FilteredRays<W> rays;
     Leaves::Intersector::template filter_rays<AnyHit, W>(lanes_.rays, packet_, group, k, in, block, triangle,
                                                          F::load(lanes_.t + k), rays);
-    again |= Mask(rays.again) << k;
-    for (unsigned hit = rays.hit; hit; hit &= hit - 1) {
-      const int lane = __builtin_ctz(hit), i = k + lane;
-      if constexpr (AnyHit) {
-        occluded(i);
-      } else if (Leaves::Intersector::take(data(i), block, triangle, rays.low[lane], rays.high[lane], best_[i])) {
-        lanes_.t[i] = best_[i].t;
-      } else {
-        again |= Mask{1} << i;
-      }
+    if constexpr (AnyHit) {
+      all_occluded(Mask(rays.hit) << k);
+    } else if (rays.hit != 0) {
+      const unsigned taken = hits_.template take<W>(k, rays, block, triangle, lanes_.t);
+      in_lanes_ |= Mask(taken) << k, rays.again |= rays.hit & ~taken;
     }
+    again |= Mask(rays.again) << k;
   }
 
  protected:
@@ -333,16 +370,22 @@ class PacketLeaves {
   NearestHit best_[kMost];
 
  private:
-  struct NoPacket {};
+  struct Nothing {};
   template <class L>
   struct PacketOf {
     using type = typename L::Intersector::PacketData;
   };
-  using Packet =
-      typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<NoPacket>>::type;
+  using Packet = typename std::conditional_t<Leaves::kRaysInLanes, PacketOf<Leaves>, std::type_identity<Nothing>>::type;
+  template <class L>
+  struct HitsOf {
+    using type = typename L::Intersector::template PacketHits<typename L::Block>;
+  };
+  using Hits = typename std::conditional_t<kHitsInLanes, HitsOf<Leaves>, std::type_identity<Nothing>>::type;
   alignas(64) std::byte data_[kMadeWhenNeeded ? 1 : kMost * sizeof(RayData)];
   Mask prepared_ = 0;
   Packet packet_;
+  Mask in_lanes_ = 0;  ///< rays whose nearest hit is in hits_, not in best_
+  Hits hits_;
   bool common_origin_ = false;
   int threshold_ = 0;
   std::size_t times_alone_ = 0;
