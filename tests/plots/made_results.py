@@ -5,14 +5,30 @@ import json
 import subprocess
 import sys
 import tempfile
+import unittest
 from pathlib import Path
 
 PLOTS = Path(__file__).resolve().parent.parent.parent / "plots"
 sys.path.insert(0, str(PLOTS))
 
+import style  # noqa: E402
 from figures import ALL  # noqa: E402
+from results import Results  # noqa: E402
 
 AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
+
+
+def results_of(traces, structures=()):
+    """Of cells, not of a folder."""
+    return Results(Path(), {}, list(traces), list(structures), [], "", True, len(traces))
+
+
+class Drawn(unittest.TestCase):
+    def draw(self, module, results):
+        """A module's figure, which is closed when the test is over."""
+        figure = module.draw(results)
+        self.addCleanup(style.plt.close, figure)
+        return figure
 
 
 def trace(structure="bvh8", isa="avx2", intersector="watertight", rate=10e6, repetition=0, **more):

@@ -3,19 +3,17 @@
 import re
 import sys
 import unittest
-from pathlib import Path
 
 sys.dont_write_bytecode = True
 
 from matplotlib.text import Text  # noqa: E402
 
-from made_results import PLOTS  # noqa: E402
+from made_results import PLOTS, Drawn, results_of  # noqa: E402
 
-import style  # noqa: E402
 from figures import ALL, build_phases, bytes_per_triangle, leaf_histograms, squares  # noqa: E402
 from figures.bars import in_order  # noqa: E402
 from figures.rows import groups_of, places_of  # noqa: E402
-from results import Cell, Results  # noqa: E402
+from results import Cell  # noqa: E402
 
 
 def built(structure="bvh8", builder="binned_sah", scene="bunny", **more):
@@ -24,10 +22,6 @@ def built(structure="bvh8", builder="binned_sah", scene="bunny", **more):
            "node_bytes": 300, "leaf_bytes": 600, "other_bytes": 100, "peak_build_bytes": 1500, "depth_histogram": [0, 0, 1, 6], "leaf_histogram": [0, 3, 0, 4],
            "leaf_fill": 0.75, **more}
     return Cell({"scene": scene, "structure": structure, "builder": builder, "threads": "1", "isa": "avx2", "leaf": "triangle8"}, [row])
-
-
-def results_of(cells):
-    return Results(Path(), {}, [], cells, [], "", True, len(cells))
 
 
 def many(scenes=("bunny", "a_scene_with_a_name_that_is_long", "city-300000")):
@@ -45,11 +39,9 @@ def written(axis):
     return [t.get_text() for t in axis.texts]
 
 
-class Rows(unittest.TestCase):
+class Rows(Drawn):
     def draw(self, module, cells):
-        figure = module.draw(results_of(cells))
-        self.addCleanup(style.plt.close, figure)
-        return figure
+        return super().draw(module, results_of([], cells))
 
     def legend(self, figure):
         return [t.get_text() for each in figure.legends for t in each.get_texts()]

@@ -2,16 +2,14 @@
 
 import sys
 import unittest
-from pathlib import Path
 
 sys.dont_write_bytecode = True
 
-import made_results  # noqa: E402, F401: finds plots/
+from made_results import Drawn, results_of  # noqa: E402
 
-import style  # noqa: E402
 from figures import build_vs_trace, memory_vs_time, trade_offs, visits_per_ray  # noqa: E402
 from figures.trade_offs import Point, builder_markers, pareto_front  # noqa: E402
-from results import Cell, Estimate, NoData, Results  # noqa: E402
+from results import Cell, Estimate, NoData  # noqa: E402
 
 
 def exactly(value, spread=0.0):
@@ -33,10 +31,6 @@ def built(cell, milliseconds):
     return Cell({a: cell[a] for a in ("scene", "structure", "builder", "leaf", "isa", "threads")}, [{"build_seconds": 1e-3 * milliseconds}])
 
 
-def results_of(traces, structures=()):
-    return Results(Path(), {}, list(traces), list(structures), [], "", True, len(traces))
-
-
 STRUCTURES = ("bvh4_quantised", "bvh8_quantised", "bvh16", "bih")
 BUILDERS = ("binned_sah", "sweep_sah", "spatial_sah", "morton", "ploc", "embree_low", "embree_medium", "embree_high")
 
@@ -49,12 +43,7 @@ def many(scenes=("bunny", "a_scene_with_a_name_that_is_long"), workloads=("prima
     return results_of([c for c, _ in cells], [built(c, ms) for c, ms in cells])
 
 
-class TradeOffs(unittest.TestCase):
-    def draw(self, module, results):
-        figure = module.draw(results)
-        self.addCleanup(style.plt.close, figure)
-        return figure
-
+class TradeOffs(Drawn):
     def words(self, axis):
         """What stands below a panel: (name, what is said of it), by line."""
         found = [t.get_text() for t in axis.texts]
@@ -154,11 +143,9 @@ class TradeOffs(unittest.TestCase):
                 self.assertLess(figure.get_size_inches()[0], 18)
 
 
-class Visits(unittest.TestCase):
+class Visits(Drawn):
     def draw(self, cells):
-        figure = visits_per_ray.draw(results_of(cells))
-        self.addCleanup(style.plt.close, figure)
-        return figure
+        return super().draw(visits_per_ray, results_of(cells))
 
     def counted(self, nodes=9.5, **axes):
         return traced(**axes, nodes_per_ray=nodes, leaves_per_ray=1.9, boxes_per_ray=37.5, triangles_per_ray=0.0)
