@@ -1,12 +1,15 @@
-// Queued traversal of the wide BVHs: as traversal/queued_rays.h, which says what it is for, with a loop of its own. A
-// reference's own bits tell the kind of a step here, the end of a stack is a reference too, and the stack is cleared of
-// what lies behind a new hit, so that a step has no branch but those of its test.
+// Many rays in flight through a wide BVH of any node format (traversal/queued_rays.h).
+//
+// The steps of bvh_single.h, one at a time: children in the same order, nearest on top of the ray's own stack; for any
+// hit as they stand in the node. A reference's own bits tell the kind of a step, the end of a stack is a reference too,
+// and what starts beyond a new hit leaves the stack when that is found: a step takes the top, compares nothing and has
+// no branch but those of its test.
 #pragma once
 
 #include "simd/lane_order.h"
 #include "traversal/usual_leaves.h"
 #include "structures/bvh/bvh_single.h"
-#include "traversal/queued_functions.h"
+#include "traversal/queued_rays.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -17,14 +20,14 @@ inline constexpr bvh::NodeReference kDone = 16;
 /// The kinds of step, as the reference's own bits tell them: node 0, leaf 1, done 2.
 [[nodiscard]] ARBORETUM_INLINE unsigned kind_of(bvh::NodeReference r) { return r >> 3 & 3u; }
 
-/// The children of `hit` onto the stack, the nearest on top: the order of push_children(). For any hit as they stand in
-/// the node: walk_bvh()'s.
-template <int N, bool AnyHit>
+/// The children of `hit`, whose references lie `Stride` places apart, onto the stack, the nearest on top: the order of
+/// push_children(). For any hit as they stand in the node: walk_bvh()'s.
+template <int Stride, bool AnyHit>
 ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std::uint32_t* key, unsigned hit,
                                       StackEntry*& top) {
   for (StackEntry* const bottom = top; hit; hit &= hit - 1) {
     const int i = __builtin_ctz(hit);
-    const StackEntry e = stack_entry(key[i], child[i]);
+    const StackEntry e = stack_entry(key[i], child[i * Stride]);
     StackEntry* p = top++;
     if constexpr (!AnyHit) {
       for (; p != bottom && p[-1] < e; --p) *p = p[-1];
@@ -32,6 +35,19 @@ ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std
     *p = e;
   }
 }
+
+#if ARBORETUM_TARGET != ARBORETUM_TARGET_SCALAR
+/// W references in a register, or two.
+template <int Stride, int W>
+ARBORETUM_INLINE vi<W> references(const bvh::NodeReference* child) {
+  if constexpr (Stride == 1) {
+    return vi<W>::load(child);
+  } else {
+    static_assert(W == 4);
+    return vi<4>(_mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride])));
+  }
+}
+#endif
 
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
 /// Four entries, the largest first. Positive doubles order as their bits do, and no distance of a float is a double's
@@ -92,35 +108,34 @@ ARBORETUM_INLINE void sort_down(__m128d& a, __m128d& b) {
 }
 #endif
 
-/// The same for all: up to four children, the usual case, without a branch where the registers can do it. Writes up to
-/// four entries whatever their number.
-template <int N, bool AnyHit>
-ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<lanes_for(N)> entry, unsigned hit, StackEntry*& top) {
-  constexpr int W = lanes_for(N);
+/// The same as push_in_scalars(): up to four children, the usual case, without a branch where the registers can do it.
+/// Writes up to four entries whatever their number.
+template <int Stride, bool AnyHit, int W>
+ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<W> entry, unsigned hit, StackEntry*& top) {
   [[maybe_unused]] const unsigned count = unsigned(__builtin_popcount(hit));
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
-  if constexpr (kOrdersLanes<N>) {
-    if (__builtin_expect(count <= 4, 1)) {
-      push_four<AnyHit>(vi<N>::load(child), entry, hit, top);
+  if constexpr (kOrdersLanes<W>) {
+    if (W == 4 || __builtin_expect(count <= 4, 1)) {
+      push_four<AnyHit>(references<Stride, W>(child), entry, hit, top);
       top += count;
       return;
     }
   }
 #elif ARBORETUM_TARGET == ARBORETUM_TARGET_SSE
-  if constexpr (N == 4 || N == 8) {
-    if (__builtin_expect(count <= 4, 1)) {
-      __m128i keys, references;
+  if constexpr (W == 4 || W == 8) {
+    if (W == 4 || __builtin_expect(count <= 4, 1)) {
+      __m128i keys, in_order;
       const __m128i from = _mm_load_si128(reinterpret_cast<const __m128i*>(kCompressBytes.bytes[hit]));
-      const auto* reference = reinterpret_cast<const __m128i*>(child);
-      if constexpr (N == 4) {
-        references = _mm_shuffle_epi8(_mm_loadu_si128(reference), from);
+      const vi<W> all = references<Stride, W>(child);
+      if constexpr (W == 4) {
+        in_order = _mm_shuffle_epi8(all.v, from);
         keys = _mm_shuffle_epi8(_mm_castps_si128(entry.v), from);
       } else {
-        references = compress_bytes(_mm_loadu_si128(reference), _mm_loadu_si128(reference + 1), from);
+        in_order = compress_bytes(all.lo.v, all.hi.v, from);
         keys = compress_bytes(_mm_castps_si128(entry.lo.v), _mm_castps_si128(entry.hi.v), from);
       }
-      __m128d a = _mm_castsi128_pd(_mm_unpacklo_epi32(references, keys)),
-              b = _mm_castsi128_pd(_mm_unpackhi_epi32(references, keys));
+      __m128d a = _mm_castsi128_pd(_mm_unpacklo_epi32(in_order, keys)),
+              b = _mm_castsi128_pd(_mm_unpackhi_epi32(in_order, keys));
       if constexpr (!AnyHit) sort_down(a, b);
       _mm_storeu_pd(reinterpret_cast<double*>(top), a), _mm_storeu_pd(reinterpret_cast<double*>(top + 2), b);
       top += count;
@@ -130,174 +145,127 @@ ARBORETUM_INLINE void push(const bvh::NodeReference* child, vf<lanes_for(N)> ent
 #endif
   alignas(64) std::uint32_t key[W];
   entry.store(key);
-  push_in_scalars<N, AnyHit>(child, key, hit, top);
+  push_in_scalars<Stride, AnyHit>(child, key, hit, top);
 }
 
-template <int N, class Leaves, bool Padded, bool AnyHit>
-class Queued {
+/// `Nodes`: a ray and how it meets nodes, as bvh_single.h says.
+template <class Nodes, class Leaves, bool AnyHit>
+class BvhNodeWalk {
  public:
-  /// `in_flight`: 1 to kMostInFlight.
-  Queued(const Accel& accel, const KernelRow& row, RayBatch rays, unsigned in_flight)
-      : Queued(static_cast<const bvh::BvhBase&>(accel), row, rays, in_flight) {}
-  Queued(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, unsigned in_flight)
-      : in_flight_(in_flight), base_(tree.base()), leaves_(row, tree.vertices()), root_(tree.root()),
-        max_coordinate_(tree.max_coordinate()), rays_(rays),
-        stride_(stride_of<StackEntry>(tree.stack_entries() + kSpareEntries)), stacks_(stride_ * in_flight) {}
+  static constexpr bool kAnyHit = AnyHit;
+  using Target = bvh::NodeReference;
+  using Entry = StackEntry;
+  struct State {
+    Nodes nodes;
+    typename Leaves::RayData data;
+    Entry* top;
+    float tnear;
+    NearestHit best;
+  };
 
-  /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit. Of `counting` the
-  /// queues' lengths alone.
-  template <class Report, class Counting>
-  void run(Report&& report, const Counting& counting) {
-    for (unsigned slot = 0; slot < in_flight_; ++slot) start(slot, report);
-    while (counts_[0] | counts_[1]) {
-      counting.node_queue(counts_[0]);
-      step_nodes();
-      counting.leaf_queue(counts_[1]);
-      step_leaves();
-      const unsigned done = std::exchange(counts_[2], 0u);
-      for (unsigned i = 0; i < done; ++i) {
-        const unsigned slot = queues_[2][i].slot;
-        State& s = state(slot);
-        if constexpr (!AnyHit) leaves_.finish(s.data, s.best);
-        report(s.index, s.best);
-        start(slot, report);
+  BvhNodeWalk(const Accel& accel, const KernelRow& row) : BvhNodeWalk(static_cast<const bvh::BvhBase&>(accel), row) {}
+
+  /// Beside what waits: the end at the bottom, and what push() writes beyond the top.
+  std::size_t stack_entries() const { return stack_entries_ + kSpareEntries; }
+
+  ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
+    stack[0] = kDone;
+    new (state) State{Nodes(ray, max_coordinate_), leaves_.prepare(ray), stack + 1, ray.tnear, NearestHit{ray.tfar}};
+  }
+  ARBORETUM_INLINE Target first(const State&) const { return root_; }
+  static ARBORETUM_INLINE unsigned kind(Target target) { return kind_of(target); }
+
+  ARBORETUM_INLINE void prefetch(Target target) const {
+    prefetch_lines<lines_of(std::max(Nodes::kBytes, Leaves::kBytesAhead))>(base_ + bvh::offset_of(target));
+  }
+
+  ARBORETUM_INLINE Target node(State& s, Target target) const {
+    const std::byte* const node = base_ + bvh::offset_of(target);
+    vf<Nodes::W> entry;
+    const unsigned hit = s.nodes.test(node, entry);
+    push<Nodes::kStride, AnyHit>(Nodes::children(node), entry, hit, s.top);
+    return pop(s);
+  }
+
+  ARBORETUM_INLINE Target leaf(State& s, Target target, Entry* stack) const {
+    const std::byte* const blocks = base_ + bvh::offset_of(target);
+    const unsigned count = bvh::block_count(target);
+    if constexpr (AnyHit) {
+      if (leaves_.any_hit(s.data, blocks, count, s.tnear, s.best.t)) s.best.primitive = 0, s.top = stack + 1;
+    } else if (leaves_.closest_hit(s.data, blocks, count, s.tnear, s.best)) {
+      s.nodes.shorten(s.best.t);
+      Entry* out = stack + 1;
+      for (const Entry* e = out; e != s.top; ++e) {
+        *out = *e;
+        out += __builtin_bit_cast(float, std::uint32_t(*e >> 32)) <= s.best.t;
       }
+      s.top = out;
     }
+    return pop(s);
+  }
+
+  ARBORETUM_INLINE void finish(State& s) const {
+    if constexpr (!AnyHit) leaves_.finish(s.data, s.best);
   }
 
  private:
-  static constexpr int W = lanes_for(N);
-  /// Of a stack: kDone at its bottom, and what push() writes beyond the top.
+  BvhNodeWalk(const bvh::BvhBase& tree, const KernelRow& row)
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()),
+        stack_entries_(tree.stack_entries()) {}
+
   static constexpr std::size_t kSpareEntries = 6;
-  using F = vf<W>;
-  using Box = BoxRay<N, Padded>;
 
-  struct alignas(64) State {
-    Box box;
-    float first;  ///< distance from which boxes count
-    float tnear;
-    StackEntry* top;
-    NearestHit best;
-    std::size_t index;
-    typename Leaves::RayData data;
+  static ARBORETUM_INLINE Target pop(State& s) { return Target(*--s.top); }
 
-    ARBORETUM_INLINE State(const Ray& ray, const Leaves& leaves, float max_coordinate, StackEntry* stack, std::size_t i)
-        : box(ray, max_coordinate), first(first_distance(ray)), tnear(ray.tnear), top(stack), best{ray.tfar}, index(i),
-          data(leaves.prepare(ray)) {}
-  };
-  struct Step {
-    std::uint32_t slot;
-    bvh::NodeReference target;
-  };
-
-  State& state(unsigned slot) { return *reinterpret_cast<State*>(states_ + slot * sizeof(State)); }
-
-  /// The ends of the queues while a loop appends to them: in registers.
-  struct Tails {
-    Queued& q;
-    unsigned node, leaf, done;
-    ARBORETUM_INLINE explicit Tails(Queued& queued)
-        : q(queued), node(queued.counts_[0]), leaf(queued.counts_[1]), done(queued.counts_[2]) {}
-    ARBORETUM_INLINE ~Tails() { q.counts_[0] = node, q.counts_[1] = leaf, q.counts_[2] = done; }
-
-    /// Asks for the lines of the target and puts the step on the queue of its kind.
-    ARBORETUM_INLINE void route(unsigned slot, bvh::NodeReference target) {
-      prefetch_lines<lines_of(std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead))>(q.base_ + bvh::offset_of(target));
-      const Step step{slot, target};
-      const unsigned kind = kind_of(target);
-      q.queues_[0][node] = step, q.queues_[1][leaf] = step, q.queues_[2][done] = step;
-      node += kind == 0, leaf += kind == 1, done += kind == 2;
-    }
-  };
-
-  template <class Report>
-  void start(unsigned slot, Report&& report) {
-    for (; next_ < rays_.size(); ++next_) {
-      const Ray& ray = rays_[next_];
-      if (!is_valid_in_lanes(ray)) {
-        report(next_, NearestHit{ray.tfar});
-        continue;
-      }
-      StackEntry* const stack = stacks_.data() + slot * stride_;
-      stack[0] = kDone;
-      new (&state(slot)) State(ray, leaves_, max_coordinate_, stack + 1, next_++);
-      Tails(*this).route(slot, root_);
-      return;
-    }
-  }
-
-  static ARBORETUM_INLINE bvh::NodeReference pop(State& s) { return bvh::NodeReference(*--s.top); }
-
-  /// Drops what starts beyond the nearest hit, so that pop() need not look.
-  ARBORETUM_INLINE void drop_far(State& s, unsigned slot) {
-    StackEntry* const bottom = stacks_.data() + slot * stride_;
-    StackEntry* out = bottom;
-    for (const StackEntry* e = bottom; e != s.top; ++e) {
-      *out = *e;
-      out += __builtin_bit_cast(float, std::uint32_t(*e >> 32)) <= s.best.t;
-    }
-    s.top = out;
-  }
-
-  void step_nodes() {
-    const unsigned count = std::exchange(counts_[0], 0u);
-    Step steps[kMostInFlight];
-    std::memcpy(steps, queues_[0], count * sizeof(Step));
-    Tails tails(*this);
-    for (unsigned i = 0; i < count; ++i) {
-      State& s = state(steps[i].slot);
-      const std::byte* node = base_ + bvh::offset_of(steps[i].target);
-      F entry;
-      const unsigned hit = BoxLanes<N, Padded>(s.box).test(node, F(s.first), F(s.best.t), entry);
-      push<N, AnyHit>(reinterpret_cast<const bvh::NodeReference*>(node + 6 * N * sizeof(float)), entry, hit, s.top);
-      tails.route(steps[i].slot, pop(s));
-    }
-  }
-
-  void step_leaves() {
-    const unsigned count = std::exchange(counts_[1], 0u);
-    for (unsigned i = 0; i < count; ++i) {
-      const Step step = queues_[1][i];
-      State& s = state(step.slot);
-      const std::byte* const blocks = base_ + bvh::offset_of(step.target);
-      const unsigned blocks_in_leaf = bvh::block_count(step.target);
-      if constexpr (AnyHit) {
-        if (leaves_.any_hit(s.data, blocks, blocks_in_leaf, s.tnear, s.best.t)) {
-          s.best.primitive = 0;
-          s.top = stacks_.data() + step.slot * stride_ + 1;
-        }
-      } else if (leaves_.closest_hit(s.data, blocks, blocks_in_leaf, s.tnear, s.best)) {
-        drop_far(s, step.slot);
-      }
-      // Only nodes and ends come back to this queue's place: the steps before i are spent.
-      pending_[i] = {step.slot, pop(s)};
-    }
-    Tails tails(*this);
-    for (unsigned i = 0; i < count; ++i) tails.route(pending_[i].slot, pending_[i].target);
-  }
-
-  const unsigned in_flight_;
   const std::byte* base_;
-  const Leaves leaves_;
-  const bvh::NodeReference root_;
-  const float max_coordinate_;
-  const RayBatch rays_;
-  std::size_t next_ = 0;
-  const std::size_t stride_;
-  std::vector<StackEntry> stacks_;
-  unsigned counts_[3] = {0, 0, 0};
-  Step queues_[3][kMostInFlight + 1];  ///< one place more: a step is written to the end of all three
-  Step pending_[kMostInFlight];
-  alignas(64) std::byte states_[kMostInFlight * sizeof(State)];
+  bvh::NodeReference root_;
+  float max_coordinate_;
+  Leaves leaves_;
+  std::size_t stack_entries_;
 };
 
-/// As traversal/queued_functions.h takes it.
-template <int N>
-struct BvhQueue {
+/// As traversal/queued_functions.h takes it, for nodes that `Nodes<Padded>` tests.
+template <template <bool> class Nodes>
+struct BvhNodeQueue {
   template <class Leaves, bool Padded, bool AnyHit>
-  using Of = Queued<N, Leaves, Padded, AnyHit>;
+  using Of = QueuedRays<BvhNodeWalk<Nodes<Padded>, Leaves, AnyHit>>;
+};
+
+/// Nodes of bvh::SoaNodes<N>: of a ray its constants alone are kept, from which a step makes their test anew, in
+/// registers.
+template <int N, bool Padded>
+struct SoaNodeConstants {
+  static constexpr int W = lanes_for(N), kStride = 1;
+  static constexpr std::size_t kBytes = sizeof(bvh::Node<N>);
+  BoxRay<N, Padded> box;
+  float first, last;
+
+  ARBORETUM_INLINE SoaNodeConstants(const Ray& ray, float max_coordinate)
+      : box(ray, max_coordinate), first(first_distance(ray)), last(ray.tfar) {}
+  ARBORETUM_INLINE unsigned test(const std::byte* node, vf<W>& entry) const {
+    return BoxLanes<N, Padded>(box).test(node, vf<W>(first), vf<W>(last), entry);
+  }
+  ARBORETUM_INLINE void shorten(float t) { last = t; }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return SoaNodeTest<N, Padded>::children(node);
+  }
+};
+template <int N>
+struct SoaConstants {
+  template <bool Padded>
+  using Nodes = SoaNodeConstants<N, Padded>;
+};
+
+/// Of the wide BVHs.
+template <int N>
+struct BvhQueue : BvhNodeQueue<SoaConstants<N>::template Nodes> {
   using Single = typename BvhSingle<SoaTests<N>::template Nodes>::Functions;
 };
+
+/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register
+/// (docs/performance.md), else alone.
+template <template <class, bool, bool> class Queue, class Single, int N>
+using IncoherentInFlight = std::conditional_t<(kRegisterWidth >= N), QueuedFunctions<Queue, Single, 32, 64>, Single>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -13,7 +13,7 @@
 
 #include "simd/swizzle.h"
 #include "traversal/usual_leaves.h"
-#include "structures/bvh/bvh_node_queued.h"
+#include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
 #include "traversal/auto_rows.h"
