@@ -145,7 +145,7 @@ struct Exact {
     }
   }
   /// The nearest hits of a packet's rays (traversal/packet_leaves.h): of the interval of each the low end, the high one
-  /// being the packet's t, and its triangle.
+  /// being the packet's t, and its triangle, whose block stays where it is.
   template <class Block>
   class PacketHits {
    public:
@@ -153,19 +153,19 @@ struct Exact {
     ARBORETUM_INLINE void start(int k, vf<W> tfar) {
       tfar.store(low_ + k);
     }
-    /// Of the rays that triangle i of a block certainly hits, `found.hit`, those for which it is certainly the nearest
-    /// so far; sets their t.
+    /// Of the rays that triangle i of a block certainly hits no farther than their t, `found.hit`, those for which it
+    /// is certainly the nearest so far; sets their t.
     template <int W>
     ARBORETUM_INLINE unsigned take(int k, const FilteredRays<W>& found, const Block& block, int i, float* t) {
       using F = vf<W>;
-      const F low = F::load(low_ + k), high = F::load(t + k);
-      const vm<W> nearer = vm<W>::from_bits(found.hit) & (found.high < low) & (found.high <= high);
-      select(nearer, found.low, low).store(low_ + k), select(nearer, found.high, high).store(t + k);
+      const F low = F::load(low_ + k);
+      const vm<W> nearer = vm<W>::from_bits(found.hit) & (found.high < low);
+      select(nearer, found.low, low).store(low_ + k), select(nearer, found.high, F::load(t + k)).store(t + k);
       const auto address = reinterpret_cast<std::uintptr_t>(&block.v0[0][i]);
-      const auto put = [nearer](std::uint32_t* to, std::uint64_t half) {
+      const auto put = [nearer](std::uint32_t* to, std::uint32_t half) {
         select(nearer, vi<W>(std::int32_t(half)), vi<W>::load(to)).store(to);
       };
-      put(first_[0] + k, address), put(first_[1] + k, std::uint64_t(address) >> 32);
+      put(first_[0] + k, std::uint32_t(address)), put(first_[1] + k, std::uint32_t(std::uint64_t(address) >> 32));
       return nearer.bits();
     }
     [[nodiscard]] ARBORETUM_INLINE NearestHit at(int i, float t) const {
@@ -180,11 +180,12 @@ struct Exact {
     ARBORETUM_INLINE void bring(int i, RayData& ray) const {
       ray.has_best = true, ray.best = corners(i), ray.best_low = low_[i];
     }
-    ARBORETUM_INLINE void met_alone(int i, const RayData& ray) { low_[i] = ray.best_low; }
+    ARBORETUM_INLINE void take_back(int i, const RayData& ray) { low_[i] = ray.best_low; }
 
    private:
     static_assert(offsetof(Block, v1) == offsetof(Block, v0) + 3 * sizeof(float[Block::kWidth]) &&
-                  offsetof(Block, v2) == offsetof(Block, v1) + 3 * sizeof(float[Block::kWidth]));
+                  offsetof(Block, v2) == offsetof(Block, v1) + 3 * sizeof(float[Block::kWidth]) &&
+                  sizeof Block::id == sizeof(float[Block::kWidth]));
     /// The first coordinate of ray i's triangle; the others follow, a row of the block apart.
     [[nodiscard]] ARBORETUM_INLINE const float* first(int i) const {
       return reinterpret_cast<const float*>(std::uintptr_t(first_[0][i] | std::uint64_t(first_[1][i]) << 32));

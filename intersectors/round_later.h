@@ -88,13 +88,13 @@ class UnroundedHits {
     const D weight_radius = scale * size_d * size_s * max_x86(size_1, size_2) + det_error + D(double_bounds::kRounding);
     const auto weight = [](D w) { return min_x86(max_x86(w, D(0.0)), D(1.0)); };
     float low[kLanes], high[kLanes], u[kLanes], v[kLanes];
-    (t - radius + D(0.0)).store(low), (t + radius).store(high),  // of zeros the one without a sign
-        weight(dot(s, p) * inverse).store(u), weight(dot(d, q) * inverse).store(v);
+    (t - radius).store(low), (t + radius).store(high), weight(dot(s, p) * inverse).store(u),
+        weight(dot(d, q) * inverse).store(v);
     // Comparisons that a NaN makes false.
     const unsigned bounded =
         (det_error < D(double_bounds::kMostOfDivisor)) & (weight_radius < D(double_bounds::kWeight));
     for (int i = 0; i < kLanes; ++i) {
-      RoundedHit hit{low[i], u[i], v[i]};
+      RoundedHit hit{low[i] + 0.0f, u[i], v[i]};  // of zeros the one without a sign
       if (__builtin_expect((bounded >> i & 1u) == 0 || low[i] != high[i], 0)) hit = exactly(i);
       hit_[i]->t = hit.t, hit_[i]->u = hit.u, hit_[i]->v = hit.v;
     }

@@ -57,8 +57,8 @@ std::vector<KernelRow> rows_of_every_mode() {
   return rows;
 }
 
-/// What a kernel must answer: the lowest id of those at the nearest t, and t as a float. u and v are near the oracle's,
-/// within an ulp.
+/// What a kernel must answer: the lowest id of those at the nearest t, and t as a float, of zeros the one without a
+/// sign. u and v are near the oracle's, within an ulp.
 struct Truth {
   std::vector<Hit> hits;
 
@@ -106,8 +106,8 @@ std::string literal(const Hit& hit) {
 
 bool right(const Hit& answer, const Hit& truth) {
   if (answer.primitive != truth.primitive) return false;
-  return !truth.is_hit() ||
-         (answer.t == truth.t && std::abs(answer.u - truth.u) <= 0x1p-23f && std::abs(answer.v - truth.v) <= 0x1p-23f);
+  return !truth.is_hit() || (answer.t == truth.t && !std::signbit(answer.t) &&
+                             std::abs(answer.u - truth.u) <= 0x1p-23f && std::abs(answer.v - truth.v) <= 0x1p-23f);
 }
 
 /// Every row on all rays, closest hit and any hit.
@@ -329,6 +329,26 @@ TEST_CASE("exact kernels of every mode, packets of rays alike whose products ove
     REQUIRE(truth.hits.front().is_hit());
     check(mesh, rays, truth, rows);
   }
+}
+
+TEST_CASE("exact kernels of every mode: a distance below floats is a zero without a sign") {
+  const auto rows = rows_of_every_mode();
+  REQUIRE(rows.size() >= 2 * 10);
+  const auto meets_at_zero = [&](const TriangleMesh& mesh, const Ray& ray) {
+    const std::vector<Ray> rays(64, ray);
+    const Truth truth = Truth::by_rationals(mesh, rays);
+    REQUIRE((truth.hits.front().is_hit() && truth.hits.front().t == 0.0f));
+    check(mesh, rays, truth, rows);
+  };
+  TriangleMesh tiny, plain;
+  add_triangle(tiny, Vec3f{1, -1, 0} * 0x1p-120f, Vec3f{0, 1, -1} * 0x1p-120f, Vec3f{-1, 0, 1} * 0x1p-120f);
+  meets_at_zero(tiny, {{0, 0, 0}, 0.0f, {0.3f, 0.2f, 0.7f}, kInfinity});
+  add_triangle(plain, {-0x1.dcp+0f, -0x1.036p+1f, 0x1.9ap-4f}, {-0x1.9ap+0f, -0x1.1p-6f, -0x1.97cp-1f},
+               {-0x1.e8p-3f, -0x1.44p+0f, 0x1.1bp-1f});
+  meets_at_zero(plain, {{-0x1.e4p-2f, -0x1.1dp+0f, 0x1.694p-2f},
+                        0.0f,
+                        {-0x1.239966p+124f, 0x1.5db0ap+124f, 0x1.bad7dap+124f},
+                        kInfinity});
 }
 
 TEST_CASE("exact kernels of every mode: rays that start next to walls along the axes through the origin, and on them") {

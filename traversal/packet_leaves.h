@@ -1,6 +1,7 @@
 // Up to 64 rays as structures of arrays with what they have met, and how those of a mask meet a leaf: one ray after the
 // other, or, where the intersector can, the leaf's triangles against many rays in lanes, those first left out that no
-// ray of the packet can hit (traversal/packet_interval.h). Each ray gets the bits that it would get alone.
+// ray of the packet can hit (traversal/packet_interval.h). Of the same triangles each ray gets the bits that it would
+// get alone.
 #pragma once
 
 #include "traversal/lane_rays.h"
@@ -65,7 +66,7 @@ class PacketLeaves {
       if constexpr (AnyHit) {
         if (hit) occluded(i);
       } else {
-        met_alone(i);
+        back_from_alone(i);
       }
     }
   }
@@ -145,8 +146,9 @@ class PacketLeaves {
 
   static ARBORETUM_INLINE unsigned lanes_of(Mask mask, int chunk) { return unsigned(mask >> (chunk * W)) & kAll; }
 
-  /// What the intersector keeps for ray i: where rays can stand in lanes it is made of what the packet keeps whenever
-  /// it is asked for.
+  /// What the intersector keeps for ray i, which goes on alone: where rays can stand in lanes it is made of what the
+  /// packet keeps, the first time or whenever it is asked for. best_[i] is right only after it: what the ray has met in
+  /// lanes comes here with it.
   ARBORETUM_INLINE decltype(auto) data(int i) {
     if constexpr (kHitsInLanes) {
       if (in_lanes_ >> i & 1u) fetch(i);
@@ -173,10 +175,10 @@ class PacketLeaves {
     for (; rays; rays &= rays - 1) best_[__builtin_ctzll(rays)].primitive = 0;
   }
 
-  /// Ray i has met something alone, which is in best_[i].
-  ARBORETUM_INLINE void met_alone(int i) {
+  /// What ray i met while it was alone is known in lanes, too.
+  ARBORETUM_INLINE void back_from_alone(int i) {
     lanes_.t[i] = best_[i].t;
-    if constexpr (kHitsInLanes) hits_.met_alone(i, prepared_data(i));
+    if constexpr (kHitsInLanes) hits_.take_back(i, prepared_data(i));
   }
   /// What ray i has met in lanes comes to where it is looked for when the ray is alone.
   ARBORETUM_INLINE void fetch(int i) {
@@ -256,7 +258,7 @@ class PacketLeaves {
       if constexpr (AnyHit) {
         occluded(i);
       } else {
-        met_alone(i);
+        back_from_alone(i);
       }
     };
     test_leaf<AnyHit>(
@@ -277,7 +279,8 @@ class PacketLeaves {
           for (; rays; rays &= rays - 1) {
             const int i = __builtin_ctzll(rays);
             auto&& ray = data(i);
-            if (closest_hit_block<typename Leaves::Intersector>(ray, seen, rays_[i].tnear, best_[i])) met_alone(i);
+            if (closest_hit_block<typename Leaves::Intersector>(ray, seen, rays_[i].tnear, best_[i]))
+              back_from_alone(i);
           }
         });
       }
@@ -384,7 +387,7 @@ class PacketLeaves {
   alignas(64) std::byte data_[kMadeWhenNeeded ? 1 : kMost * sizeof(RayData)];
   Mask prepared_ = 0;
   Packet packet_;
-  Mask in_lanes_ = 0;  ///< rays whose nearest hit is in hits_, not in best_
+  Mask in_lanes_ = 0;  ///< rays whose nearest hit is in hits_, not in best_ (data())
   Hits hits_;
   bool common_origin_ = false;
   int threshold_ = 0;
