@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/whole_file.h"
+
 namespace arboretum {
 
 /// A file of lines that only grows. Each line is handed to the operating system at once, so that a killed
@@ -31,15 +33,9 @@ class AppendFile {
 
 /// Whole lines of a file; a last line without its newline is left out. Empty when there is no such file.
 [[nodiscard]] std::vector<std::string> read_lines(const std::filesystem::path& path);
-/// Writes beside `path` and renames over it, so that a failure leaves the old file; a symbolic link stays and what it
-/// leads to is written. What is there and is no regular file (a device, a FIFO, /dev/stdout, /dev/fd/63) is written to
-/// as it stands. Throws UserError.
-void write_whole(const std::filesystem::path& path, std::string_view text);
 /// Hands what was printed to the operating system. Throws std::system_error where it does not go there: the reader has
 /// left (EPIPE), the disk is full.
 void flush_output();
-/// Throws UserError where write_whole could not write to `path`, as far as can be seen without writing.
-void require_writable(const std::filesystem::path& path);
 /// Creates the folder, if need be, and tries whether files can be made in it. Throws UserError: `what` cannot be,
 /// `mend`.
 void make_output_folder(const std::filesystem::path& folder, std::string_view what = "the output folder",

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 
 #define STB_IMAGE_WRITE_IMPLEMENTATION
@@ -12,6 +11,7 @@
 #include <stb/stb_image_write.h>
 
 #include "core/error.h"
+#include "core/whole_file.h"
 #include "rendering/luminance.h"
 #include "rendering/transfer.h"
 
@@ -32,25 +32,6 @@ std::vector<double> block_luminances(const Picture& picture) {
     }
   }
   return blocks;
-}
-
-/// By opening it, which leaves a file that is there as it is and none that was not.
-void check_writable(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  const bool exists = std::filesystem::exists(status);
-  // Opening a pipe would wait
-  if (exists && !std::filesystem::is_regular_file(status) && !std::filesystem::is_directory(status)) return;
-  if (!std::ofstream(path, std::ios::binary | std::ios::app))
-    throw UserError(path.string() + ": cannot be written; is it a file, and may you write there?");
-  if (!exists) std::filesystem::remove(path, error);
-}
-
-void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(bytes.data(), std::streamsize(bytes.size()));
-  file.close();
-  if (!file) throw UserError(path.string() + ": cannot be written; is there space, and may you write there?");
 }
 
 std::string pfm(const Picture& picture) {
@@ -95,7 +76,7 @@ void write_png(const std::filesystem::path& path, unsigned width, unsigned heigh
   };
   if (stbi_write_png_to_func(append, &bytes, int(width), int(height), 3, rgb.data(), int(width) * 3) == 0)
     throw UserError(path.string() + ": the picture is too large for a PNG");
-  write_bytes(path, bytes);
+  write_whole(path, bytes);
 }
 
 void check_exposure(double stops) {
@@ -109,7 +90,7 @@ void write_picture(const std::filesystem::path& path, const Picture& picture, do
   check_exposure(stops);
   check_picture_path(path);
   if (path.extension() == ".pfm")
-    write_bytes(path, pfm(picture));
+    write_whole(path, pfm(picture));
   else
     write_png(path, picture.width, picture.height, develop(picture, stops));
 }
@@ -120,7 +101,7 @@ void check_picture_path(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.parent_path();
   if (std::error_code error; !folder.empty() && !std::filesystem::is_directory(folder, error))
     throw UserError(folder.string() + ": no such folder; make it first, or write elsewhere with --out");
-  check_writable(path);
+  require_writable(path);
 }
 
 void check_png_size(unsigned width, unsigned height) {

@@ -22,6 +22,7 @@
 
 #include "core/error.h"
 #include "core/instances.h"
+#include "core/whole_file.h"
 #include "structures/archive.h"
 
 namespace arboretum {
@@ -136,8 +137,8 @@ void check_name(const std::filesystem::path& file, Archive& archive, const char*
   }
 }
 
-void write_whole(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings,
-                 const std::filesystem::path& file) {
+void write_archive(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings,
+                   const std::filesystem::path& file) {
   StructureFileHeader header = header_of(mesh);
   header.program = program_digest();
   std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
@@ -226,10 +227,10 @@ std::string structure_file_name(std::string_view name, const TriangleMesh& mesh,
 
 void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings& settings,
                     const std::filesystem::path& file) {
-  const std::filesystem::path unfinished = unfinished_name(file);
+  const std::filesystem::path target = regular_file(file), unfinished = unfinished_name(target);
   try {
-    write_whole(accel, mesh, settings, unfinished);
-    std::filesystem::rename(unfinished, file);
+    write_archive(accel, mesh, settings, unfinished);
+    std::filesystem::rename(unfinished, target);
   } catch (const std::exception& e) {
     std::error_code ignored;
     std::filesystem::remove(unfinished, ignored);

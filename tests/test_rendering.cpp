@@ -1,4 +1,7 @@
 // The parts of rendering: effect sets, random numbers, textures, surfaces and their lobes, lights, pictures in files.
+#include <sys/resource.h>
+
+#include <csignal>
 #include <numbers>
 #include <numeric>
 #include <set>
@@ -356,6 +359,27 @@ TEST_CASE("a material that is not there is an error") {
         std::string::npos);
 }
 
+namespace {
+
+/// As if the disk were full beyond so many bytes a file.
+class LimitedFiles {
+ public:
+  explicit LimitedFiles(rlim_t bytes) : before_(std::signal(SIGXFSZ, SIG_IGN)) {
+    REQUIRE(::getrlimit(RLIMIT_FSIZE, &limit_) == 0);
+    const rlimit less{bytes, limit_.rlim_max};
+    REQUIRE(::setrlimit(RLIMIT_FSIZE, &less) == 0);
+  }
+  ~LimitedFiles() { ::setrlimit(RLIMIT_FSIZE, &limit_), std::signal(SIGXFSZ, before_); }
+  LimitedFiles(const LimitedFiles&) = delete;
+  LimitedFiles& operator=(const LimitedFiles&) = delete;
+
+ private:
+  void (*before_)(int);
+  rlimit limit_{};
+};
+
+}  // namespace
+
 TEST_CASE("pictures: developed by exposure and sRGB, and the same again from their file") {
   const Folder folder;
   Picture picture{
@@ -381,6 +405,21 @@ TEST_CASE("pictures: developed by exposure and sRGB, and the same again from the
   REQUIRE(bytes.size() == header.size() + 72);
   CHECK(bytes.substr(0, header.size()) == header);
   CHECK(std::memcmp(bytes.data() + header.size() + 36, picture.pixels.data(), 36) == 0);  // the first row comes last
+  {
+    // What cannot be written leaves the picture that was there.
+    const auto bytes_of = [](const fs::path& path) {
+      std::ifstream stream(path, std::ios::binary);
+      return std::string{std::istreambuf_iterator<char>(stream), {}};
+    };
+    const std::string before = bytes_of(pfm);
+    std::string refusal;
+    {
+      const LimitedFiles limited(16);
+      refusal = error_of([&] { write_picture(pfm, picture, 5); });
+    }
+    CHECK(refusal.find("cannot be written") != std::string::npos);
+    CHECK(bytes_of(pfm) == before);
+  }
   CHECK(error_of([&] { write_picture(folder.path() / "a.jpg", picture, 0); }).find(".png") != std::string::npos);
   CHECK(error_of([&] { write_picture(folder.path() / "no" / "a.png", picture, 0); }).find("no such folder") !=
         std::string::npos);

@@ -3,6 +3,7 @@
 #include <boost/crc.hpp>
 
 #include <malloc.h>
+#include <sys/stat.h>
 #include <tbb/global_control.h>
 
 #include <atomic>
@@ -292,6 +293,17 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
   SECTION("what cannot be written") {
     CHECK_THROWS_AS(save_structure(*built, mesh, settings, folder / "none/saved"), UserError);
     CHECK_FALSE(fs::exists(folder / "none"));
+    const fs::path pipe = folder / "pipe";
+    REQUIRE(::mkfifo(pipe.c_str(), 0666) == 0);
+    CHECK_THROWS_WITH(save_structure(*built, mesh, settings, pipe), Catch::Contains("is no file"));
+    CHECK(fs::is_fifo(pipe));
+    CHECK_THROWS_AS(save_structure(*built, mesh, settings, folder / "."), UserError);
+  }
+  SECTION("a link stays, and what it leads to is written") {
+    fs::create_symlink("other", folder / "link");
+    save_structure(*built, mesh, settings, folder / "link");
+    CHECK(fs::is_symlink(folder / "link"));
+    CHECK(read(folder / "other") == whole);
   }
   SECTION("saving is over the old file, and leaves nothing beside it") {
     save_structure(*built, mesh, settings, file);
