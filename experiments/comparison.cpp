@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "experiments/axes.h"
+#include "experiments/name_filter.h"
 #include "experiments/ratio_bootstrap.h"
 #include "experiments/results_writer.h"
 
@@ -145,14 +146,7 @@ class Comparer {
 
   /// Divides all ratios by those of the control cells: trace by trace, builds by builds where the control has some.
   void take_relative() {
-    std::regex expression;
-    try {
-      expression.assign(out_.options.control);
-    } catch (const std::regex_error&) {
-      throw UserError(
-          fmt::format("--control '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes",
-                      out_.options.control));
-    }
+    const std::regex expression = name_expression(out_.options.control, "--control");
     bool any = false;
     for (bool trace : {true, false}) {
       const auto is_control = [&](const ComparedCell& c) {

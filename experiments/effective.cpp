@@ -15,7 +15,9 @@ void emit_list(YAML::Emitter& out, const std::vector<std::string>& values) {
   out << YAML::EndSeq;
 }
 
-void emit_scene(YAML::Emitter& out, const SceneChoice& scene) {
+/// `whole`: with where files are, and whether they are there, which changes no number: what they hold has hashes of its
+/// own (plan.json), and a sweep may be measured on several machines.
+void emit_scene(YAML::Emitter& out, const SceneChoice& scene, bool whole) {
   const SceneSpec& spec = scene.spec;
   const Placing& placing = scene.placing;
   if (!spec.catalogue.empty() && placing.label.empty()) {
@@ -24,12 +26,14 @@ void emit_scene(YAML::Emitter& out, const SceneChoice& scene) {
   }
   out << YAML::Flow << YAML::BeginMap;
   if (!spec.catalogue.empty()) out << YAML::Key << "catalogue" << YAML::Value << spec.catalogue;
-  const auto path = [&](const std::filesystem::path& file) {  // one that is missing has no place
-    return scene.missing.empty() ? std::filesystem::absolute(file).lexically_normal().string() : file.string();
+  const auto path = [&](const std::filesystem::path& file) {
+    if (!whole) return scene.family();
+    return scene.missing.empty() ? std::filesystem::absolute(file).lexically_normal().string()
+                                 : file.string();  // one that is missing has no place
   };
   if (!spec.file.empty()) out << YAML::Key << "file" << YAML::Value << path(spec.file);
   if (!spec.scene.empty()) out << YAML::Key << "scene" << YAML::Value << path(spec.scene);
-  if (!scene.missing.empty()) out << YAML::Key << "optional" << YAML::Value << true;
+  if (whole && !scene.missing.empty()) out << YAML::Key << "optional" << YAML::Value << true;
   if (!spec.generator.empty()) {
     out << YAML::Key << "generate" << YAML::Value << spec.generator << YAML::Key << "triangles" << YAML::Value
         << spec.triangles << YAML::Key << "seed" << YAML::Value << spec.seed;
@@ -74,12 +78,12 @@ void emit_rays(YAML::Emitter& out, const RaySettings& rays) {
   out << YAML::EndMap;
 }
 
-/// `whole`: with what changes no measured number: plots, and the folder of saved structures.
+/// `whole`: with what changes no measured number: plots, the folder of saved structures, where scenes are.
 std::string text(const Experiment& e, bool whole) {
   YAML::Emitter out;
   out << YAML::BeginMap << YAML::Key << "experiment" << YAML::Value << e.name;
   out << YAML::Key << "scenes" << YAML::Value << YAML::BeginSeq;
-  for (const SceneChoice& scene : e.scenes) emit_scene(out, scene);
+  for (const SceneChoice& scene : e.scenes) emit_scene(out, scene, whole);
   out << YAML::EndSeq << YAML::Key << "axes" << YAML::Value << YAML::BeginMap;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     out << YAML::Key << std::string(kAxisNames[i]) << YAML::Value;

@@ -5,22 +5,28 @@
 #include "core/error.h"
 
 namespace arboretum {
-namespace {
-
-std::regex compile(const std::string& expression, std::string_view option) {
+std::regex name_expression(const std::string& expression, std::string_view option) {
+  constexpr std::size_t kMostCharacters = 10000;  // compiling recurses
+  if (expression.size() > kMostCharacters)
+    throw UserError(fmt::format("{}: an expression of {} characters is too long; {} are possible", option,
+                                expression.size(), kMostCharacters));
+  auto syntax = std::regex::ECMAScript;
+#ifdef __GLIBCXX__
+  syntax |= std::regex_constants::__polynomial;  // else some take for ever
+#endif
   try {
-    return std::regex(expression);
+    return std::regex(expression, syntax);
   } catch (const std::regex_error&) {
-    throw UserError(fmt::format("{} '{}' is no regular expression (ECMAScript syntax); check brackets and backslashes",
-                                option, expression));
+    throw UserError(
+        fmt::format("{} '{}' is no regular expression (ECMAScript syntax, without references to groups); "
+                    "check brackets and backslashes",
+                    option, expression));
   }
 }
 
-}  // namespace
-
 NameFilter::NameFilter(const std::string& filter, const std::string& skip) {
-  if (!filter.empty()) filter_ = compile(filter, "--filter");
-  if (!skip.empty()) skip_ = compile(skip, "--skip");
+  if (!filter.empty()) filter_ = name_expression(filter, "--filter");
+  if (!skip.empty()) skip_ = name_expression(skip, "--skip");
 }
 
 bool NameFilter::operator()(const std::string& name) const {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <type_traits>
 #include <utility>
 
 #include "structures/parameters_read.h"
@@ -58,13 +60,37 @@ std::string Registry::readers_of(std::string_view parameter) const {
   return words.empty() ? "nothing in this build" : words;
 }
 
+namespace {
+
+/// A function that always answers the same, and looks through all kernels for it: a sweep asks it once a cell, and has
+/// far more cells than different questions.
+template <class Function>
+auto remembered(Function* ask) {
+  using Result = decltype([]<class R, class... Asked>(R (*)(Asked...)) -> R { return R(); }(ask));
+  return [ask, known = std::make_shared<std::map<std::string, Result>>()](const auto&... asked) -> Result {
+    std::string question;
+    const auto add = [&question](const auto& word) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(word)>, Isa>) {
+        question += to_string(word);
+      } else {
+        question.append(word).push_back('\n');
+      }
+    };
+    (add(asked), ...);
+    const auto found = known->find(question);
+    return found != known->end() ? found->second : known->emplace(std::move(question), ask(asked...)).first->second;
+  };
+}
+
+}  // namespace
+
 Registry this_registry() {
   Registry registry;
   registry.structures = all_structures();
   registry.kernels = kernel_table();
   registry.isas.assign(available_isas().begin(), available_isas().end());
-  registry.default_leaf = default_leaf;
-  registry.why_no_kernel = why_no_kernel;
+  registry.default_leaf = remembered(default_leaf);
+  registry.why_no_kernel = remembered(why_no_kernel);
   registry.build = build_structure;
   registry.parameters_read = parameters_read;
   return registry;

@@ -226,6 +226,7 @@ TEST_CASE(
   CHECK(plan.cells.size() == 2);
   CHECK(effective_yaml(read_experiment(file, registry)).find("{file: away/far.obj, optional: true}") !=
         std::string::npos);
+  const std::string without = configuration_hash(read_experiment(file, registry));
   const fs::path scenes = folder.path() / "scenes";
   ::setenv("ARBORETUM_SCENES", scenes.c_str(), 1);
   CHECK(plan_now().skipped.at(0).reason ==
@@ -234,6 +235,8 @@ TEST_CASE(
   folder.write("scenes/away/far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   CHECK(plan_now().skipped.empty());
   CHECK(plan_now().cells.size() == 4);
+  // Where a file is, and whether, is no other sweep: parts of it may be measured on machines that differ in that.
+  CHECK(configuration_hash(read_experiment(file, registry)) == without);
   ::unsetenv("ARBORETUM_SCENES");
 }
 
@@ -459,6 +462,9 @@ TEST_CASE("filters keep and drop by name; a broken expression is named") {
   CHECK(plan.cells.size() == 2);
   CHECK(plan.filtered == 4);
   CHECK(error_of([&] { apply_filter(plan, "(", ""); }).find("no regular expression") != std::string::npos);
+  CHECK(error_of([&] { apply_filter(plan, "(a)\\1", ""); }).find("references to groups") != std::string::npos);
+  CHECK(error_of([&] { apply_filter(plan, std::string(100000, 'a'), ""); }).find("too long") != std::string::npos);
+  apply_filter(plan, "", "(((((.*)*)*)*)*)*~");  // without backtracking: at once
 }
 
 TEST_CASE("the effective configuration can be run again and means the same") {
