@@ -4,6 +4,7 @@
 #include <locale.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <charconv>
 #include <string>
 #include <string_view>
@@ -26,6 +27,15 @@ namespace arboretum {
   static const locale_t kC = newlocale(LC_ALL_MASK, "C", nullptr);
   value = strtof_l(std::string(p, next).c_str(), nullptr, kC);
   return next;
+}
+
+/// The next word of a line, taken off its front; empty at its end or before a comment.
+[[nodiscard]] inline std::string_view next_word(std::string_view& line) {
+  line.remove_prefix(std::min(line.size(), line.find_first_not_of(" \t\r")));
+  if (line.starts_with('#')) line = {};
+  const std::string_view word = line.substr(0, line.find_first_of(" \t\r#"));
+  line.remove_prefix(word.size());
+  return word;
 }
 
 }  // namespace arboretum

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "scenes/file_bytes.h"
 #include "scenes/gltf_check.h"
+#include "scenes/number_text.h"
 
 namespace arboretum {
 namespace {
@@ -130,12 +131,31 @@ void check_glb(std::string_view bytes, const std::string& name) {
   check_gltf(bytes.substr(20, word(12)), name);
 }
 
+/// Assimp reads an STL file of text up to where it is cut off, and says nothing.
+void check_stl(std::string_view bytes, const std::string& path) {
+  constexpr std::size_t kHead = 80 + sizeof(std::uint32_t), kTriangle = 50;
+  std::uint32_t triangles = 0;
+  if (bytes.size() >= kHead) std::memcpy(&triangles, bytes.data() + 80, sizeof triangles);
+  const bool binary = bytes.size() >= kHead && bytes.size() == kHead + kTriangle * std::size_t(triangles);
+  constexpr std::string_view kBlank = " \t\r\n";
+  const std::string_view text = without_mark(bytes);
+  const std::size_t first = text.find_first_not_of(kBlank), last = text.find_last_not_of(kBlank);
+  if (binary || first == std::string_view::npos || !text.substr(first).starts_with("solid")) return;
+  std::string_view last_line = text.substr(0, last + 1);
+  last_line.remove_prefix(last_line.rfind('\n') + 1);
+  if (next_word(last_line) != "endsolid")
+    throw UserError(path + ": broken or truncated: its last line does not begin with 'endsolid'");
+}
+
 }  // namespace
 
 void check_before_assimp(const std::filesystem::path& path, std::string_view extension) {
-  if (extension != ".off" && extension != ".gltf" && extension != ".glb" && extension != ".vrm") return;
+  if (extension != ".off" && extension != ".stl" && extension != ".gltf" && extension != ".glb" && extension != ".vrm")
+    return;
   const FileBytes bytes(path);
-  if (extension == ".off") {
+  if (extension == ".stl") {
+    check_stl(bytes.text(), path.string());
+  } else if (extension == ".off") {
     const std::string name = path.string();
     OffCheck(bytes.text(), name).run();
   } else if (extension != ".gltf") {  // a VRM is a GLB

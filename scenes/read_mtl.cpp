@@ -1,12 +1,15 @@
 // MTL through tinyobjloader.
+#include <fmt/format.h>
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <sstream>
 
 #include "core/error.h"
 #include "scenes/file_bytes.h"
+#include "scenes/number_text.h"
 #include "scenes/readers.h"
 
 namespace arboretum {
@@ -14,10 +17,59 @@ namespace {
 
 Vec3f color(const tinyobj::real_t (&c)[3]) { return {float(c[0]), float(c[1]), float(c[2])}; }
 
+/// What stands behind a keyword: so many numbers within [least, most].
+struct Numbers {
+  std::string_view keyword;
+  int count;
+  float least = 0.0f, most = std::numeric_limits<float>::max();
+};
+constexpr Numbers kNumbers[] = {{"Ka", 3},           {"Kd", 3},       {"Ks", 3},      {"Ke", 3},      {"Tf", 3},
+                                {"Kt", 3},           {"Ns", 1},       {"Ni", 1},      {"d", 1, 0, 1}, {"Tr", 1, 0, 1},
+                                {"illum", 1, 0, 10}, {"Pr", 1, 0, 1}, {"Pm", 1, 0, 1}};
+
+/// tinyobjloader takes what is no number, and numbers that are missing, for 0. Throws UserError.
+void check_line(std::string_view line, const std::string& where) {
+  const std::string_view keyword = next_word(line);
+  if (keyword.starts_with("map_") && next_word(line).empty())
+    throw UserError(fmt::format("{}: {} names no file", where, keyword));
+  const auto* known = std::ranges::find(kNumbers, keyword, &Numbers::keyword);
+  if (known == std::end(kNumbers)) return;
+  std::string_view rest = line;
+  if (keyword != "d" || next_word(rest) != "-halo") rest = line;
+  for (int i = 0; i < known->count; ++i) {
+    const std::string_view word = next_word(rest);
+    float value;
+    const char* const end = parse_float(word.data(), word.data() + word.size(), value);
+    const bool is_number =
+        !word.empty() && end == word.data() + word.size() && (keyword != "illum" || value == float(int(value)));
+    if (!is_number) {
+      throw UserError(word.empty() ? fmt::format("{}: {} needs {}", where, keyword,
+                                                 known->count == 3 ? "three numbers" : "a number")
+                                   : fmt::format("{}: {}: '{}' is no {}", where, keyword, one_line(word),
+                                                 keyword == "illum" ? "whole number" : "number"));
+    }
+    if (!(value >= known->least && value <= known->most)) {
+      throw UserError(fmt::format("{}: {} is {}, not {}", where, keyword, word,
+                                  known->most < std::numeric_limits<float>::max()
+                                      ? fmt::format("within {} to {}", known->least, known->most)
+                                      : "a finite number from 0 on"));
+    }
+  }
+}
+
+void check_lines(std::string_view text, const std::filesystem::path& path) {
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    check_line(text.substr(0, end), fmt::format("{}:{}", path.string(), number));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+}
+
 }  // namespace
 
 std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<std::string>& warnings) {
   const FileBytes bytes(path);
+  check_lines(without_mark(bytes.text()), path);
   std::istringstream stream{std::string(without_mark(bytes.text()))};
   std::map<std::string, int> ids;
   std::vector<tinyobj::material_t> read;
@@ -41,10 +93,6 @@ std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<st
     // tinyobjloader cannot tell an absent Tf from one of zeros; the format's default is a filter that lets
     // all through.
     if (material.transmission == Vec3f{0, 0, 0}) material.transmission = {1, 1, 1};
-    for (Vec3f* c : {&material.diffuse, &material.specular, &material.emission, &material.transmission}) {
-      if (!is_finite(*c))
-        throw UserError(path.string() + ": material '" + m.name + "' has a colour that is no finite number");
-    }
     if (!m.diffuse_texname.empty()) material.diffuse_map = beside(path, m.diffuse_texname).string();
     if (!m.alpha_texname.empty()) material.opacity_map = beside(path, m.alpha_texname).string();
     materials.push_back(std::move(material));

@@ -70,15 +70,6 @@ struct ObjCorner {
   std::int64_t vertex = 0, texture = 0;
 };
 
-/// The next word of a line, taken off its front; empty at its end or before a comment.
-std::string_view next_word(std::string_view& line) {
-  line.remove_prefix(std::min(line.size(), line.find_first_not_of(" \t\r")));
-  if (line.starts_with('#')) line = {};
-  const std::string_view word = line.substr(0, line.find_first_of(" \t\r#"));
-  line.remove_prefix(word.size());
-  return word;
-}
-
 struct ObjReader {
   const std::filesystem::path& path;
   MappedBuffer buffer;

@@ -146,6 +146,38 @@ TEST_CASE("OBJ: polygons, negative indices, materials, line ends, exact decimals
   CHECK_THAT(scene.report.warnings[0], Catch::Contains("a.obj:12: no material 'missing'"));
 }
 
+TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
+  const Folder folder;
+  const fs::path model = folder.write("a.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+  const auto refusal = [&](const std::string& line) {
+    folder.write("m.mtl", "newmtl m\n" + line + "\n");
+    return error_of([&] { (void)load_file(model); });
+  };
+  const std::pair<const char*, const char*> wrong[] = {
+      {"Ns abc", "m.mtl:2: Ns: 'abc' is no number"},
+      {"Kd a b c", "m.mtl:2: Kd: 'a' is no number"},
+      {"Kd 0.5", "m.mtl:2: Kd needs three numbers"},
+      {"Ke -1 0 0", "m.mtl:2: Ke is -1, not a finite number from 0 on"},
+      {"Ks 1 1 nan", "m.mtl:2: Ks is nan, not a finite number"},
+      {"Ke 1e39 0 0", "m.mtl:2: Ke is 1e39, not a finite number"},
+      {"Tf", "m.mtl:2: Tf needs three numbers"},
+      {"Ni -1", "m.mtl:2: Ni is -1"},
+      {"d 7", "m.mtl:2: d is 7, not within 0 to 1"},
+      {"illum x", "m.mtl:2: illum: 'x' is no whole number"},
+      {"illum 1.5", "m.mtl:2: illum: '1.5' is no whole number"},
+      {"illum 99", "m.mtl:2: illum is 99, not within 0 to 10"},
+      {"  map_Kd", "m.mtl:2: map_Kd names no file"},
+  };
+  for (const auto& [line, says] : wrong) {
+    INFO(line);
+    CHECK_THAT(refusal(line), Catch::Contains(says));
+  }
+  for (const char* line : {"", "Kd 2 +1 .5  # bright", "d -halo 0.5", "Ns 1e3", "a_word_of_others abc", "# Ns abc"}) {
+    INFO(line);
+    CHECK(refusal(line) == "");
+  }
+}
+
 TEST_CASE("OBJ and MTL: a byte-order mark costs no line") {
   const Folder folder;
   const std::string mark = "\xef\xbb\xbf";
@@ -339,6 +371,7 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
        "2\n",
        "vertex 1 of 3: '0x' is not a number"},
       {"cut.stl", stl_binary().substr(0, 200), "broken or truncated"},
+      {"cut_text.stl", stl_ascii().substr(0, stl_ascii().rfind("facet normal")), "broken or truncated"},
       {"decimal.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1.7 2 3\n", "decimal.obj:4: '1.7' is no corner of a face"},
       {"early.obj", "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",
        "early.obj:1: face index 1 is out of range: no vertex precedes it"},
