@@ -66,7 +66,7 @@ namespace {
 /// far more cells than different questions.
 template <class Function>
 auto remembered(Function* ask) {
-  using Result = decltype([]<class R, class... Asked>(R (*)(Asked...)) -> R { return R(); }(ask));
+  using Result = typename decltype(std::function(ask))::result_type;
   return [ask, known = std::make_shared<std::map<std::string, Result>>()](const auto&... asked) -> Result {
     std::string question;
     const auto add = [&question](const auto& word) {
