@@ -3,7 +3,7 @@
 
 The report holds at least the figures that the configuration names: where --only leaves out one of them, it stays as it is.
 
-Exit status: 0 done, 2 the folder cannot be read or a figure is unknown.
+Exit status: 0 done, 1 a figure could not be drawn (the others and the report are), 2 the folder cannot be read or a figure is unknown.
 """
 
 import argparse
@@ -63,20 +63,31 @@ def main():
     import report
     import style
     from results import NoData, ResultError, load
+    from warned import told_in_a_line
 
     try:
         results = load(arguments.results)
         drawn, default = [], configured(figures.ALL, results.context.get("plots"))
         names = chosen(arguments.only, figures.ALL, default)
         named = not arguments.only and isinstance(results.context.get("plots"), list)
+        failed = []
         for name in names:
             module = importlib.import_module(f"figures.{name}")
             try:
-                style.save(module.draw(results), results.folder, name)
+                with told_in_a_line(name):
+                    style.save(module.draw(results), results.folder, name)
+            except OSError:  # the disk's, not the figure's: the next one could not be written either
+                raise
             except NoData as reason:
                 # `run` hides what is written here to stdout; that a figure which somebody named is not there must be seen.
                 print(f"{name}: left out, {reason}", file=sys.stderr if named and getattr(module, "ONLY_WHEN_NAMED", False) else sys.stdout)
                 drawn.append((name, module, str(reason)))
+                continue
+            except Exception as error:  # noqa: BLE001  of a figure: it takes no other with it
+                why = " ".join(f"{type(error).__name__}: {error}".split())
+                style.discard(results.folder, name)
+                drawn.append((name, module, f"an error of the figure's own, {why}"))
+                failed.append(f"{name}: {why}")
                 continue
             print(f"{results.folder / name}.png .svg")
             drawn.append((name, module, None))
@@ -84,6 +95,9 @@ def main():
             print(report.write(results, drawn))
         elif not arguments.no_report:
             print("report.html: left as it is; it is written with all figures, without --only")
+        for line in failed:
+            print(f"error: could not be drawn: {line}", file=sys.stderr)
+        sys.exit(1 if failed else 0)
     except ResultError as error:
         fail(str(error))
     except OSError as error:

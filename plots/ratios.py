@@ -90,13 +90,14 @@ def main():
         fail(f"usage: {sys.argv[0]} COMPARISON.json OUT.png")
     need_matplotlib()
     import style
+    from warned import told_in_a_line
 
     source, target = Path(sys.argv[1]), Path(sys.argv[2])
     try:
         comparison = json.loads(source.read_text(encoding="utf-8"))
-        figure = draw(comparison)
         metadata = {"Date": None, "Creator": None} if target.suffix == ".svg" else {"Software": None} if target.suffix == ".png" else None
-        figure.savefig(target, dpi=style.DPI, bbox_inches="tight", metadata=metadata)
+        with told_in_a_line(target.name):
+            draw(comparison).savefig(target, dpi=style.DPI, bbox_inches="tight", metadata=metadata)
     except OSError as error:
         fail(f"{error.filename or target}: {error.strerror}; the figure could not be written")
     except (KeyError, ValueError) as error:

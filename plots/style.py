@@ -7,6 +7,7 @@ hatched, so that it stays apart in print too.
 import math
 
 import matplotlib
+from matplotlib import font_manager
 
 matplotlib.use("Agg")
 
@@ -26,13 +27,26 @@ SPARE_COLOURS = ("#77AADD", "#BBCC33", "#EE3377", "#99DDFF", "#663333", "#009988
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 DPI = 160
 
+# Of fonts that have what DejaVu Sans lacks (Chinese, Japanese, Korean; then the rest of Unicode), those that are installed are asked for such characters.
+FALLBACK_FONTS = ("Noto Sans CJK JP", "Noto Sans CJK SC", "Noto Sans JP", "Noto Sans SC", "Source Han Sans", "IPAexGothic", "IPAGothic", "TakaoGothic", "VL Gothic", "WenQuanYi Zen Hei",
+                  "WenQuanYi Micro Hei", "Droid Sans Fallback", "Baekmuk Gulim", "NanumGothic", "Hiragino Sans", "Yu Gothic", "Noto Sans", "FreeSans", "Symbola", "Unifont")
+
+
+def font_families(installed):
+    """DejaVu Sans, then those of FALLBACK_FONTS that are among the names `installed`."""
+    return ["DejaVu Sans", *(name for name in FALLBACK_FONTS if name in installed)]
+
+
 plt.rcParams.update({
+    "font.family": font_families({font.name for font in font_manager.fontManager.ttflist}),
     "figure.facecolor": "white", "savefig.facecolor": "white", "axes.facecolor": "white",
     "font.size": 10, "axes.titlesize": 10.5, "axes.labelsize": 10, "xtick.labelsize": 9.5, "ytick.labelsize": 9.5,
     "legend.fontsize": 9, "legend.frameon": False, "axes.spines.top": False, "axes.spines.right": False,
     "axes.grid": True, "grid.color": "#DDDDDD", "grid.linewidth": 0.7, "axes.axisbelow": True,
     "svg.hashsalt": "arboretum", "hatch.linewidth": 0.6, "errorbar.capsize": 2.0,
 })
+if "text.parse_math" in plt.rcParams:  # from matplotlib 3.6 on: names of scenes and files are text, a pair of $ in them too
+    plt.rcParams["text.parse_math"] = False
 
 
 class Palette:
@@ -104,12 +118,15 @@ def log_axis(axis, which, values):
     ticks.set_minor_locator(NullLocator())
 
 
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def plain(value):
     """0, 0.01, 1, 1000, 10⁵, 2·10⁵: as a person writes a power of ten or a multiple of one."""
     if value == 0 or 1e-3 < value < 1e4:
         return f"{value:g}"
     digit, power = f"{value:.0e}".split("e")
-    return f"$10^{{{int(power)}}}$" if digit == "1" else f"${digit}\\cdot10^{{{int(power)}}}$"
+    return ("" if digit == "1" else f"{digit}·") + "10" + str(int(power)).translate(SUPERSCRIPTS)
 
 
 def hatch(structure):
@@ -237,3 +254,10 @@ def save(figure, folder, name):
     figure.savefig(folder / f"{name}.png", dpi=DPI, bbox_inches="tight", metadata={"Software": None})
     figure.savefig(folder / f"{name}.svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
     plt.close(figure)
+
+
+def discard(folder, name):
+    """Closes what is open and removes name.png and name.svg: what is left of a figure that could not be drawn."""
+    plt.close("all")
+    for kind in ("png", "svg"):
+        (folder / f"{name}.{kind}").unlink(missing_ok=True)

@@ -8,10 +8,9 @@ from textwrap import fill
 
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter
 
 from results import AXES, STRUCTURE_AXES, NoData, ordered
-from style import WRONG, colour, hatch, is_wrong, legends_right, panels, short
+from style import WRONG, colour, hatch, is_wrong, legends_right, log_axis, panels, short
 from tables import STRUCTURE_COLUMNS
 
 TITLE = "Beside published figures"
@@ -185,9 +184,9 @@ def draw_panel(axis, series, rows, most):
         axis.axhline(1.0, color="#222222", linewidth=0.8)
     axis.set_xlim(-0.6, max(len(rows), 0.6 * most) - 0.4)
     if far:
-        axis.set_yscale("log")
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-    axis.set_ylim(0.4 * low if far else 0, (1.3 if far else 1.08) * top)
+        log_axis(axis, "y", [0.5 * low, 1.08 * top])
+    else:
+        axis.set_ylim(0, 1.08 * top)
     axis.grid(axis="x", visible=False)
 
 

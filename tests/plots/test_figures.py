@@ -13,6 +13,7 @@ from made_results import HARD, PLOTS, PUBLISHED, SEEN, Folder, build, everything
 import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
+import warned  # noqa: E402
 from figures import ALL, leaks_vs_distance, published_ratios, rays_per_second  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
 from figures.leak_lines import slots, wider, without  # noqa: E402
@@ -96,7 +97,7 @@ class Hard(unittest.TestCase):
         log_with_zero(axis, "y", [0, 1.9e5, 2.3e5])  # within a decade: ticks between the powers of ten
         self.assertEqual(list(axis.get_yticks()), [0, 1e5, 2e5, 5e5])
         plt.close(figure)
-        self.assertEqual([plain(v) for v in (0, 0.01, 1, 1000, 1e5, 2e5)], ["0", "0.01", "1", "1000", "$10^{5}$", r"$2\cdot10^{5}$"])
+        self.assertEqual([plain(v) for v in (0, 0.01, 1, 1000, 1e5, 2e5, 1e-12)], ["0", "0.01", "1", "1000", "10⁵", "2·10⁵", "10⁻¹²"])
 
 
 class Drawing(unittest.TestCase):
@@ -161,6 +162,8 @@ class Drawing(unittest.TestCase):
             "leaks nowhere": [other("camera_edges", "ball", cracks=0, leak_points=[])],
             "one way": [other("diffuse", self_intersection="none", self_hits_per_million=1.0)],
             "strange names": [trace("$x_1$ <&>"), build("$x_1$ <&>"), trace("bvh8", intersector="$")],
+            "dollars that are no formula": [row | {"scene": "odd/cost_$5_and_$6.ply", "name": row["name"].replace("bunny", "$5_and_$6")} for row in
+                                            (trace(rate=9e6), trace("bvh4"), build("bvh8", "ploc_$5_and_$6"), build("bvh4"))],
         }
         for case, rows in cases.items():
             with self.subTest(case):
@@ -178,6 +181,33 @@ class Drawing(unittest.TestCase):
         few = Folder(rows[1:], {"plots": ["lane_utilization"]})
         self.assertEqual(few.plot("--no-report").stderr, "")
         self.assertTrue((few.path / "lane_utilization.png").is_file())
+
+    def test_a_figure_that_fails_takes_no_other_with_it(self):
+        rows = whole() + [other("camera_edges", "ball", cracks=1, leak_points=[[3.5]])]  # a point of one coordinate
+        folder = Folder(rows, {"plots": ["sah_cost", "leak_picture", "build_time"]}, files=SEEN)
+        (folder.path / "leak_picture.png").write_bytes(b"of an earlier run")
+        done = folder.plot()
+        self.assertEqual((done.returncode, done.stderr), (1, "error: could not be drawn: leak_picture: IndexError: list index out of range\n"))
+        self.assertEqual(sorted(p.stem for p in folder.path.glob("*.png")), ["build_time", "sah_cost"])
+        page = (folder.path / "report.html").read_text()
+        self.assertIn("Not drawn: an error of the figure&#x27;s own, IndexError: list index out of range.", page)
+        self.assertEqual(page.count("<img"), 2)
+
+    def test_characters_without_a_glyph_are_told_in_one_line(self):
+        done = Folder([row | {"scene": "日本語"} for row in (trace("bvh8"), trace("bvh4"))]).plot("--no-report")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn(done.stderr, ("", "warning: no font here has 日本語, which figures show as boxes; fonts-noto-cjk has Chinese, Japanese and Korean\n"))
+
+    def test_fonts_that_are_installed_are_asked_for_what_the_first_lacks(self):
+        self.assertEqual(style.font_families({"IPAGothic", "Noto Sans CJK JP", "cmr10"}), ["DejaVu Sans", "Noto Sans CJK JP", "IPAGothic"])
+        self.assertEqual(style.font_families(set()), ["DejaVu Sans"])
+        self.assertEqual(style.plt.rcParams["font.family"][0], "DejaVu Sans")
+
+    def test_warnings_are_lines_that_are_said_once(self):
+        messages = ["Glyph 26085 (\\N{CJK UNIFIED IDEOGRAPH-65E5}) missing from current font."] * 2 + ["two\nlines"] * 2
+        told = warned.lines_of("a", messages)
+        self.assertEqual([line.split(",")[0] for line in told], ["warning: no font here has 日", "warning: a: two lines"])
+        self.assertEqual(warned.lines_of("b", messages), [])
 
     def test_the_report_shows_what_auto_chose_and_what_rays_share(self):
         shared = {"packet_share": 0.0, "stream_share": 0.75, "queued_share": 0.0, "single_share": 0.25, "rays_per_node_visit": 5.625,
