@@ -90,14 +90,15 @@ def log_with_zero(axis, which, values):
     ticks = axis.yaxis if which == "y" else axis.xaxis
     if largest <= 0:
         set_limits(-0.1, 1.0)
-        ticks.set_major_locator(FixedLocator([0]))
+        ticks.set_major_locator(FixedLocator([0, 1]))
         return
     low = 10.0 ** math.floor(math.log10(smallest))
     (axis.set_yscale if which == "y" else axis.set_xscale)("symlog", linthresh=low, linscale=0.6)
     set_limits(-0.25 * low, 2.5 * largest)
     first, last = round(math.log10(low)), math.floor(math.log10(2.5 * largest))
     step = max(1, -(-(last - first + 1) // 6))
-    digits = (1, 2, 5) if last - first < 2 else (1,)  # powers of ten alone would leave few values a tick near them
+    # Powers of ten alone would leave few values a tick near them; beside each other labels take more room than one above the other.
+    digits = (1, 2, 5) if last - first < (2 if which == "y" else 1) else (1,)
     ticks.set_major_locator(FixedLocator([0] + [d * 10.0**k for k in range(first, last + 1, step) for d in digits if d * 10.0**k <= 2.5 * largest]))
     ticks.set_minor_locator(NullLocator())
     ticks.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
@@ -217,20 +218,23 @@ def panel_title(scene, workload, width):
     return f"{scene},\n" + (workload if len(workload) <= most else workload.replace(":", ":\n", 1))
 
 
-def panel_grid(scenes, workloads, width, height, most_columns):
-    """A panel for each scene and workload, titled; a scene begins a row. Gives the figure and {(scene, workload): axis}."""
-    columns = min(len(workloads), most_columns)
-    rows_each = -(-len(workloads) // columns)
-    figure, axes = panels(len(scenes) * rows_each, columns, width, height)
+def panel_grid(shown, places, width, height, most_columns):
+    """A panel for each (scene, place) of `shown`, titled; `places`, {place: words of the title}, gives their order. A scene begins a row, or stands beside the one
+    before where all panels of both fit. Gives the figure and {(scene, place): axis}."""
+    shown = dict.fromkeys(shown)  # in order, each once
+    own = {scene: [place for place in places if (scene, place) in shown] for scene in dict.fromkeys(scene for scene, _ in shown)}
+    most = max(map(len, own.values()))
+    columns = min(most, most_columns)
+    lines = [(scene, line[i:i + columns]) for scene, line in own.items() for i in range(0, len(line), columns)]
+    beside = min(most_columns // columns, len(lines)) if most == columns else 1
+    figure, axes = panels(-(-len(lines) // beside), beside * columns, width, height)
     found = {}
-    for first, scene in enumerate(scenes):
-        for place in range(rows_each * columns):
-            axis = axes[first * rows_each + place // columns][place % columns]
-            if place >= len(workloads):
-                axis.set_visible(False)
-                continue
-            found[scene, workloads[place]] = axis
-            axis.set_title(panel_title(scene, workloads[place], width))
+    for i, (scene, line) in enumerate(lines):
+        for k, place in enumerate(line):
+            axis = found[scene, place] = axes[i // beside][i % beside * columns + k]
+            axis.set_title(panel_title(scene, places[place], width))
+    for axis in set(axes.flat) - set(found.values()):
+        axis.set_visible(False)
     return figure, found
 
 

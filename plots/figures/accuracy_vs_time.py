@@ -1,16 +1,16 @@
-"""What accuracy costs in time, the Pareto front drawn. Accuracy is that of hard rays where the run has them: a row of panels for wrong
-answers, one for the error of t, a column an instruction set. Otherwise that of each workload's own rays, a panel a scene, workload and
-instruction set."""
+"""What accuracy costs in time, the Pareto front drawn. Accuracy is that of hard rays where the run has them: panels of wrong
+answers and of the error of t, for each scene and instruction set. Otherwise that of each workload's own rays, a panel a scene, workload and
+instruction set. A panel that would show no point is left out."""
 
 from figures.trade_offs import step_front
 from results import HARD_PREFIX, NoData, ordered
-from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_legend, marker_map, panel_grid, panels, short
+from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_legend, marker_map, panel_grid
 
 TITLE = "Accuracy against time"
 CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hits, false hits and wrong surfaces against exact "
            "arithmetic; the error of t is that of right answers. Where the run has the workload `hard`, accuracy is that of its rays, which are aimed at "
            "what goes wrong, and time that of ordinary rays of the same cell. Where no cell of ordinary rays has a wrong answer, the figure says so and shows the "
-           "error of t. The grey steps join the cells that no other beats in both. "
+           "error of t, which rays of any hit (shadow rays) have none of: there are no panels of them. The grey steps join the cells that no other beats in both. "
            "Zero stands on the lowest line. Cells that differ in builder or way of traversal alone have the same sign.")
 
 MEASURES = (("wrong_answers", "wrong answers per million"), ("t_error_ulp_p99", "error of t, 99th percentile, ulp"))
@@ -39,22 +39,26 @@ def hard_points(results, metric):
 
 
 def draw_hard(points):
-    scenes, isas = ordered((c["scene"] for c, _, _ in points), "scene"), ordered((c["isa"] for c, _, _ in points), "isa")
+    isas = ordered((c["isa"] for c, _, _ in points), "isa")
     markers = marker_map(ordered((c["structure"] for c, _, _ in points), "structure"))
-    measures = [(name, label) for name, label in MEASURES if any(value_of(hard, name) is not None for _, _, hard in points)]
-    figure, axes = panels(len(scenes) * len(measures), len(isas), 4.2, 3.1)
-    rows = [(scene, *measure) for scene in scenes for measure in measures]
-    for row, (scene, name, label) in enumerate(rows):
-        everywhere = [value_of(h, name) for c, _, h in points if c["scene"] == scene]
-        for column, isa in enumerate(isas):
-            axis = axes[row][column]
-            here = [(c, t, value_of(h, name)) for c, t, h in points if c["scene"] == scene and c["isa"] == isa and value_of(h, name) is not None]
-            panel(axis, here, everywhere, [t for c, t, _ in points if c["scene"] == scene], markers)
-            axis.set_title(f"{short(scene)}, {isa}")
-            axis.set_xlabel(f"time of {points[0][0]['workload'].replace('_', ' ')} rays, ns a ray")
-            axis.set_ylabel(label + ("\nhard rays" if name == "wrong_answers" else "\nhard rays answered right"))
+    shown = {}  # (scene, (measure, isa)) -> [(cell, ns a ray, how wrong)]
+    for cell, time, hard in points:
+        for measure in MEASURES:
+            if (value := value_of(hard, measure[0])) is not None:
+                shown.setdefault((cell["scene"], (measure, cell["isa"])), []).append((cell, time, value))
+    figure, axes = panel_grid(shown, {(measure, isa): isa for measure in MEASURES for isa in isas}, 4.2, 3.1, columns_of(isas))
+    for (scene, ((name, label), isa)), axis in axes.items():
+        of_scene = [(t, value_of(h, name)) for c, t, h in points if c["scene"] == scene]
+        panel(axis, shown[scene, ((name, label), isa)], [v for _, v in of_scene], [t for t, _ in of_scene], markers)
+        axis.set_xlabel(f"time of {points[0][0]['workload'].replace('_', ' ')} rays, ns a ray")
+        axis.set_ylabel(label + ("\nhard rays" if name == "wrong_answers" else "\nhard rays answered right"))
     add_legends(figure, [c for c, _, _ in points], markers)
     return figure
+
+
+def columns_of(isas):
+    """How many panels stand beside each other: those of all instruction sets, and of so many groups of them that they are four or so."""
+    return len(isas) * max(1, 4 // len(isas))
 
 
 def panel(axis, points, values, times, markers):
@@ -86,18 +90,19 @@ def value_of(cell, name):
 
 def draw_workloads(points):
     """`points`: (cell, ns a ray). What is drawn is the first measure that is not 0 everywhere."""
-    scenes, isas = ordered((c["scene"] for c, _ in points), "scene"), ordered((c["isa"] for c, _ in points), "isa")
-    places = {f"{w}, {i}": (w, i) for w in ordered((c["workload"] for c, _ in points), "workload") for i in isas}
+    isas = ordered((c["isa"] for c, _ in points), "isa")
+    places = {(w, i): f"{w}, {i}" for w in ordered((c["workload"] for c, _ in points), "workload") for i in isas}
     markers = marker_map(ordered((c["structure"] for c, _ in points), "structure"))
     name, label, said = measure_of([c for c, _ in points])
-    figure, axes = panel_grid(scenes, list(places), 4.2, 3.1, len(isas) * max(1, 4 // len(isas)))
-    for (scene, place), axis in axes.items():
-        here = [p for p in points if (p[0]["scene"], (p[0]["workload"], p[0]["isa"])) == (scene, places[place])]
-        panel(axis, [(c, t, v) for c, t in here if (v := value_of(c, name)) is not None], [value_of(c, name) for c, _ in points], [t for _, t in here], markers)
+    shown = {}  # (scene, place) -> [(cell, ns a ray, how wrong)]
+    for cell, time in points:
+        if (value := value_of(cell, name)) is not None:
+            shown.setdefault((cell["scene"], (cell["workload"], cell["isa"])), []).append((cell, time, value))
+    figure, axes = panel_grid(shown, places, 4.2, 3.1, columns_of(isas))
+    for place, axis in axes.items():
+        panel(axis, shown[place], [v for here in shown.values() for *_, v in here], [t for _, t, _ in shown[place]], markers)
         axis.set_xlabel("time, ns a ray")
         axis.set_ylabel(label)
-        if not here:
-            axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
     if said:
         figure.suptitle(said, fontsize=11)
     add_legends(figure, [c for c, _ in points], markers)

@@ -21,8 +21,8 @@ def draw(results):
     if len(labels) > len(MARKERS):
         raise NoData(f"{len(labels)} modes are too many to tell apart; choose some with --filter")
     markers = marker_map(labels)
-    scenes, workloads = ordered((c["scene"] for c in cells), "scene"), ordered((c["workload"] for c in cells), "workload")
-    figure, axes = panel_grid(scenes, workloads, 4.6, 2.9, 2)
+    workloads = ordered((c["workload"] for c in cells), "workload")
+    figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, 4.6, 2.9, 2)
     for (scene, workload), axis in axes.items():
         drawn = set()
         for cell in (c for c in cells if c["scene"] == scene and c["workload"] == workload):

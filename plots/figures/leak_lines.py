@@ -6,7 +6,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from results import HARD_PREFIX, NoData, ordered
-from style import intersector_colour, intersector_legend, legends_right, log_with_zero, panels, plain, short
+from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, panels, plain, short
 
 CAPTION = (" Lines in the shaded band are at zero, side by side so that all can be seen; above it the scale is logarithmic. Where lines lie on each "
            "other, those beneath are wider.")
@@ -43,10 +43,7 @@ def draw_lines(results, key, value_of, label, why_none):
                           alpha=0.55 if fast else 1.0, linestyle=BOX_LINES.get(box, "-"),
                           marker="D" if is_embree else "o", markersize=5 if is_embree else 3.5, markerfacecolor="white" if is_embree else None, clip_on=False)
             xs = sorted({x for line in lines.values() for x in line})
-            if xs and xs[0] == 0:
-                log_with_zero(axis, "x", xs)
-            else:
-                axis.set_xscale("log")
+            (log_with_zero if xs and xs[0] == 0 else log_axis)(axis, "x", xs)
             axis.xaxis.set_minor_locator(NullLocator())
             if all(abs(round(v, 2) - 1) < 1e-9 or v % 10 == 0 for v in xs):
                 axis.xaxis.set_major_locator(FixedLocator(xs))
@@ -83,7 +80,8 @@ class LeakScale:
         low, high = self.band
         decades = range(self.first, math.floor(self.last) + 1)
         step = max(1, -(-len(decades) // 6))
-        ticks = [float(k) for k in decades[::step]] if self.last > self.first else []
+        digits = (1, 2, 5) if len(decades) < 3 else (1,)  # two labels at least
+        ticks = [tick for k in decades[::step] for d in digits if (tick := k + math.log10(d)) <= self.last] if self.last > self.first else []
         axis.yaxis.grid(False)
         for tick in ticks:
             axis.axhline(tick, color="#DDDDDD", linewidth=0.7, zorder=0)
@@ -97,7 +95,7 @@ class LeakScale:
         axis.set_ylim(low if self.has_zero else self.first, max(high, self.last))
         axis.yaxis.set_major_locator(FixedLocator(([(low + high) / 2] if self.has_zero else []) + ticks))
         axis.yaxis.set_minor_locator(NullLocator())
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: "0" if y <= high and self.has_zero else plain(10.0 ** round(y))))
+        axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: "0" if y <= high and self.has_zero else plain(float(f"{10.0 ** y:.0e}"))))
 
 
 def slots(lines):

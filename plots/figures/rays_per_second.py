@@ -16,13 +16,13 @@ def draw(results):
     cells = [c for c in results.traces if c.estimate(metric)]
     if not cells:
         raise NoData("no cell has a throughput")
-    scenes, workloads = ordered((c["scene"] for c in cells), "scene"), ordered((c["workload"] for c in cells), "workload")
+    workloads = ordered((c["workload"] for c in cells), "workload")
     isas, structures = ordered((c["isa"] for c in cells), "isa"), ordered((c["structure"] for c in cells), "structure")
     modes = Modes(cells)
     markers = marker_map(modes.labels) if len(modes.labels) <= len(MARKERS) else {}
 
     width = min(7.0, max(3.2, 0.2 * len(isas) * (len(structures) + 1) + 0.8))
-    figure, axes = panel_grid(scenes, workloads, width, 2.9, 3 if width < 4.2 else 2)
+    figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, width, 2.9, 3 if width < 4.2 else 2)
     for (scene, workload), axis in axes.items():
         here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
         panel(axis, here, metric, isas, structures, modes, markers)
@@ -65,5 +65,3 @@ def panel(axis, cells, metric, isas, structures, modes, markers):
     axis.set_xlim(-0.55, len(isas) - 0.45)
     axis.set_ylim(0, axis.get_ylim()[1] * (1.2 if any(is_wrong(c) for c in cells) else 1.0))
     axis.grid(axis="x", visible=False)
-    if not cells:
-        axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")

@@ -31,7 +31,7 @@ def draw(results):
     markers = marker_map(scenes)
 
     if far_apart(points):
-        figure = panels_by_scene(points, scenes, [(w, i) for w in workloads for i in isas], markers)
+        figure = panels_by_scene(points, {(w, i): f"{w}, {i}" for w in workloads for i in isas}, markers)
     else:
         figure = panels_of_all(points, workloads, isas, markers)
     answers = wrong_legend([c for c, *_ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, *_ in points])} per million"))
@@ -56,18 +56,17 @@ def far_apart(points):
     return max(largest.values()) > FAR_APART * min(largest.values())
 
 
-def panels_by_scene(points, scenes, kinds, markers):
-    figure, axes = panel_grid(scenes, [f"{workload}, {isa}" for workload, isa in kinds], 3.3, 3.05, 4)
-    for scene in scenes:
-        for workload, isa in kinds:
-            axis = axes[scene, f"{workload}, {isa}"]
-            here = [p for p in points if (p[0]["scene"], p[0]["workload"], p[0]["isa"]) == (scene, workload, isa)]
-            panel(axis, here, markers, axis.get_title())
-            if here:
-                axis.set_xlim(0, 1.08 * max(p[1] for p in here))
-                axis.set_ylim(0, 1.08 * max(p[2] for p in here))
-            axis.set_xlabel("SAH cost")
-        axes[scene, "%s, %s" % kinds[0]].set_ylabel("time, ns a ray")
+def panels_by_scene(points, kinds, markers):
+    shown = {}  # (scene, (workload, isa)) -> points
+    for point in points:
+        shown.setdefault((point[0]["scene"], (point[0]["workload"], point[0]["isa"])), []).append(point)
+    figure, axes = panel_grid(shown, kinds, 3.3, 3.05, 4)
+    for place, axis in axes.items():
+        panel(axis, shown[place], markers, axis.get_title())
+        axis.set_xlim(0, 1.08 * max(p[1] for p in shown[place]))
+        axis.set_ylim(0, 1.08 * max(p[2] for p in shown[place]))
+        axis.set_xlabel("SAH cost")
+        axis.set_ylabel("time, ns a ray")
     return figure
 
 

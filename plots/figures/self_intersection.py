@@ -1,10 +1,11 @@
 """How secondary rays leave their surface: what each way loses, and what it costs. A row a scene; a column a fault, the last one time."""
 
+from textwrap import fill
+
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullLocator
 
 from results import NoData, ordered
-from style import MARKERS, intersector_colour, intersector_legend, legends_right, log_with_zero, panels, plain, short
+from style import MARKERS, intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, panels, plain, short
 
 TITLE = "Leaving a surface"
 CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass through what "
@@ -50,9 +51,10 @@ def draw(results):
         if name:
             log_with_zero(axes[0][column], "x", [v for c in cells for v in [c.value(name)] if v is not None])
         else:
-            axes[0][column].set_xscale("log")
-            axes[0][column].xaxis.set_minor_locator(NullLocator())
+            log_axis(axes[0][column], "x", [1e9 / c.value(metric) for c in cells])
             axes[0][column].xaxis.set_major_formatter(lambda v, _: plain(v))
+    if others := [s for s in ordered((c["scene"] for c in results.traces), "scene") if s not in scenes]:
+        figure.supxlabel("not shown, as no secondary rays were measured: " + fill(", ".join(others), 90), fontsize=8.5, color="#555555")
     handles = [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="white", markersize=5, label=w.replace("_", " ")) for w, m in markers.items()]
     legends_right(figure, [("intersector", intersector_legend(intersectors)), ("workload", handles)])
     return figure

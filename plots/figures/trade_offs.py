@@ -86,27 +86,23 @@ def draw_panels(places, x_label, y_label, named_of):
     beside = min(MOST_COLUMNS, len({rest[1:] for rest in columns}))  # panels of a workload, which stay in a row
     width = max(WIDTH, LEFT + WORDS_AT + CHARACTER * max(len(bar_label(p.cell, varied)) + 2 + len(text) for here in named.values() for p, text in here))
     markers = builder_markers([p.cell["builder"] for p in points])
-    figure, axes = panel_grid(ordered((p[0] for p in places), "scene"), list(titles.values()), width, HEIGHT + LINE * (lines + 1.5), beside * (MOST_COLUMNS // beside))
+    figure, axes = panel_grid([(place[0], place[1:]) for place in places], titles, width, HEIGHT + LINE * (lines + 1.5), beside * (MOST_COLUMNS // beside))
     figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
     drawn = []
-    for scene in dict.fromkeys(scene for scene, _ in axes):
-        for rest, title in titles.items():
-            axis, here = axes[scene, title], places.get((scene, *rest), [])
-            if not here:
-                axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
-                continue
-            for point in here:
-                mark(axis, point.x.median, point.y.median, point.cell, markers)
-            step_front(axis, [(p.x.median, p.y.median) for p in here])
-            log_axis(axis, "x", [p.x.median for p in here])
-            log_axis(axis, "y", [p.y.median for p in here])
-            axis.set_xlabel(x_label(rest[2]))
-            axis.set_ylabel(y_label(rest[2]))
-            axis.xaxis.label.set_fontsize(9)
-            axis.yaxis.label.set_fontsize(9)
-            axis.tick_params(labelsize=8.5)
-            names_below(axis, named[scene, *rest], varied, markers)
-            drawn.append((axis, named[scene, *rest]))
+    for (scene, rest), axis in axes.items():
+        here = places[scene, *rest]
+        for point in here:
+            mark(axis, point.x.median, point.y.median, point.cell, markers)
+        step_front(axis, [(p.x.median, p.y.median) for p in here])
+        log_axis(axis, "x", [p.x.median for p in here])
+        log_axis(axis, "y", [p.y.median for p in here])
+        axis.set_xlabel(x_label(rest[2]))
+        axis.set_ylabel(y_label(rest[2]))
+        axis.xaxis.label.set_fontsize(9)
+        axis.yaxis.label.set_fontsize(9)
+        axis.tick_params(labelsize=8.5)
+        names_below(axis, named[scene, *rest], varied, markers)
+        drawn.append((axis, named[scene, *rest]))
     cells = [p.cell for p in points]
     answers = wrong_legend(cells, wrong_marker(f"edge: some wrong, up to\n{most_wrong(cells)} per million"))
     legends_right(figure, [("structure", structure_legend({c["structure"] for c in cells})), ("builder", builder_legend(markers)), *answers])

@@ -8,13 +8,13 @@ from html.parser import HTMLParser
 
 sys.dont_write_bytecode = True
 
-from made_results import HARD, PLOTS, PUBLISHED, SEEN, Folder, build, everything, hard, other, trace, whole  # noqa: E402
+from made_results import HARD, PLOTS, PUBLISHED, SEEN, Drawn, Folder, build, everything, hard, other, trace, whole  # noqa: E402
 
 import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
 import warned  # noqa: E402
-from figures import ALL, leaks_vs_distance, published_ratios, rays_per_second  # noqa: E402
+from figures import ALL, accuracy_vs_time, leaks_vs_aspect, leaks_vs_distance, published_ratios, rays_per_second, self_intersection  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
 from figures.leak_lines import slots, wider, without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
@@ -44,7 +44,7 @@ class Strict(HTMLParser):
         self.text.append(data)
 
 
-class Hard(unittest.TestCase):
+class Hard(Drawn):
     def test_accuracy_is_of_hard_rays_and_time_of_ordinary_ones(self):
         results = load(Folder(whole() + hard()).path)
         points = hard_points(results, "rays_per_cpu_second")
@@ -71,6 +71,40 @@ class Hard(unittest.TestCase):
                 self.assertEqual("".join(t.get_text() for t in figure.texts), said)
                 self.assertEqual({a.get_ylabel() for a in figure.axes}, {label})
                 plt.close(figure)
+
+    def test_panels_that_would_be_empty_are_left_out(self):
+        rows = [other(w, s, isa=i, wrong_answers=0, **({} if w == "shadow" else {"t_error_ulp_p99": 1.5})) for s in ("bunny", "city") for w in ("primary", "shadow", "diffuse")
+                for i in ("sse", "avx2") if (s, w) != ("city", "primary")]
+        figure = self.draw(accuracy_vs_time, load(Folder(rows).path))
+        titles = [a.get_title() for a in figure.axes if a.get_visible()]
+        self.assertEqual(titles, ["bunny, primary, sse", "bunny, primary, avx2", "bunny, diffuse, sse", "bunny, diffuse, avx2", "city, diffuse, sse", "city, diffuse, avx2"])
+        self.assertTrue(all(a.lines for a in figure.axes if a.get_visible()))
+
+    def test_panels_of_hard_rays_stand_beside_each_other(self):
+        rows = [other(w, f"scene{k}", wrong_answers=1, t_error_ulp_p99=0.5) for k in range(4) for w in ("primary", "hard")]
+        figure = self.draw(accuracy_vs_time, load(Folder(rows).path))
+        self.assertEqual([len({round(getattr(a.get_position(), edge), 3) for a in figure.axes}) for edge in ("x0", "y0")], [4, 2])
+        self.assertEqual([a.get_title() for a in figure.axes][:4], ["scene0, avx2", "scene0, avx2", "scene1, avx2", "scene1, avx2"])
+
+    def test_labels_of_leaving_a_surface_do_not_overlap_and_scenes_without_are_named(self):
+        rows = [other(f"diffuse:self_intersection={way}", "ball", self_intersection=way, self_hits_per_million=hits, near_hits_per_million=0.0, leaks_per_million=0.0)
+                for way, hits in (("none", 4.9e5), ("epsilon", 9.9e5), ("exclusion", 0.0))]
+        figure = self.draw(self_intersection, load(Folder([*rows, other("primary", "city"), other("primary", "forest")]).path))
+        figure.draw_without_rendering()
+        for axis in figure.axes:
+            ticks = [t.get_window_extent() for t in axis.get_xticklabels() if t.get_text()]
+            self.assertGreater(len(ticks), 1)
+            self.assertFalse([a for a, b in zip(ticks, ticks[1:]) if a.overlaps(b)])
+        self.assertEqual(figure._supxlabel.get_text(), "not shown, as no secondary rays were measured: city, forest")
+
+    def test_an_axis_has_two_labels_at_least(self):
+        for cracks in ((10, 30, 10), (1, 1, 1), (1000, 9, 0)):
+            rows = [other("hard_edge", f"ball:stretch={x}", cracks=c, rays=10**6, triangle_aspect_median=a) for x, c, a in zip((1, 2, 3), cracks, (2.07, 3.1, 5.0))]
+            (axis,) = self.draw(leaks_vs_aspect, load(Folder(rows).path)).axes
+            axis.figure.draw_without_rendering()
+            for ticks, (low, high) in ((axis.xaxis, axis.get_xlim()), (axis.yaxis, axis.get_ylim())):
+                labels = [t.label1.get_text() for t in ticks.get_major_ticks() if low <= t.get_loc() <= high and t.label1.get_text() != "0"]
+                self.assertGreater(len(set(labels)), 1, (cracks, labels))
 
     def test_scenes_without_a_part_of_their_placing(self):
         self.assertEqual(without("ball:size=100:offset=1e4", "offset"), ("ball:size=100", True))
