@@ -62,7 +62,7 @@ def main():
     import figures
     import report
     import style
-    from results import NoData, ResultError, load
+    from results import NoData, ResultError, TooMuch, load
     from warned import told_in_a_line
 
     try:
@@ -80,7 +80,7 @@ def main():
                 raise
             except NoData as reason:
                 # `run` hides what is written here to stdout; that a figure which somebody named is not there must be seen.
-                print(f"{name}: left out, {reason}", file=sys.stderr if named and getattr(module, "ONLY_WHEN_NAMED", False) else sys.stdout)
+                print(f"{name}: left out, {reason}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch)) else sys.stdout)
                 drawn.append((name, module, str(reason)))
                 continue
             except Exception as error:  # noqa: BLE001  of a figure: it takes no other with it

@@ -29,6 +29,10 @@ class NoData(Exception):
     """Why a figure cannot be drawn from these results."""
 
 
+class TooMuch(NoData):
+    """Of what there is more than a figure can show, and how to choose from it."""
+
+
 @dataclass(frozen=True)
 class Estimate:
     """Median with a 95 % confidence interval; `low` and `high` equal the median below three samples."""

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
-from results import ordered  # noqa: E402
+from results import TooMuch, ordered  # noqa: E402
 
 COLOURS = {  # structures
     "kdtree": "#CC6677", "bvh2": "#88CCEE", "bvh4": "#44AA99", "bvh8": "#332288", "bvh16": "#882255",
@@ -26,6 +26,8 @@ COLOURS = {  # structures
 SPARE_COLOURS = ("#77AADD", "#BBCC33", "#EE3377", "#99DDFF", "#663333", "#009988")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 DPI = 160
+TALLEST = 8000  # pixels of a figure
+WIDEST = 17.0  # inches of scenes beside each other
 
 # Of fonts that have what DejaVu Sans lacks (Chinese, Japanese, Korean; then the rest of Unicode), those that are installed are asked for such characters.
 FALLBACK_FONTS = ("Noto Sans CJK JP", "Noto Sans CJK SC", "Noto Sans JP", "Noto Sans SC", "Source Han Sans", "IPAexGothic", "IPAGothic", "TakaoGothic", "VL Gothic", "WenQuanYi Zen Hei",
@@ -143,8 +145,13 @@ SPARE_PART_COLOURS = ("#4477AA", "#44AA99", "#117733", "#994455", "#999933", "#8
 part_colour = Palette(PART_COLOURS, SPARE_PART_COLOURS)  # of a phase of a build, a part of the memory
 
 
-def part_legend(names):
-    return [Patch(facecolor=part_colour(n), edgecolor="white", label=n.replace("_", " ")) for n in names]
+REST_COLOUR = "#CCCCCC"  # of what none of a bar's parts covers
+
+
+def part_legend(names, rest):
+    """A handle for each part, and for what none of them covers where there is a `rest`."""
+    handles = [Patch(facecolor=part_colour(n), edgecolor="white", label=n.replace("_", " ")) for n in names]
+    return handles + ([Patch(facecolor=REST_COLOUR, edgecolor="white", label="none of these")] if rest else [])
 
 
 def structure_legend(structures):
@@ -226,7 +233,7 @@ def panel_grid(shown, places, width, height, most_columns):
     most = max(map(len, own.values()))
     columns = min(most, most_columns)
     lines = [(scene, line[i:i + columns]) for scene, line in own.items() for i in range(0, len(line), columns)]
-    beside = min(most_columns // columns, len(lines)) if most == columns else 1
+    beside = max(1, min(most_columns // columns, int(WIDEST / (columns * width)), len(lines))) if most == columns else 1
     figure, axes = panels(-(-len(lines) // beside), beside * columns, width, height)
     found = {}
     for i, (scene, line) in enumerate(lines):
@@ -247,10 +254,17 @@ def legends_right(figure, legends):
 
 
 def panels(rows, columns, width, height, **options):
-    """A grid of axes, always two-dimensional. Sizes in inches, one panel's each."""
+    """A grid of axes, always two-dimensional. Sizes in inches, one panel's each. TooMuch where that is taller than can be read."""
+    if not fits(height * rows):
+        raise TooMuch(f"it would be {DPI * height * rows:.0f} pixels tall ({TALLEST} at most); choose fewer scenes, workloads or builders, in the configuration or with --filter")
     figure, axes = plt.subplots(rows, columns, figsize=(width * columns, height * rows), squeeze=False,
                                 layout="constrained", **options)
     return figure, axes
+
+
+def fits(height):
+    """Whether a figure of so many inches is not taller than can be read."""
+    return DPI * height <= TALLEST
 
 
 def save(figure, folder, name):

@@ -1,12 +1,14 @@
 """Horizontal bars, one a built structure, one panel a scene: what sah_cost and build_time have in common."""
 
 from figures import squares
+from figures.names import bar_label
 from results import Cell, NoData, axis_sort_key, ordered, telling_axes
-from style import colour, hatch, legends_right, panels, part_colour, part_legend, short
+from style import REST_COLOUR, colour, hatch, legends_right, panels, part_colour, part_legend, short, structure_legend
 
 
 # Inches: of a panel at least; of its bars; of a character beside them.
 LEAST_WIDTH, BAR_WIDTH, CHARACTER = 5.6, 2.6, 0.068
+LEAST_REST = 0.002  # of a bar's length, that is seen
 
 
 def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None):
@@ -19,7 +21,9 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
     scenes = ordered((c["scene"] for c in cells), "scene")
     bars = {scene: scene_bars([c for c in cells if c["scene"] == scene], varied) for scene in scenes}
     if squares.are_due(bars.values(), varied):
-        return squares.square_panels([(short(scene), bars[scene]) for scene in scenes], value_of, digits, axis_label, higher_is_better=False)
+        every = [c for c in results.structures if value_of(c)]
+        varied = telling_axes(every, ("scene", "structure"), label_axes)
+        return squares.square_panels([(short(scene), [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label, higher_is_better=False)[0]
 
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
@@ -35,10 +39,16 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
         axis.set_title(short(scenes[index]))
         axis.set_xlabel(axis_label)
     if parts_of:
-        names = in_order([name for name, value in parts_of(cell) if value > 0] for cell in cells)
-        if names:
-            legends_right(figure, [("part", part_legend(names))])
+        legends_right(figure, parts_legend("part", [(parts_of(cell), value_of(cell)[0], cell) for cell in cells]))
     return figure
+
+
+def parts_legend(title, bars):
+    """Legends of bars, (parts, length, cell): of the parts, and of the structures whose bars have none."""
+    names = in_order([name for name, value in parts if value > 0] for parts, *_ in bars)
+    rest = any(parts and sum(value for _, value in parts) < (1 - LEAST_REST) * length for parts, length, _ in bars)
+    whole = {cell["structure"] for parts, _, cell in bars if not parts}
+    return ([(title, part_legend(names, rest))] + ([(f"no {title}s", structure_legend(whole))] if whole else [])) if names else []
 
 
 def distinct(results, shown_of, label_axes):
@@ -100,12 +110,4 @@ def digits(value):
 
 def look(cell, parts):
     """Colour and hatch of a bar: its structure's, or, beneath its parts, the grey of what none of them covers."""
-    return {"color": "#CCCCCC"} if parts else {"color": colour(cell["structure"]), "hatch": hatch(cell["structure"])}
-
-
-def bar_label(cell, varied):
-    return " ".join([cell["structure"]] + [label(a, cell[a]) for a in varied if cell[a]])
-
-
-def label(axis, key):
-    return f"{key} thread{'' if key == '1' else 's'}" if axis == "threads" else key
+    return {"color": REST_COLOUR} if parts else {"color": colour(cell["structure"]), "hatch": hatch(cell["structure"])}

@@ -1,6 +1,6 @@
 """What a slower build buys: build time against the time of a ray, and from how many rays on it pays."""
 
-from figures.bars import label
+from figures.names import label
 from figures.trade_offs import MOST_NAMES, draw_panels, fastest_points, of_places
 from results import STRUCTURE_AXES
 

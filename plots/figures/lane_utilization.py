@@ -1,7 +1,7 @@
 """Lane utilisation by depth: how full the lanes are that nodes are tested with, from the root down."""
 
 from figures.modes import Modes
-from results import NoData, ordered
+from results import NoData, TooMuch, ordered
 from style import MARKERS, colour, legends_right, marker_legend, marker_map, panel_grid, structure_legend
 
 TITLE = "Lane utilisation by depth"
@@ -19,7 +19,7 @@ def draw(results):
     isas = ordered((c["isa"] for c in cells), "isa")
     labels = sorted({label(modes, c, isas) for c in cells})
     if len(labels) > len(MARKERS):
-        raise NoData(f"{len(labels)} modes are too many to tell apart; choose some with --filter")
+        raise TooMuch(f"{len(labels)} modes are too many to tell apart; choose some with --filter")
     markers = marker_map(labels)
     workloads = ordered((c["workload"] for c in cells), "workload")
     figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, 4.6, 2.9, 2)

@@ -40,9 +40,9 @@ def draw(results):
 
     titles = {key: f"{short(key[0])}, {key[1].replace('_', ' ')}, {key[2]}" for key in keys}
     if squares.are_due(shown.values(), varied):
-        figure = squares.square_panels([(titles[key], shown[key]) for key in keys], value, digits, unit, higher_is_better=True)
-        for key, axis in zip(keys, figure.axes):
-            squares.mark_wrong(axis, squares.by_place(axis, shown[key]))
+        figure, drawn = squares.square_panels([(titles[key], shown[key]) for key in keys], varied, value, digits, unit, higher_is_better=True)
+        for axis, places in drawn:
+            squares.mark_wrong(axis, places)
         legends_right(figure, wrong_legend(best))
         return figure
     columns = min(2, len(keys))

@@ -1,5 +1,7 @@
 """Throughput by structure and instruction set: one panel a scene and workload."""
 
+from matplotlib.lines import Line2D
+
 from figures.modes import Modes
 from results import NoData, ordered
 from style import (MARKERS, WRONG, colour, edge, hatch, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend, wrong_legend,
@@ -7,7 +9,7 @@ from style import (MARKERS, WRONG, colour, edge, hatch, is_wrong, legends_right,
 
 TITLE = "Rays per second"
 CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with its 95 % confidence interval of the "
-           "median. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
+           "median, dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
            "reaches, per million rays. Those of each cell stand in the table.")
 
 
@@ -28,7 +30,8 @@ def draw(results):
         panel(axis, here, metric, isas, structures, modes, markers)
         axis.set_ylabel(unit)
     legends = [("structure", structure_legend(structures))]
-    legends += [("mode", marker_legend(markers))] if len(markers) > 1 else []
+    dot = Line2D([], [], linestyle="", marker=".", color="#222222", markersize=2.5, label=f"each of {len(modes.labels)}")
+    legends += [("mode", marker_legend(markers) or [dot])] if len(modes.labels) > 1 else []
     legends_right(figure, legends + wrong_legend(cells, wrong_marker("some wrong; the number:\nof the bar's, per million")))
     return figure
 

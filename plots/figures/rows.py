@@ -4,9 +4,10 @@ from collections import Counter
 from dataclasses import dataclass
 
 from figures import squares
-from figures.bars import in_order, label, look
+from figures.bars import look, parts_legend
+from figures.names import label
 from results import axis_sort_key, ordered
-from style import legends_right, panels, part_colour, part_legend, short
+from style import legends_right, panels, part_colour, short
 
 # Inches: of a row; above and below a panel's rows; of a character of a label; that scenes side by side may take.
 ROW, AROUND, CHARACTER, WIDEST = 0.15, 0.95, 0.062, 13.5
@@ -95,7 +96,6 @@ def bar_rows(groups, scenes, value_of, parts_of, note_of, axis_label, part="part
     places = places_of(groups)
     notes = max(len(note_of(c)) for _, row in places for c in row.cells.values())
     figure, axes = row_panels(groups, scenes, [1.5], 0.2 + 0.055 * notes)
-    names = in_order([name for name, value in parts_of(c) if value > 0] for _, row in places for c in row.cells.values())
     for scene, (axis,) in axes.items():
         here = [(place, row.cells[scene]) for place, row in places if scene in row.cells]
         ends = [value_of(cell)[0] for _, cell in here]
@@ -106,8 +106,7 @@ def bar_rows(groups, scenes, value_of, parts_of, note_of, axis_label, part="part
             axis.barh([place for place, _, _ in bars], [value for _, _, value in bars], 0.78, left=[left for _, left, _ in bars], color=part_colour(name), linewidth=0)
         axis.set_xlim(0, most or max(ends, default=0) or 1.0)
         axis.set_xlabel(axis_label, fontsize=FONT + 1)
-    if names:
-        legends_right(figure, [(part, part_legend(names))])
+    legends_right(figure, parts_legend(part, [(parts_of(c), value_of(c)[0], c) for _, row in places for c in row.cells.values()]))
     return figure
 
 

@@ -1,5 +1,5 @@
-"""How well the SAH cost foretells the measured time: one panel a workload and instruction set; and a scene, where scenes are so far apart
-that one of them would decide every fit."""
+"""How well the SAH cost foretells the measured time: a panel a scene, workload and instruction set; scenes share panels where there
+would be many of them and costs are near each other."""
 
 import numpy as np
 
@@ -10,13 +10,13 @@ from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker
 from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
-CAPTION = ("A point is a structure on a scene, traced in its fastest mode. The line is the least-squares fit through a panel's "
-           "points, R² its share of the variance explained; with EPO: that of the plane through SAH cost and end-point overlap, which never explains less, so "
-           "small differences say nothing. A red edge: the mode has wrong answers. "
+CAPTION = ("A point is a structure on a scene, traced in its fastest mode. A line is the least-squares fit through the points of one scene "
+           "in a panel, R² its share of the variance explained (where scenes share a panel, in the legend's order; of more than three the least and the most); with EPO: that of the plane "
+           "through SAH cost and end-point overlap, which never explains less, so small differences say nothing. A red edge: the mode has wrong answers. "
            + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
 
-# Scenes whose costs differ by more get panels of their own.
-FAR_APART = 4.0
+MOST_PANELS = 24  # of scenes apart
+FAR_APART = 4.0  # scenes whose costs differ by more never share panels
 
 
 def draw(results):
@@ -30,7 +30,7 @@ def draw(results):
     structures = ordered((c["structure"] for c, *_ in points), "structure")
     markers = marker_map(scenes)
 
-    if far_apart(points):
+    if len({(c["scene"], c["workload"], c["isa"]) for c, *_ in points}) <= MOST_PANELS or far_apart(points):
         figure = panels_by_scene(points, {(w, i): f"{w}, {i}" for w in workloads for i in isas}, markers)
     else:
         figure = panels_of_all(points, workloads, isas, markers)
@@ -75,7 +75,7 @@ def panels_of_all(points, workloads, isas, markers):
     for row, workload in enumerate(workloads):
         for column, isa in enumerate(isas):
             here = [p for p in points if p[0]["workload"] == workload and p[0]["isa"] == isa]
-            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}")
+            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}", shared=True)
         axes[row][0].set_ylabel("time, ns a ray")
         axes[row][0].set_ylim(0, 1.08 * max(p[2] for p in points if p[0]["workload"] == workload))
     axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))
@@ -84,22 +84,39 @@ def panels_of_all(points, workloads, isas, markers):
     return figure
 
 
-def panel(axis, points, markers, title):
+def panel(axis, points, markers, title, shared=False):
+    """`shared`: the panel is that of all scenes of `markers`."""
     for cell, cost, nanoseconds, _ in points:
         axis.plot(cost, nanoseconds, markers[cell["scene"]], color=colour(cell["structure"]), markersize=7,
                   markeredgecolor=WRONG if is_wrong(cell) else "white", markeredgewidth=1.2 if is_wrong(cell) else 0.7)
-    fit = linear_fit([p[1] for p in points], [p[2] for p in points])
-    if fit:
-        slope, offset, r2 = fit
-        ends = np.array([min(p[1] for p in points), max(p[1] for p in points)])
-        axis.plot(ends, slope * ends + offset, "-", color="#777777", linewidth=1, zorder=1)
-        both = plane_fit([p[1] for p in points], [p[3] for p in points], [p[2] for p in points])
-        title += f"\nR² = {r2:.2f}{'' if both is None else f', with EPO {both:.2f}'} (n = {len(points)})"
-    elif points:
-        title += f"\n(n = {len(points)}, no fit)"
+    explained_by = []  # (R², R² with EPO) of each scene, None where there is none
+    for scene in markers if shared else {p[0]["scene"] for p in points}:
+        here = [p for p in points if p[0]["scene"] == scene]
+        x, y = [p[1] for p in here], [p[2] for p in here]
+        if fit := linear_fit(x, y):
+            slope, offset, _ = fit
+            ends = np.array([min(x), max(x)])
+            axis.plot(ends, slope * ends + offset, "-", color="#777777", linewidth=1, zorder=1)
+        explained_by.append((fit and fit[2], fit and plane_fit(x, [p[3] for p in here], y)))
+    if points:
+        title += f"\n{fits_text(explained_by)} (n = {len(points)})"
     else:
         axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
     axis.set_title(title)
+
+
+def fits_text(explained_by):
+    """(R², R² with EPO) of each scene in words, None where there is none; of more than three scenes from the least to the most."""
+    def said(values):
+        if len(values) <= 3:
+            return ", ".join("–" if value is None else f"{value:.2f}" for value in values)
+        known = [value for value in values if value is not None]
+        return f"{min(known):.2f} to {max(known):.2f}"
+
+    alone, both = zip(*explained_by)
+    if not any(value is not None for value in alone):
+        return "no fit"
+    return f"R² = {said(alone)}" + (f"{', ' if len(both) == 1 else chr(10)}with EPO {said(both)}" if any(value is not None for value in both) else "")
 
 
 def linear_fit(x, y):

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import ScaledTranslation
 
-from figures.bars import bar_label, label
+from figures.names import bar_label, label
 from results import STRUCTURE_AXES, Estimate, NoData, axis_sort_key, ordered, telling_axes
 from style import MARKERS, WRONG, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend, wrong_marker
 
@@ -147,11 +147,12 @@ def mark(axis, x, y, cell, markers, size=6.0, **more):
 
 
 def builder_legend(markers):
-    """Handles, one a marker, named by what shares it; and what the white dot is."""
+    """Handles, one a marker, named by what shares it, or by the builder where only a reinserted one or Embree's of our trees has it; and what the white dot is."""
     names = {}
     for builder, marker in markers.items():
         names.setdefault((marker, kind(builder)), builder)
-    handles = [Line2D([], [], linestyle="", marker=marker, color="#444444", markeredgewidth=0, markersize=6, label=name) for (marker, name) in names]
+    handles = [Line2D([], [], linestyle="", marker=marker, color="#444444", markeredgewidth=0, markersize=6, label=name if name in markers else builder)
+               for (marker, name), builder in names.items()]
     if any(map(reinserted, markers)):
         handles.append(Line2D([], [], linestyle="", marker="o", markersize=4.5, color="white", markeredgecolor="#444444", markeredgewidth=2, label="…_reinsertion: white dot"))
     return handles

@@ -6,14 +6,15 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 
 from figures.modes import Modes
-from figures.squares import mark_wrong
+from figures.squares import headings_above, mark_wrong
 from results import NoData, ordered
 from style import panels, short
 
 TITLE = "Ways of traversal"
 CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set (where the sweep has no Embree: of the structure's "
            "own single rays). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes. "
-           "Framed red: ways with wrong answers.")
+           "Framed red: ways with wrong answers. Where an instruction set would have more than 60 rows, a row is a structure and way of traversal, on each scene by its fastest builder, leaf and tests.")
+MOST_ROWS = 60
 # Blue to orange by way of white: readers with any colour vision can tell the ends apart.
 COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FEE9CF", "#FFFFFF", "#D3E4F3", "#5C9BCF", "#1F5A96"])
 MEAN = "mean"
@@ -26,9 +27,12 @@ def draw(results):
     if len({c["traversal"] for c in cells}) < 2:
         raise NoData("all cells have one way of traversal")
     modes = Modes(cells)
-    tables = {isa: table for isa in ordered((c["isa"] for c in cells), "isa") if (table := ratios([c for c in cells if c["isa"] == isa], modes, metric))}
+    tables = tables_of(cells, modes, metric)
     if not tables:
         raise NoData("nothing to compare with: neither embree nor single rays on the same scene and workload")
+    if fastest_alone := max(map(len, tables.values())) > MOST_ROWS:
+        modes = Modes(cells, without=("builder", "leaf", "intersector", "box"))
+        tables = tables_of(cells, modes, metric)
     columns = columns_of(cells)
     rows = {isa: row_names(table, modes) for isa, table in tables.items()}
     longest = max(map(len, rows.values()))
@@ -37,8 +41,13 @@ def draw(results):
         panel(axis, table, rows[isa], columns)
         fastest = fastest_cells([c for c in cells if c["isa"] == isa], modes, metric)
         mark_wrong(axis, {(x, y): fastest[row][place] for y, row in enumerate(rows[isa]) for x, place in enumerate(columns) if place in fastest[row]})
-        axis.set_title(isa, loc="left", pad=36)
+        axis.set_title(isa + (": fastest builder, leaf and tests of each" if fastest_alone else ""), loc="left", pad=30)
     return figure
+
+
+def tables_of(cells, modes, metric):
+    """{isa: what ratios() gives} of those instruction sets of which there is something to compare with."""
+    return {isa: table for isa in ordered((c["isa"] for c in cells), "isa") if (table := ratios([c for c in cells if c["isa"] == isa], modes, metric))}
 
 
 def fastest_cells(cells, modes, metric):
@@ -100,13 +109,15 @@ def panel(axis, table, rows, columns):
     axis.set_yticks(range(len(rows)), [f"{s}  {m}" for s, m in rows], fontsize=8.5)
     axis.set_xticks(range(len(columns)), [short(s, 16) for _, s in columns], rotation=30, ha="right", rotation_mode="anchor", fontsize=8)
     axis.tick_params(length=0)
+    headed = headings_above(axis, len(rows))
     axis.grid(visible=False)
     for spine in axis.spines.values():
         spine.set_visible(False)
     starts = [k for k in range(len(columns)) if k == 0 or columns[k][0] != columns[k - 1][0]]
     for first, after in zip(starts, [*starts[1:], len(columns)]):
         alone = after - first == 1
-        axis.text((first + after - 1) / 2, -0.75, columns[first][0].replace("_", "\n" if alone else " "), ha="center", va="bottom", fontsize=7.5 if alone else 9.5)
+        axis.annotate(columns[first][0].replace("_", "\n" if alone else " "), ((first + after - 1) / 2, -0.5), (0, 50 if headed else 4), textcoords="offset points", ha="center",
+                      va="bottom", fontsize=7.5 if alone else 9.5)
         if first:
             axis.axvline(first - 0.5, color="white", linewidth=4)
     for y in range(1, len(rows)):

@@ -7,16 +7,16 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 
-from made_results import Folder, build, trace  # noqa: E402
+from made_results import Drawn, Folder, build, other, results_of, trace  # noqa: E402
 
 import style  # noqa: E402
-from figures import build_time, rays_by_builder, rays_per_second, squares, traversal_ratios  # noqa: E402
+from figures import build_time, rays_by_builder, rays_per_second, sah_cost, sah_vs_time, squares, traversal_ratios  # noqa: E402
 from figures.modes import Modes  # noqa: E402
-from figures.sah_vs_time import linear_fit, plane_fit  # noqa: E402
-from results import Cell, Results, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
+from figures.sah_vs_time import fits_text, linear_fit, plane_fit  # noqa: E402
+from results import Cell, Results, TooMuch, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
 
 
-class Numbers(unittest.TestCase):
+class Numbers(Drawn):
     def test_estimate(self):
         for values, median in (([5.0], 5.0), ([1.0, 3.0], 2.0), ([1.0, 2.0, 900.0], 2.0)):
             found = estimate(values)
@@ -64,8 +64,9 @@ class Numbers(unittest.TestCase):
                 for i, (s, b) in enumerate((s, b) for s in ("bvh2", "bvh4", "bvh8", "bvh16", "bih") for b in map("builder{}".format, range(9)))]
         self.assertTrue(squares.are_due([bars], ["builder"]))
         self.assertFalse(squares.are_due([bars[:squares.MOST_BARS]], ["builder"]))
-        self.assertFalse(squares.are_due([bars], ["builder", "isa"]))  # a square would stand for two cells
-        figure = squares.square_panels([("bunny", bars), ("city", bars[:12])], lambda c: (c.value("sah_cost"),) * 3, str, "SAH cost", higher_is_better=False)
+        self.assertTrue(squares.are_due([bars], ["builder", "isa"]))
+        self.assertFalse(squares.are_due([bars], []))
+        figure, _ = squares.square_panels([("bunny", bars), ("city", bars[:12])], ["builder"], lambda c: (c.value("sah_cost"),) * 3, str, "SAH cost", higher_is_better=False)
         first, second = figure.axes
         self.assertEqual([t.get_text() for t in first.get_yticklabels()], ["bih", "bvh2", "bvh4", "bvh8", "bvh16"])
         written = [[t.get_text() for t in axis.texts if t.get_text() != "–"] for axis in (first, second)]
@@ -74,6 +75,61 @@ class Numbers(unittest.TestCase):
         self.assertLess(min(squares.SHADES(0.0)), 0.92)  # the worst is not white, as nothing is
         self.assertEqual([t.get_text() for t in first.texts if t.get_fontweight() == "bold"], ["10.0"])
         plt.close(figure)
+
+    def test_squares_of_cells_that_more_than_builders_tell_apart(self):
+        def cell(structure, builder, leaf, isa, cost):
+            return Cell({"scene": "bunny", "structure": structure, "builder": builder, "leaf": leaf, "isa": isa, "threads": "1"}, [{"sah_cost": cost}])
+
+        cells = [cell(s, f"builder{b}", leaf, isa, 10.0 * (b + 1) + (leaf == "triangle4") + 0.1 * (s == "bvh8" and isa == "sse"))
+                 for s in ("bvh4", "bvh8") for b in range(7) for leaf in ("triangle4", "triangle8", "triangle8v") for isa in ("sse", "avx2")]
+        figure = self.draw(sah_cost, results_of([], cells + [cell("bvh2", "builder0", "triangle4", "sse", cost) for cost in (5.0,)] +
+                                                [cell("bvh16", f"builder{b}", f"triangle{n}", "sse", 100.0 + n + b) for b in range(7) for n in (4, 8)]))
+        (axis,) = figure.axes
+        self.assertEqual([t.get_text() for t in axis.get_yticklabels()],
+                         ["bvh2 triangle4 sse", "bvh4 triangle4", "bvh4 triangle8, triangle8v", "bvh8 triangle4 sse", "bvh8 triangle4 avx2", "bvh8 triangle8, triangle8v sse",
+                          "bvh8 triangle8, triangle8v avx2", "bvh16 triangle4 sse", "bvh16 triangle8 sse"])
+        self.assertEqual([t.get_text() for t in axis.get_xticklabels()], [f"builder{b}" for b in range(7)])
+        self.assertEqual(len([t for t in axis.texts if t.get_text() != "–"]), 1 + 8 * 7)
+
+    def test_names_of_columns_stand_above_many_rows_too(self):
+        for structures, above in ((9, False), (30, True)):
+            cells = [Cell({"scene": "bunny", "structure": f"s{s}", "builder": f"builder{b}"}, [{"sah_cost": 10.0 + s + b}]) for s in range(structures) for b in range(5)]
+            (axis,) = self.draw(sah_cost, results_of([], cells)).axes
+            self.assertEqual({t.label2.get_visible() for t in axis.xaxis.get_major_ticks()}, {above})
+
+    def test_a_figure_that_would_be_too_tall_is_left_out_and_says_so(self):
+        rows = [other("primary", f"scene{k}", isa=isa) for k in range(60) for isa in ("sse", "avx2", "avx512")]
+        with self.assertRaisesRegex(TooMuch, r"pixels tall \(8000 at most\); choose fewer scenes, .*--filter"):
+            rays_per_second.draw(load(Folder([row | {"structure": f"s{n}"} for row in rows for n in range(9)]).path))
+        named = Folder([build(f"bvh{n}", scene=f"scene{s}") | {"name": f"build/scene{s}/bvh{n}/b/l/-/-/-/avx2/-/threads:1"} for s in range(70) for n in range(9)], {"plots": ["sah_cost"]}).plot()
+        self.assertRegex(named.stderr, r"^sah_cost: left out, it would be \d+ pixels tall .*\n$")
+        self.assertEqual(named.returncode, 0)
+
+    def test_ways_of_traversal_of_many_modes_are_those_of_the_fastest(self):
+        cells = [Cell({"scene": s, "workload": "primary", "isa": "avx2", "structure": "bvh8", "builder": f"b{b}", "leaf": "l", "intersector": f"i{i}", "box": "fast", "traversal": t,
+                       "threads": "1"}, [{"rays_per_second": 1e6 * (1 + b + (t == "packet8"))}])
+                 for s in ("bunny", "city") for b in range(8) for i in range(5) for t in ("single", "packet8")]
+        (axis,) = self.draw(traversal_ratios, results_of(cells)).axes
+        self.assertEqual([t.get_text() for t in axis.get_yticklabels()], ["bvh8  packet8", "bvh8  single"])
+        self.assertEqual([t.get_text() for t in axis.texts if t.get_text() != "primary"], ["1.12"] * 3 + ["1.00"] * 3)
+        self.assertEqual(axis.get_title(loc="left"), "avx2: fastest builder, leaf and tests of each")
+        few = self.draw(traversal_ratios, results_of([c for c in cells if c["intersector"] == "i0"]))
+        self.assertEqual(len(few.axes[0].get_yticks()), 16)
+
+    def test_a_fit_is_that_of_one_scene(self):
+        points = [(Cell({"scene": s, "structure": "bvh8", "workload": "primary", "isa": "avx2"}, []), x, y * (1 + x), None) for s, y in (("bunny", 1.0), ("city", -3.0)) for x in (1.0, 2.0, 3.0)]
+        figure, axis = style.plt.subplots()
+        self.addCleanup(style.plt.close, figure)
+        sah_vs_time.panel(axis, points, {"bunny": "o", "city": "s"}, "primary", shared=True)
+        self.assertEqual(axis.get_title(), "primary\nR² = 1.00, 1.00 (n = 6)")
+        self.assertEqual(sorted(round(float(line.get_ydata()[-1])) for line in axis.lines if len(line.get_xdata()) == 2), [-12, 4])
+        self.assertEqual([fits_text(of) for of in ([(0.5, 0.75)], [(0.5, None), (None, None)], [(0.5, 0.6)] * 2, [(0.1, 0.2), (0.3, 0.4), (None, None), (0.2, 0.9)], [(None, None)])],
+                         ["R² = 0.50, with EPO 0.75", "R² = 0.50, –", "R² = 0.50, 0.50\nwith EPO 0.60, 0.60", "R² = 0.10 to 0.30\nwith EPO 0.20 to 0.90", "no fit"])
+
+    def test_dots_of_many_modes_are_in_the_legend(self):
+        for modes, said in ((3, ["single0", "single1", "single2"]), (11, ["each of 11"])):
+            figure = self.draw(rays_per_second, load(Folder([other("primary", traversal=f"single{k}", wrong_answers=0) for k in range(modes)]).path))
+            self.assertEqual([t.get_text() for each in figure.legends for t in each.get_texts()], ["bvh8", *said])
 
     def test_wrong_answers_are_marked(self):
         import matplotlib.pyplot as plt

@@ -10,7 +10,7 @@ from matplotlib.text import Text  # noqa: E402
 
 from made_results import PLOTS, Drawn, results_of  # noqa: E402
 
-from figures import ALL, build_phases, bytes_per_triangle, leaf_histograms, squares  # noqa: E402
+from figures import ALL, build_phases, build_time, bytes_per_triangle, leaf_histograms, squares  # noqa: E402
 from figures.bars import in_order  # noqa: E402
 from figures.rows import groups_of, places_of  # noqa: E402
 from results import Cell  # noqa: E402
@@ -69,9 +69,16 @@ class Rows(Drawn):
         (axis,) = figure.axes
         self.assertEqual(labels(axis), ["bvh8", "binned_sah", "morton"])
         self.assertEqual(written(axis), ["200 ns", "200 ns"])
-        self.assertEqual(self.legend(figure), ["references", "splits", "order", "leaves"])
+        self.assertEqual(self.legend(figure), ["references", "splits", "order", "leaves", "none of these"])
         drawn = sorted((round(p.get_y() + p.get_height() / 2), round(p.get_x()), round(p.get_width())) for p in axis.patches)
         self.assertEqual(drawn, [(1, 0, 10), (1, 0, 100), (1, 10, 50), (1, 60, 20), (2, 0, 50), (2, 0, 100), (2, 50, 50)])  # what is left of 100 is no phase
+
+    def test_what_no_part_covers_is_in_the_legend_where_there_is_any(self):
+        whole = {"phase_seconds": {"splits": 2e-5}}
+        for more, rest in ((whole, []), ({}, ["none of these"])):
+            for module in (build_phases, build_time):
+                legend = self.legend(self.draw(module, [built(**more), built("bvh4", build_seconds=3e-5, phase_seconds={"splits": 3e-5}), built("embree", "medium", phase_seconds={})]))
+                self.assertEqual([n for n in legend if n not in ("references", "splits", "leaves")], rest + ["embree"] * (module is build_time), module.TITLE)
 
     def test_threads_have_rows_of_their_own(self):
         two = built(build_seconds=1e-5)
@@ -113,7 +120,7 @@ class Rows(Drawn):
         self.assertGreater(len(cells), squares.MOST_BARS)
         figure = self.draw(bytes_per_triangle, cells + [built("embree", "medium", node_bytes=None)])
         (axis,) = figure.axes
-        self.assertEqual(self.legend(figure), ["nodes", "leaves", "other"])
+        self.assertEqual(self.legend(figure), ["nodes", "leaves", "other", "none of these", "embree"])
         self.assertEqual(len(axis.patches), 4 * len(cells) + 1)
         alike = [built(s, c["builder"], bytes_per_triangle=99.0, peak_build_bytes=peak) for c in cells[:12] for s, peak in
                  (("kdtree", 1500), ("grid", 1500), ("octree", 1600))]

@@ -126,6 +126,15 @@ class TradeOffs(Drawn):
         self.assertEqual(len(set(variants.values())), 7)
         self.assertEqual(variants["binned_sah_reinsertion:bins=16:collapse=greedy"], variants["binned_sah:bins=16:collapse=greedy"])
 
+    def test_the_legend_names_builders_that_exist(self):
+        def names(*builders):
+            return [h.get_label() for h in trade_offs.builder_legend(builder_markers(builders))]
+
+        rounds = [f"binned_sah_reinsertion:reinsertion_rounds={n}" for n in (1, 3)]
+        self.assertEqual(names("binned_sah", *rounds), ["binned_sah", *rounds, "…_reinsertion: white dot"])
+        self.assertEqual(names("ploc", "ploc_reinsertion", "embree_low"), ["embree_low", "ploc", "…_reinsertion: white dot"])
+        self.assertEqual(names("embree_low", "low"), ["low"])
+
     def test_many_points_have_legible_names_and_numbers(self):
         for module in (build_vs_trace, memory_vs_time):
             with self.subTest(module.TITLE):
