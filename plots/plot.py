@@ -95,9 +95,9 @@ def main():
             print(report.write(results, drawn))
         elif not arguments.no_report:
             print("report.html: left as it is; it is written with all figures, without --only")
-        for line in failed:
-            print(f"error: could not be drawn: {line}", file=sys.stderr)
-        sys.exit(1 if failed else 0)
+        if failed:
+            print(f"error: could not be drawn: {'; '.join(failed)}", file=sys.stderr)
+            sys.exit(1)
     except ResultError as error:
         fail(str(error))
     except OSError as error:
