@@ -88,6 +88,7 @@ std::string run_script(const char* name, const std::vector<std::string>& argumen
   const int status = run_program(words, quiet, errors);
   if (status == 0) return fmt::print(stderr, "{}", errors), "";
   const std::string why = last_line(errors);
+  if (why.starts_with("could not be drawn: ")) return "figures that " + why;  // the others were
   return fmt::format("no plots: {}", why.empty() ? fmt::format("{} ended with status {}", name, status) : why);
 }
 
