@@ -11,7 +11,6 @@
 #include "core/error.h"
 #include "scenes/file_bytes.h"
 #include "scenes/gltf_check.h"
-#include "scenes/number_text.h"
 
 namespace arboretum {
 namespace {
@@ -137,14 +136,12 @@ void check_stl(std::string_view bytes, const std::string& path) {
   std::uint32_t triangles = 0;
   if (bytes.size() >= kHead) std::memcpy(&triangles, bytes.data() + 80, sizeof triangles);
   const bool binary = bytes.size() >= kHead && bytes.size() == kHead + kTriangle * std::size_t(triangles);
-  constexpr std::string_view kBlank = " \t\r\n";
   const std::string_view text = without_mark(bytes);
-  const std::size_t first = text.find_first_not_of(kBlank), last = text.find_last_not_of(kBlank);
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (binary || first == std::string_view::npos || !text.substr(first).starts_with("solid")) return;
-  std::string_view last_line = text.substr(0, last + 1);
-  last_line.remove_prefix(last_line.rfind('\n') + 1);
-  if (next_word(last_line) != "endsolid")
-    throw UserError(path + ": broken or truncated: its last line does not begin with 'endsolid'");
+  const std::size_t end = std::max(text.rfind("endsolid") + 1, text.rfind("end solid") + 1),
+                    facet = text.rfind("vertex") + 1;  // 0 where there is none
+  if (end == 0 || end < facet) throw UserError(path + ": broken or truncated: no 'endsolid' behind its triangles");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <sstream>
@@ -27,21 +28,19 @@ constexpr Numbers kNumbers[] = {{"Ka", 3},           {"Kd", 3},       {"Ks", 3},
                                 {"Kt", 3},           {"Ns", 1},       {"Ni", 1},      {"d", 1, 0, 1}, {"Tr", 1, 0, 1},
                                 {"illum", 1, 0, 10}, {"Pr", 1, 0, 1}, {"Pm", 1, 0, 1}};
 
-/// tinyobjloader takes what is no number, and numbers that are missing, for 0. Throws UserError.
+/// tinyobjloader takes what is no number, numbers that are missing and `-halo` for 0. Throws UserError.
 void check_line(std::string_view line, const std::string& where) {
   const std::string_view keyword = next_word(line);
-  if (keyword.starts_with("map_") && next_word(line).empty())
+  if (keyword.starts_with("map_") && line.find_first_not_of(" \t\r") == std::string_view::npos)
     throw UserError(fmt::format("{}: {} names no file", where, keyword));
   const auto* known = std::ranges::find(kNumbers, keyword, &Numbers::keyword);
   if (known == std::end(kNumbers)) return;
-  std::string_view rest = line;
-  if (keyword != "d" || next_word(rest) != "-halo") rest = line;
   for (int i = 0; i < known->count; ++i) {
-    const std::string_view word = next_word(rest);
+    const std::string_view word = next_word(line);
     float value;
     const char* const end = parse_float(word.data(), word.data() + word.size(), value);
     const bool is_number =
-        !word.empty() && end == word.data() + word.size() && (keyword != "illum" || value == float(int(value)));
+        !word.empty() && end == word.data() + word.size() && (keyword != "illum" || value == std::trunc(value));
     if (!is_number) {
       throw UserError(word.empty() ? fmt::format("{}: {} needs {}", where, keyword,
                                                  known->count == 3 ? "three numbers" : "a number")
@@ -59,9 +58,9 @@ void check_line(std::string_view line, const std::string& where) {
 
 void check_lines(std::string_view text, const std::filesystem::path& path) {
   for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     check_line(text.substr(0, end), fmt::format("{}:{}", path.string(), number));
-    text.remove_prefix(std::min(end + 1, text.size()));
+    text.remove_prefix(std::min(end + (text.substr(end).starts_with("\r\n") ? 2 : 1), text.size()));
   }
 }
 

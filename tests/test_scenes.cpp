@@ -167,12 +167,16 @@ TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
       {"illum 1.5", "m.mtl:2: illum: '1.5' is no whole number"},
       {"illum 99", "m.mtl:2: illum is 99, not within 0 to 10"},
       {"  map_Kd", "m.mtl:2: map_Kd names no file"},
+      {"illum nan", "m.mtl:2: illum: 'nan' is no whole number"},
+      {"illum 1e30", "m.mtl:2: illum is 1e30, not within 0 to 10"},
+      {"d -halo 0.5", "m.mtl:2: d: '-halo' is no number"},
+      {"\rKe 1e39 0 0\r", "m.mtl:3: Ke is 1e39"},
   };
   for (const auto& [line, says] : wrong) {
     INFO(line);
     CHECK_THAT(refusal(line), Catch::Contains(says));
   }
-  for (const char* line : {"", "Kd 2 +1 .5  # bright", "d -halo 0.5", "Ns 1e3", "a_word_of_others abc", "# Ns abc"}) {
+  for (const char* line : {"", "Kd 2 +1 .5  # bright", "map_Kd #1.png", "Ns 1e3", "a_word_of_others abc", "# Ns abc"}) {
     INFO(line);
     CHECK(refusal(line) == "");
   }
@@ -372,6 +376,7 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
        "vertex 1 of 3: '0x' is not a number"},
       {"cut.stl", stl_binary().substr(0, 200), "broken or truncated"},
       {"cut_text.stl", stl_ascii().substr(0, stl_ascii().rfind("facet normal")), "broken or truncated"},
+      {"cut_word.stl", stl_ascii().substr(0, stl_ascii().rfind("endsolid")), "broken or truncated"},
       {"decimal.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1.7 2 3\n", "decimal.obj:4: '1.7' is no corner of a face"},
       {"early.obj", "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",
        "early.obj:1: face index 1 is out of range: no vertex precedes it"},
