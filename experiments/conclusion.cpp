@@ -23,12 +23,12 @@ ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outco
     fmt::print(stderr, "arboretum: {}\n", why);
     return status;
   }
-  bool report = false;
   if (draw) {
     const std::string problem = draw_plots(folder, {}, true);
     if (!problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
-    report = problem.empty();
   }
+  std::error_code ignored;
+  const bool report = draw && std::filesystem::exists(folder / "report.html", ignored);
   fmt::print("{}: {}\n", report ? "report" : "results", (folder / (report ? "report.html" : "results.json")).string());
   if (outcome.stopped) fmt::print("stopped at the first wrong answer (--fail-fast)\n");
   fmt::print("{}\n", why);

@@ -74,6 +74,9 @@ std::string last_line(std::string text) {
   return text.starts_with(kHead) ? text.substr(kHead.size()) : text;
 }
 
+/// What plot.py ends with where it drew all figures but some.
+constexpr int kSomeFailed = 3;
+
 /// Runs a script of plots/ with its arguments. One line that says why not, or empty.
 std::string run_script(const char* name, const std::vector<std::string>& arguments, bool quiet) {
   const std::filesystem::path script = data_folder() / "plots" / name;
@@ -88,7 +91,10 @@ std::string run_script(const char* name, const std::vector<std::string>& argumen
   const int status = run_program(words, quiet, errors);
   if (status == 0) return fmt::print(stderr, "{}", errors), "";
   const std::string why = last_line(errors);
-  if (why.starts_with("could not be drawn: ")) return "figures that " + why;  // the others were
+  if (status == kSomeFailed) {
+    fmt::print(stderr, "{}", std::string_view(errors).substr(0, errors.rfind("error: ")));
+    return "figures that " + why;
+  }
   return fmt::format("no plots: {}", why.empty() ? fmt::format("{} ended with status {}", name, status) : why);
 }
 

@@ -3,7 +3,7 @@
 
 The report holds at least the figures that the configuration names: where --only leaves out one of them, it stays as it is.
 
-Exit status: 0 done, 1 a figure could not be drawn (the others and the report are), 2 the folder cannot be read or a figure is unknown.
+Exit status: 0 done, 2 the folder cannot be read or a figure is unknown, 3 a figure could not be drawn (the others and the report are).
 """
 
 import argparse
@@ -81,6 +81,7 @@ def main():
             except NoData as reason:
                 # `run` hides what is written here to stdout; that a figure which somebody named is not there must be seen.
                 print(f"{name}: left out, {reason}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch)) else sys.stdout)
+                style.discard(results.folder, name)  # of a drawing before
                 drawn.append((name, module, str(reason)))
                 continue
             except Exception as error:  # noqa: BLE001  of a figure: it takes no other with it
@@ -97,7 +98,7 @@ def main():
             print("report.html: left as it is; it is written with all figures, without --only")
         if failed:
             print(f"error: could not be drawn: {'; '.join(failed)}", file=sys.stderr)
-            sys.exit(1)
+            sys.exit(3)  # 1 is Python's own, of an error that is none of a figure's
     except ResultError as error:
         fail(str(error))
     except OSError as error:

@@ -6,7 +6,7 @@ import sys
 import warnings
 
 GLYPH = re.compile(r"Glyph (\d+) .*missing from")
-told = set()
+told = set()  # texts, and characters without a glyph
 
 
 @contextlib.contextmanager
@@ -22,9 +22,8 @@ def told_in_a_line(name):
 def lines_of(name, messages):
     """The characters without a glyph as one line, any other message as its own."""
     found = [(GLYPH.match(message), " ".join(message.split())) for message in messages]
-    missing = "".join(dict.fromkeys(chr(int(glyph[1])) for glyph, _ in found if glyph))
-    new = [("glyphs", f"warning: no font here has {missing}, which figures show as boxes; fonts-noto-cjk has Chinese, Japanese and Korean")] if missing else []
-    new += [(text, f"warning: {name}: {text}") for text in dict.fromkeys(text for glyph, text in found if not glyph)]
-    lines = [line for key, line in new if key not in told]
-    told.update(key for key, _ in new)
-    return lines
+    missing = [c for c in dict.fromkeys(chr(int(glyph[1])) for glyph, _ in found if glyph) if c not in told]
+    texts = [text for text in dict.fromkeys(text for glyph, text in found if not glyph) if text not in told]
+    told.update(missing, texts)
+    lines = [f"warning: no font here has {''.join(missing)}, which figures show as boxes; fonts-noto-cjk has Chinese, Japanese and Korean"] if missing else []
+    return lines + [f"warning: {name}: {text}" for text in texts]

@@ -30,7 +30,7 @@ def square_panels(cells_of, varied, value_of, text_of, quantity, higher_is_bette
     every = [c for _, cells in cells_of for c in cells]
     across = "builder" if "builder" in varied else max(varied, key=lambda a: len({c[a] for c in every}))
     down = ["structure"] + [a for a in varied if a != across]
-    rows = rows_of(cells_of, across, down, lambda c: text_of(value_of(c)[0]))
+    rows = rows_of(cells_of, across, down, lambda c: (text_of(value_of(c)[0]), is_wrong(c)))
     row_of = {key: place for place, (_, keys) in enumerate(rows) for key in keys}
     columns = ordered((c[across] for c in every), across)
     tables = []
@@ -56,12 +56,12 @@ def square_panels(cells_of, varied, value_of, text_of, quantity, higher_is_bette
     return figure, drawn
 
 
-def rows_of(cells_of, across, down, text_of):
-    """[(name, keys of the axes `down`)], in order. Rows of a structure with the same text in every square are one."""
-    written = {}  # keys -> {(panel, column): text}
+def rows_of(cells_of, across, down, shown):
+    """[(name, keys of the axes `down`)], in order. Rows of a structure that show the same in every square are one."""
+    written = {}  # keys -> {(panel, column): shown(cell)}
     for panel_of, (_, cells) in enumerate(cells_of):
         for cell in cells:
-            written.setdefault(tuple(cell[a] for a in down), {}).setdefault((panel_of, cell[across]), text_of(cell))
+            written.setdefault(tuple(cell[a] for a in down), {}).setdefault((panel_of, cell[across]), shown(cell))
     places = [{v: i for i, v in enumerate(ordered(keys, a))} for a, keys in zip(down, zip(*written))]
     alike = {}
     for key in sorted(written, key=lambda key: [place[v] for place, v in zip(places, key)]):

@@ -221,7 +221,7 @@ class Drawing(unittest.TestCase):
         folder = Folder(rows, {"plots": ["sah_cost", "leak_picture", "build_time"]}, files=SEEN)
         (folder.path / "leak_picture.png").write_bytes(b"of an earlier run")
         done = folder.plot()
-        self.assertEqual((done.returncode, done.stderr), (1, "error: could not be drawn: leak_picture: IndexError: list index out of range\n"))
+        self.assertEqual((done.returncode, done.stderr), (3, "error: could not be drawn: leak_picture: IndexError: list index out of range\n"))
         self.assertEqual(sorted(p.stem for p in folder.path.glob("*.png")), ["build_time", "sah_cost"])
         page = (folder.path / "report.html").read_text()
         self.assertIn("Not drawn: an error of the figure&#x27;s own, IndexError: list index out of range.", page)

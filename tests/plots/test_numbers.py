@@ -76,6 +76,13 @@ class Numbers(Drawn):
         self.assertEqual([t.get_text() for t in first.texts if t.get_fontweight() == "bold"], ["10.0"])
         plt.close(figure)
 
+    def test_a_wrong_answer_is_not_in_the_row_of_a_right_one(self):
+        def cell(leaf, wrong):
+            return Cell({"scene": "bunny", "structure": "bvh8", "builder": "ploc", "leaf": leaf}, [{"rays": 10, "wrong_answers": wrong}])
+
+        rows = squares.rows_of([("bunny", [cell("triangle4", 0), cell("triangle8", 1), cell("triangle8v", 0)])], "builder", ["structure", "leaf"], lambda c: ("1.0", squares.is_wrong(c)))
+        self.assertEqual([[leaf for _, leaf in keys] for _, keys in rows], [["triangle4", "triangle8v"], ["triangle8"]])
+
     def test_squares_of_cells_that_more_than_builders_tell_apart(self):
         def cell(structure, builder, leaf, isa, cost):
             return Cell({"scene": "bunny", "structure": structure, "builder": builder, "leaf": leaf, "isa": isa, "threads": "1"}, [{"sah_cost": cost}])
