@@ -106,9 +106,7 @@ void require_writable(const std::filesystem::path& path) {
 
 std::filesystem::path regular_file(const std::filesystem::path& path) {
   const Target target = target_of(path);
-  std::error_code ignored;
-  if (target.in_place || std::filesystem::is_directory(target.path, ignored))
-    throw UserError(path.string() + ": is no file that can be written anew; name another");
+  if (target.in_place) throw UserError(path.string() + ": is no file that can be written anew; name another");
   return target.path;
 }
 

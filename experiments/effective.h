@@ -9,8 +9,8 @@ namespace arboretum {
 
 /// YAML text. Two experiments with equal texts measure the same cells in the same way.
 [[nodiscard]] std::string effective_yaml(const Experiment& experiment);
-/// 16 hexadecimal digits over effective_yaml (FNV-1a, 64 bits). Plots and the folders that scenes are found in do not
-/// count: they change nothing measured.
+/// 16 hexadecimal digits (FNV-1a, 64 bits) over what of effective_yaml changes a measured number: not plots, nor the
+/// folders that scenes are found in, whose files are told by their names and by hashes of what they hold (plan.json).
 [[nodiscard]] std::string configuration_hash(const Experiment& experiment);
 
 }  // namespace arboretum

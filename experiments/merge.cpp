@@ -15,13 +15,25 @@
 namespace arboretum {
 namespace {
 
+/// A scene without its folder and whether it may be missing, which make no other configuration.
+std::string without_folder(std::string line) {
+  for (const std::string_view kind : {"- {file: ", "- {scene: "}) {
+    if (!line.starts_with(kind)) continue;
+    if (const std::size_t slash = line.rfind('/'); slash != std::string::npos)
+      line.erase(kind.size(), slash + 1 - kind.size());
+    constexpr std::string_view kOptional = ", optional: true";
+    if (const std::size_t at = line.find(kOptional); at != std::string::npos) line.erase(at, kOptional.size());
+  }
+  return line;
+}
+
 /// The settings of an effective.yaml: its lines without indentation, comments and empty lines.
 std::vector<std::string> setting_lines(const ResultFolder& folder) {
   std::ifstream stream(folder.path / "effective.yaml");
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);) {
     const std::size_t start = line.find_first_not_of(" \t\r");
-    if (start != std::string::npos && line[start] != '#') lines.push_back(line.substr(start));
+    if (start != std::string::npos && line[start] != '#') lines.push_back(without_folder(line.substr(start)));
   }
   return lines;
 }
@@ -82,7 +94,8 @@ void refuse_different_geometry(const std::vector<ResultFolder>& parts) {
       const auto& [first, of_first] = known.try_emplace(scene, &part, hash).first->second;
       if (hash == of_first) continue;
       throw UserError(fmt::format(
-          "{} and {} were measured with different geometry of scene {} (hashes {} and {}); measure one of them anew",
+          "{} and {} were measured with different scenes called {} (geometry, camera, lights or materials: hashes {} "
+          "and {}); measure one of them anew",
           first->path.string(), part.path.string(), scene, of_first, hash));
     }
   }

@@ -8,8 +8,8 @@
 
 namespace arboretum {
 
-/// An ECMAScript regular expression without references to groups, found in a time that grows no faster than a power of
-/// its length. Throws UserError, which names `option`, for a broken or overlong one.
+/// An ECMAScript regular expression of 2000 characters at most, without references to groups, that looks ahead twice at
+/// most: found without backtracking. Throws UserError, which names `option`, for any other.
 [[nodiscard]] std::regex name_expression(const std::string& expression, std::string_view option);
 
 /// Names that `filter` finds and `skip` does not (ECMAScript regular expressions; empty: all, none).

@@ -46,7 +46,26 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
   for (const std::string& warning : report.warnings) note_(fmt::format("{}: {}", name_, warning));
 }
 
-std::string SceneData::geometry() const { return fmt::format("{:016x}", hash_of(mesh())); }
+std::string SceneData::geometry() const {
+  const auto words = [](const Vec3f& v) { return fmt::format("{} {} {} ", v.x, v.y, v.z); };
+  std::string rest;
+  if (const std::optional<Camera>& c = scene_.camera) {
+    rest += words(c->position) + words(c->look_at) + words(c->up) +
+            fmt::format("{} {} {} {} {} {} ", c->vertical_fov, c->mirror_x, c->width, c->height, c->aperture_radius,
+                        c->focus_distance);
+  }
+  for (const Light& l : scene_.lights)
+    rest += fmt::format("light {} {} ", int(l.type), l.cone_degrees) + words(l.position) + words(l.direction) +
+            words(l.intensity);
+  if (scene_.environment != Vec3f{0, 0, 0}) rest += "environment " + words(scene_.environment);
+  for (const Material& m : scene_.materials) {
+    rest += "material " + words(m.diffuse) + words(m.specular) + words(m.emission) + words(m.transmission) +
+            fmt::format("{} {} {} {} {} ", m.shininess, m.roughness, m.ior, m.opacity, m.illum);
+  }
+  std::uint64_t hash = hash_of(mesh());
+  for (unsigned char c : rest) hash = (hash ^ c) * 0x100000001b3u;
+  return fmt::format("{:016x}", hash);
+}
 
 void SceneData::note_to(NoteFunction note) {
   note_ = std::move(note);

@@ -463,7 +463,9 @@ TEST_CASE("filters keep and drop by name; a broken expression is named") {
   CHECK(plan.filtered == 4);
   CHECK(error_of([&] { apply_filter(plan, "(", ""); }).find("no regular expression") != std::string::npos);
   CHECK(error_of([&] { apply_filter(plan, "(a)\\1", ""); }).find("references to groups") != std::string::npos);
-  CHECK(error_of([&] { apply_filter(plan, std::string(100000, 'a'), ""); }).find("too long") != std::string::npos);
+  CHECK(error_of([&] { apply_filter(plan, std::string(2001, 'a'), ""); }).find("too long") != std::string::npos);
+  CHECK(error_of([&] { apply_filter(plan, std::string(2000, '('), ""); }).find("check brackets") != std::string::npos);
+  CHECK(error_of([&] { apply_filter(plan, "(?=.*(?=.*(?!.*b)))", ""); }).find("looks ahead") != std::string::npos);
   apply_filter(plan, "", "(((((.*)*)*)*)*)*~");  // without backtracking: at once
 }
 

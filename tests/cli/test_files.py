@@ -35,7 +35,7 @@ class Files(CommandLineCase):
         self.assertEqual(self.model("--out", "out", "--filter", "bvh2").returncode, 0)
         before = self.contents("out")
         self.write("model.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
-        self.assert_error(self.model("--out", "out", "--resume"), "model.yaml:1: scene model has other geometry than out")
+        self.assert_error(self.model("--out", "out", "--resume"), "model.yaml:1: scene model is not what out was measured with")
         self.assertEqual(self.contents("out"), before)
         self.write("model.obj", CUBE + "# a comment changes no triangle\n")
         self.assertEqual(self.model("--out", "out", "--resume").returncode, 0)
@@ -47,12 +47,29 @@ class Files(CommandLineCase):
         self.write("model.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
         self.assertEqual(self.model("--out", "out", "--resume").returncode, 0)
 
+    def test_a_scene_file_with_another_camera_is_another_scene(self):
+        self.write("model.obj", CUBE)
+        scene = "name: yard\nmeshes: [{file: model.obj}]\ncamera: {position: [%s, 2, 5], look_at: [0, 0, 0]}\n"
+        config = self.write("yard.yaml", MODEL.replace("{file: model.obj}", "{scene: yard_scene.yaml}"))
+        self.write("yard_scene.yaml", scene % 1)
+        self.assertEqual(self.call("run", config, "--no-plots", "--out", "out", "--filter", "bvh2").returncode, 0)
+        self.write("yard_scene.yaml", scene % 3)
+        self.assert_error(self.call("run", config, "--no-plots", "--out", "out", "--resume"), "scene yard is not what out was measured with (geometry, camera")
+
+    def test_parts_that_found_a_scene_in_different_folders_merge(self):
+        for place, shard in (("here", "1/2"), ("there", "2/2")):
+            (self.folder / place).mkdir()
+            self.write(f"{place}/model.obj", CUBE)
+            config = self.write(f"{place}/model.yaml", MODEL)
+            self.assertEqual(self.call("run", config, "--no-plots", "--shard", shard, "--out", f"out_{place}").returncode, 0)
+        self.assertEqual(self.call("merge", "both", "out_here", "out_there", "--no-plots").returncode, 0)
+
     def test_parts_of_different_geometry_do_not_merge(self):
         self.write("model.obj", CUBE)
         self.assertEqual(self.model("--shard", "1/2", "--out", "a").returncode, 0)
         self.write("model.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
         self.assertEqual(self.model("--shard", "2/2", "--out", "b").returncode, 0)
-        self.assert_error(self.call("merge", "both", "a", "b", "--no-plots"), "a and b were measured with different geometry of scene model")
+        self.assert_error(self.call("merge", "both", "a", "b", "--no-plots"), "a and b were measured with different scenes called model")
         self.assertFalse((self.folder / "both").exists())
         self.write("model.obj", CUBE)
         self.assertEqual(self.model("--shard", "2/2", "--out", "b").returncode, 0)
