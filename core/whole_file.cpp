@@ -75,7 +75,7 @@ void cannot_write(const std::filesystem::path& path, int error, std::string_view
                         : "name a file in a folder that exists and may be written to"));
 }
 
-void write_whole(const std::filesystem::path& path, std::string_view text) {
+void write_whole(const std::filesystem::path& path, std::string_view text, std::string_view goes_on) {
   const Target target = target_of(path);
   if (target.in_place) return write_in_place(target, text, path);
   std::filesystem::path beside = target.path;
@@ -87,7 +87,7 @@ void write_whole(const std::filesystem::path& path, std::string_view text) {
   if (error == 0 && ::rename(beside.c_str(), target.path.c_str()) != 0) error = errno;
   if (error != 0) {
     ::unlink(beside.c_str());
-    cannot_write(path, error);
+    cannot_write(path, error, goes_on);
   }
 }
 

@@ -18,8 +18,6 @@
 namespace arboretum {
 namespace {
 
-constexpr std::string_view kGoesOn = " (a run goes on with --resume)";
-
 /// Bytes up to and with the last newline.
 off_t whole_lines(int descriptor, const std::filesystem::path& path) {
   struct stat status {};

@@ -10,6 +10,9 @@
 
 namespace arboretum {
 
+/// What the message of a full disk says of a run's files.
+inline constexpr std::string_view kGoesOn = " (a run goes on with --resume)";
+
 /// A file of lines that only grows. Each line is handed to the operating system at once, so that a killed
 /// process loses no line that it had appended.
 class AppendFile {

@@ -168,8 +168,8 @@ std::filesystem::path default_folder(const Experiment& experiment, const Shard& 
 
 void write_results(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan,
                    const Json& context, const BenchmarkFlags& flags) {
-  write_whole(folder / "results.json", results_json(outcome, plan, context));
-  write_whole(folder / "results.csv", results_csv(outcome));
+  write_whole(folder / "results.json", results_json(outcome, plan, context), kGoesOn);
+  write_whole(folder / "results.csv", results_csv(outcome), kGoesOn);
   const auto text = [&](const std::string& format, bool aggregates_only) {
     const ResultForm form{.aggregates_only = aggregates_only, .time_unit = flags.time_unit};
     return format == "csv" ? results_csv(outcome, form) : results_json(outcome, plan, context, form);

@@ -187,7 +187,7 @@ class Runner {
                     {"width", m.width},
                     {"height", m.height},
                     {"points", picture_points(data.seen_pixels(workload), kMostSeenPoints)}};
-    write_whole(journal_.folder() / seen_points_file(data.name()), file.dump() + "\n");
+    write_whole(journal_.folder() / seen_points_file(data.name()), file.dump() + "\n", kGoesOn);
   }
 
   void run_builds(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {
