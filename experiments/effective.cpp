@@ -4,7 +4,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cstdint>
+
+#include "experiments/fnv.h"
 
 namespace arboretum {
 namespace {
@@ -134,9 +135,7 @@ std::string text(const Experiment& e, bool whole) {
 std::string effective_yaml(const Experiment& experiment) { return text(experiment, true); }
 
 std::string configuration_hash(const Experiment& experiment) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (unsigned char c : text(experiment, false)) hash = (hash ^ c) * 0x100000001b3u;
-  return fmt::format("{:016x}", hash);
+  return fmt::format("{:016x}", fnv1a(text(experiment, false)));
 }
 
 }  // namespace arboretum

@@ -5,15 +5,10 @@
 #include <cstdint>
 
 #include "core/random.h"
+#include "experiments/fnv.h"
 
 namespace arboretum {
 namespace {
-
-std::uint64_t seed_of(const std::string& name) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (unsigned char c : name) hash = (hash ^ c) * 0x100000001b3u;
-  return hash;
-}
 
 double resampled_median(const std::vector<double>& values, std::uint64_t seed, std::size_t i,
                         std::vector<double>& picked) {
@@ -26,7 +21,7 @@ double resampled_median(const std::vector<double>& values, std::uint64_t seed, s
 }  // namespace
 
 Replicates log_ratios(const std::string& name, const std::vector<double>& a, const std::vector<double>& b) {
-  const std::uint64_t seed = seed_of(name);
+  const std::uint64_t seed = fnv1a(name);
   Replicates logs(kResamples);
   std::vector<double> picked;
   for (std::size_t i = 0; i < kResamples; ++i)

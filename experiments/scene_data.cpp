@@ -7,6 +7,7 @@
 
 #include "core/timer.h"
 #include "experiments/exclusion.h"
+#include "experiments/fnv.h"
 #include "experiments/sampling.h"
 #include "rendering/hard_workload.h"
 #include "scenes/sanitise.h"
@@ -62,9 +63,7 @@ std::string SceneData::geometry() const {
     rest += "material " + words(m.diffuse) + words(m.specular) + words(m.emission) + words(m.transmission) +
             fmt::format("{} {} {} {} {} ", m.shininess, m.roughness, m.ior, m.opacity, m.illum);
   }
-  std::uint64_t hash = hash_of(mesh());
-  for (unsigned char c : rest) hash = (hash ^ c) * 0x100000001b3u;
-  return fmt::format("{:016x}", hash);
+  return fmt::format("{:016x}", fnv1a(rest, hash_of(mesh())));
 }
 
 void SceneData::note_to(NoteFunction note) {

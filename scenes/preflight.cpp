@@ -140,7 +140,7 @@ void check_stl(std::string_view bytes, const std::string& path) {
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (binary || first == std::string_view::npos || !text.substr(first).starts_with("solid")) return;
   const std::size_t end = std::max(text.rfind("endsolid") + 1, text.rfind("end solid") + 1),
-                    facet = text.rfind("vertex") + 1;  // 0 where there is none
+                    facet = text.rfind("facet normal") + 1;  // 0 where there is none
   if (end == 0 || end < facet) throw UserError(path + ": broken or truncated: no 'endsolid' behind its triangles");
 }
 

@@ -146,6 +146,15 @@ TEST_CASE("OBJ: polygons, negative indices, materials, line ends, exact decimals
   CHECK_THAT(scene.report.warnings[0], Catch::Contains("a.obj:12: no material 'missing'"));
 }
 
+TEST_CASE("STL of text: a name may be any word, and the solid may end where it likes") {
+  const Folder folder;
+  const std::string stl = stl_ascii(), body = stl.substr(stl.find('\n'), stl.rfind("endsolid") - stl.find('\n'));
+  for (const std::string end : {"endsolid vertex\n", "endsolid", "end solid"}) {
+    INFO(end);
+    CHECK(error_of([&] { (void)load_file(folder.write("a.stl", "solid vertex" + body + end)); }) == "");
+  }
+}
+
 TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
   const Folder folder;
   const fs::path model = folder.write("a.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
