@@ -99,8 +99,9 @@ def draw_workloads(points):
         if (value := value_of(cell, name)) is not None:
             shown.setdefault((cell["scene"], (cell["workload"], cell["isa"])), []).append((cell, time, value))
     figure, axes = panel_grid(shown, places, 4.2, 3.1, columns_of(isas))
+    values = [v for here in shown.values() for *_, v in here]
     for place, axis in axes.items():
-        panel(axis, shown[place], [v for here in shown.values() for *_, v in here], [t for _, t, _ in shown[place]], markers)
+        panel(axis, shown[place], values, [t for _, t, _ in shown[place]], markers)
         axis.set_xlabel("time, ns a ray")
         axis.set_ylabel(label)
     if said:
