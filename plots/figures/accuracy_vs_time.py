@@ -2,6 +2,8 @@
 answers and of the error of t, for each scene and instruction set. Otherwise that of each workload's own rays, a panel a scene, workload and
 instruction set. A panel that would show no point is left out."""
 
+from textwrap import fill
+
 from figures.trade_offs import step_front
 from results import HARD_PREFIX, NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_legend, marker_map, panel_grid
@@ -105,7 +107,7 @@ def draw_workloads(points):
         axis.set_xlabel("time, ns a ray")
         axis.set_ylabel(label)
     if said:
-        figure.suptitle(said, fontsize=11)
+        figure.suptitle(fill(said, int(9 * figure.get_size_inches()[0])), fontsize=11)
     add_legends(figure, [c for c, _ in points], markers)
     return figure
 
