@@ -15,12 +15,16 @@ struct FrameTime {
   float weight = 0.0f;
 };
 
-/// `frames` key frames stand equally spaced over [0, 1]; a time outside is taken as the nearer end, NaN as 0.
+/// A time outside [0, 1] is the nearer end, NaN is 0.
+[[nodiscard]] inline float within_frames(float time) noexcept {
+  return time > 0.0f ? (time < 1.0f ? time : 1.0f) : 0.0f;
+}
+
+/// `frames` key frames stand equally spaced over [0, 1]; other times are taken as within_frames() says.
 /// position - frame is exact, so the weight is off by the rounding of time * (frames - 1) alone.
 [[nodiscard]] inline FrameTime frame_at(float time, std::size_t frames) noexcept {
   if (frames < 2) return {};
-  const float within = time > 0.0f ? (time < 1.0f ? time : 1.0f) : 0.0f;
-  const float position = within * float(frames - 1);
+  const float position = within_frames(time) * float(frames - 1);
   const auto last = std::uint32_t(frames - 2);
   const std::uint32_t frame = std::uint32_t(position) < last ? std::uint32_t(position) : last;
   return {frame, position - float(frame)};

@@ -31,7 +31,7 @@ namespace {
 using Bytes = std::span<const std::byte>;
 using Crc64 = boost::crc_optimal<64, 0x42f0e1eba9ea3693u, ~std::uint64_t{0}, ~std::uint64_t{0}, true, true>;
 
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::uint32_t kByteOrder = 0x01020304;
 constexpr std::array<char, 8> kMagic{'a', 'r', 'b', 'o', 't', 'r', 'e', 'e'};
 

@@ -244,9 +244,9 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
   }
   SECTION("another version, another byte order") {
     std::string changed = whole;
-    changed[8] = 3;
+    changed[8] = 4;
     write(other, changed);
-    CHECK(has(refusal("bvh4", mesh, settings, other), "is of format version 3, this build reads version 2"));
+    CHECK(has(refusal("bvh4", mesh, settings, other), "is of format version 4, this build reads version 3"));
     changed = whole;
     std::reverse(changed.begin() + 12, changed.begin() + 16);
     write(other, changed);

@@ -69,6 +69,17 @@ struct CompiledLeaves {
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
 
+/// What leaves keep for a ray of that time, which only those whose triangles move look at.
+template <class Leaves>
+ARBORETUM_INLINE typename Leaves::RayData prepare_at(const Leaves& leaves, const Ray& ray,
+                                                     [[maybe_unused]] float time) {
+  if constexpr (requires { leaves.prepare(ray, time); }) {
+    return leaves.prepare(ray, time);
+  } else {
+    return leaves.prepare(ray);
+  }
+}
+
 /// Of any hit a ray's visit of a leaf: counted up to the block that ends it.
 template <class Leaves, class RayData, class Counting>
 ARBORETUM_INLINE bool any_hit_in_leaf(const Leaves& leaves, RayData& data, [[maybe_unused]] const LeafForm& form,

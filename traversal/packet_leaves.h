@@ -18,8 +18,8 @@ class PacketLeaves {
   static constexpr int kMost = LaneRays::kMost;
   using Mask = std::uint64_t;
 
-  PacketLeaves(const KernelRow& row, const Vec3f* vertices, Counting counting)
-      : leaves_(row, vertices), form_(*row.tests->form), counting_(counting) {}
+  PacketLeaves(const KernelRow& row, const Leaves& leaves, Counting counting)
+      : leaves_(leaves), form_(*row.tests->form), counting_(counting) {}
 
   [[nodiscard]] const NearestHit& best(int i) const { return best_[i]; }
   /// Of all packets so far, how often a ray went on alone.
@@ -29,15 +29,14 @@ class PacketLeaves {
   using F = vf<W>;
   static constexpr unsigned kAll = (1u << W) - 1u;
 
-  /// Traces `count` rays, 1 to kMost; their hits are then in best(). `prepare(ray_at, each)` hands these to the
+  /// Traces `rays`, 1 to kMost; their hits are then in best(). `prepare(count, ray_at, each)` hands these to the
   /// prepare() of lanes_; `traverse(mask, octant)` is called for the valid rays of each octant that has some. Where no
   /// more than `threshold` rays are in a node they may go on alone.
   template <class Prepare, class Traverse>
-  ARBORETUM_INLINE void trace(const Ray* rays, int count, int threshold, const Prepare& prepare,
-                              const Traverse& traverse) {
+  ARBORETUM_INLINE void trace(const RayBatch& rays, int threshold, const Prepare& prepare, const Traverse& traverse) {
     threshold_ = threshold;
     if constexpr (Counting::kCounting) ++counting_.counters.packets;
-    load(rays, count, prepare);
+    load(rays, prepare);
     for (unsigned octant = 0; octant < 8; ++octant) {
       Mask mask = lanes_.valid;
       for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? lanes_.negative[a] : ~lanes_.negative[a];
@@ -74,16 +73,18 @@ class PacketLeaves {
  private:
   /// None of the rays has met anything.
   template <class Prepare>
-  ARBORETUM_INLINE void load(const Ray* rays, int count, const Prepare& prepare) {
-    rays_ = rays, chunks_ = (count + W - 1) / W, active_ = ~Mask{0}, prepared_ = 0, in_lanes_ = 0;
+  ARBORETUM_INLINE void load(const RayBatch& rays, const Prepare& prepare) {
+    const int count = int(rays.size());
+    rays_ = rays.rays.data(), chunks_ = (count + W - 1) / W, active_ = ~Mask{0}, prepared_ = 0, in_lanes_ = 0;
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
-    prepare([this](int i) -> const Ray& { return rays_[i]; }, [this](int k) { prepare_lanes(k); });
+    prepare(
+        count, [this](int i) -> const Ray& { return rays_[i]; }, [this](int k) { prepare_lanes(k); });
     for (int i = 0; i < count; ++i) best_[i] = NearestHit{lanes_.t[i]};
     if constexpr (!Leaves::kRaysInLanes) {
       for (Mask rest = lanes_.valid; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);
         new (static_cast<void*>(data_ + std::size_t(i) * sizeof(RayData)))
-            std::remove_const_t<RayData>(leaves_.prepare(rays_[i]));
+            std::remove_const_t<RayData>(prepare_at(leaves_, rays_[i], rays.time(std::size_t(i))));
       }
     }
   }

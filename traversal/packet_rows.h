@@ -41,9 +41,9 @@ struct PacketBatch {
         static_cast<const typename Family::Structure&>(accel), row, Counting(counters));
     if constexpr (Counting::kCounting) packet.set_width(unsigned(register_lanes<Family>(rays_each)));
     for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
-      const int count = int(std::min(std::size_t(rays_each), rays.size() - begin));
-      packet.trace(&rays[begin], count, threshold);
-      for (int i = 0; i < count; ++i) report(begin + std::size_t(i), packet.best(i));
+      const std::size_t count = std::min(std::size_t(rays_each), rays.size() - begin);
+      packet.trace(rays.part(begin, count), threshold);
+      for (std::size_t i = 0; i < count; ++i) report(begin + i, packet.best(int(i)));
     }
     if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_packets += rays.size();
     return packet.times_alone();

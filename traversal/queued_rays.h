@@ -11,7 +11,7 @@
 //   using Target, Entry (of a ray's stack), State, Leaves;
 //   Walk(const Accel&, const KernelRow&);
 //   std::size_t stack_entries() const;
-//   void start(void* state, const Ray&, Entry* stack) const;
+//   void start(void* state, const Ray&, float time, Entry* stack) const;
 //                                      makes a State with members `best` (NearestHit) and `data` (Leaves::RayData)
 //   Target first(State&) const;
 //   static unsigned kind(Target);      0 a node, 1 a leaf, 2 nothing is left
@@ -96,7 +96,7 @@ class QueuedRays {
         continue;
       }
       Slot& s = slot_of(slot);
-      walk_.start(&s.state, ray, stack_of(slot));
+      walk_.start(&s.state, ray, rays_.time(next_), stack_of(slot));
       s.index = next_++;
       Tails(*this).route(slot, walk_.first(s.state));
       return;

@@ -28,11 +28,11 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
       : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded"), stack_(tree.stack_entries() + 1),
         single_stack_(tree) {}
 
-  /// Traces `count` rays, 1 to kMost; their hits are then in best().
-  void trace(const Ray* rays, int count, int threshold) {
+  /// Traces `rays`, 1 to kMost; their hits are then in best().
+  void trace(const RayBatch& rays, int threshold) {
     Base::trace(
-        rays, count, threshold,
-        [&](const auto& ray_at, const auto& each) {
+        rays, threshold,
+        [&](int count, const auto& ray_at, const auto& each) {
           lanes_.template prepare<W, 2>(count, ray_at, padded_, BoxPad{tree_.max_coordinate()}, each);
         },
         [&](Mask mask, unsigned octant) { traverse(mask, octant); });

@@ -31,7 +31,7 @@ class BihQueuedWalk : public ListedQueuedWalk<bih::Bih, Leaves, AnyHit> {
 
   std::size_t stack_entries() const { return tree_.stack_entries(); }
 
-  ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
+  ARBORETUM_INLINE void start(void* state, const Ray& ray, float /*time*/, Entry* stack) const {
     State& s = *new (state) State{Base::template constants<IntervalRay, 2>(ray),
                                   stack,
                                   stack,

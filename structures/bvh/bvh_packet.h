@@ -33,16 +33,17 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   using Base::best, Base::kMost, Base::set_width, Base::times_alone;
 
   BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(tree.root()),
+      : Base(row, leaves_of<Leaves>(tree, row), counting), base_(tree.base()), root_(tree.root()),
         max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"), stack_(tree.stack_entries()),
         single_stack_(tree.stack_entries()) {}
 
-  /// Traces `count` rays, 1 to kMost; their hits are then in best().
-  void trace(const Ray* rays, int count, int threshold) {
+  /// Traces `rays`, 1 to kMost; their hits are then in best().
+  void trace(const RayBatch& rays, int threshold) {
     Base::trace(
-        rays, count, threshold,
-        [&](const auto& ray_at, const auto& each) {
+        rays, threshold,
+        [&](int count, const auto& ray_at, const auto& each) {
           lanes_.template prepare<W, N>(count, ray_at, padded_, BoxPad{max_coordinate_}, each);
+          if constexpr (kMoves) times_.load(rays);
         },
         [&](Mask mask, unsigned) { traverse(mask); });
   }
@@ -53,6 +54,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::lanes_, Base::leaves_,
       Base::range, Base::rays_, Base::spread_;
   static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
+  static constexpr bool kMoves = kBoxesMove<Format>;
   using Children = vf<kLanes>;
 
   struct Entry {
@@ -81,6 +83,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     Bounds r[3], o[3];
     float unused;
     range(lanes_.first, mask, v.tnear, unused);
+    if constexpr (kMoves) range(times_.of_ray, mask, times_.first, times_.last);
     for (int a = 0; a < 3; ++a) {
       range(lanes_.r[a], mask, r[a].low, r[a].high), range(lanes_.rays.origin[a], mask, o[a].low, o[a].high);
     }
@@ -143,13 +146,22 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     v.tnear = v.tnear - t.high * (1.0f + 0x1p-20f);
   }
 
+  /// Planes k of all children; where they move, as far out as they are for any ray of the packet.
+  ARBORETUM_INLINE Children planes(const std::byte* node, unsigned k) const {
+    if constexpr (kMoves) {
+      return Format::planes(node, k, times_.first, times_.last);
+    } else {
+      return Format::planes(node, k);
+    }
+  }
+
   /// The children that some ray of the packet may meet, and where it enters them at the earliest.
   ARBORETUM_INLINE unsigned children_met(const Interval& v, const std::byte* node, float tfar, Children& entry) const {
     Children near(v.tnear), far(tfar);
     for (int a = 0; a < 3; ++a) {
       const Children low(v.r_low[a]), high(v.r_high[a]), pad(v.pad[a]);
-      const Children n = Format::planes(node, v.near[a]) - Children(v.near_origin[a]);
-      const Children f = Format::planes(node, unsigned(4 * a + 1) - v.near[a]) - Children(v.far_origin[a]);
+      const Children n = planes(node, v.near[a]) - Children(v.near_origin[a]);
+      const Children f = planes(node, unsigned(4 * a + 1) - v.near[a]) - Children(v.far_origin[a]);
       near = max_x86(min_x86(n * low, n * high) - pad, near);
       far = min_x86(max_x86(f * low, f * high) + pad, far);
     }
@@ -167,7 +179,11 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       const int k = c * W;
       const F rx = F::load(lanes_.r[0] + k), ry = F::load(lanes_.r[1] + k), rz = F::load(lanes_.r[2] + k);
       const auto at = [&](unsigned plane, F r, const float* c) {
-        return Format::template distance<F>(node, plane, i, r, F::load(c + k));
+        if constexpr (kMoves) {
+          return Format::template distance<F>(node, plane, i, r, F::load(c + k), F::load(times_.of_ray + k));
+        } else {
+          return Format::template distance<F>(node, plane, i, r, F::load(c + k));
+        }
       };
       const F enter = max_x86(max_x86(at(near[0], rx, lanes_.near[0]), at(near[1], ry, lanes_.near[1])),
                               max_x86(at(near[2], rz, lanes_.near[2]), F::load(lanes_.first + k)));
@@ -251,9 +267,16 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   bool alone(int i, RayData& ray, bvh::NodeReference reference, typename Counting::Depth depth) {
     const auto below = [&](auto padded) {
       const BoxRay<N, decltype(padded)::value> box(of(lanes_.r, i), of(lanes_.near, i), of(lanes_.far, i));
-      return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(
-          base_, reference, box, lanes_.first[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_,
-          counting_, depth);
+      const auto search = [&](auto... time) {
+        return trace_below<Format, Leaves, decltype(padded)::value, AnyHit>(
+            base_, reference, box, lanes_.first[i], rays_[i], leaves_, ray, best_[i], single_stack_.data(), form_,
+            counting_, depth, time...);
+      };
+      if constexpr (kMoves) {
+        return search(times_.of_ray[i]);
+      } else {
+        return search();
+      }
     };
     return padded_ ? below(std::true_type{}) : below(std::false_type{});
   }
@@ -277,10 +300,22 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     for (; mask; mask &= mask - 1) counting_.met(met.of_ray[__builtin_ctzll(mask)]);
   }
 
+  /// Where boxes move: the rays' times, within [0, 1], and between which those of an octant lie.
+  struct Times {
+    alignas(64) float of_ray[kMost];
+    float first, last;
+    void load(const RayBatch& rays) {
+      for (std::size_t i = 0; i < std::size_t(kMost); ++i)
+        of_ray[i] = within_frames(i < rays.size() ? rays.time(i) : 0.0f);
+    }
+  };
+  struct Nothing {};
+
   const std::byte* base_;
   const bvh::NodeReference root_;
   const float max_coordinate_;
   const bool padded_;
+  [[no_unique_address]] std::conditional_t<kMoves, Times, Nothing> times_;
   BatchStack<Entry, 512> stack_;
   TraversalStack single_stack_;
 };

@@ -30,14 +30,15 @@ struct SoaPacketNodes {
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
 
-/// One ray through what hangs below `root`, with what it has met already; `box` and `first` are of the packet's arrays.
-template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
+/// One ray through what hangs below `root`, with what it has met already; `box`, `first` and, where boxes move, `time`
+/// are of the packet's arrays.
+template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting, class... Time>
 __attribute__((noinline)) bool trace_below(const std::byte* base, bvh::NodeReference root,
                                            const BoxRay<Format::kBranching, Padded>& box, float first, const Ray& ray,
                                            const Leaves& leaves, typename Leaves::RayData& data, NearestHit& best,
                                            StackEntry* stack, const LeafForm& form, const Counting& counting,
-                                           typename Counting::Depth depth) {
-  typename Format::template Single<Padded> nodes(box, first, best.t);
+                                           typename Counting::Depth depth, Time... time) {
+  typename Format::template Single<Padded> nodes(box, first, best.t, time...);
   return search_bvh<AnyHit>(base, root, nodes, stack, ray, leaves, data, best, form, counting, depth);
 }
 

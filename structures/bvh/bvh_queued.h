@@ -168,9 +168,10 @@ class BvhNodeWalk {
   /// Beside what waits: the end at the bottom, and what push() writes beyond the top.
   std::size_t stack_entries() const { return stack_entries_ + kSpareEntries; }
 
-  ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
+  ARBORETUM_INLINE void start(void* state, const Ray& ray, float time, Entry* stack) const {
     stack[0] = kDone;
-    new (state) State{Nodes(ray, max_coordinate_), leaves_.prepare(ray), stack + 1, ray.tnear, NearestHit{ray.tfar}};
+    new (state) State{nodes_at<Nodes>(ray, max_coordinate_, time), prepare_at(leaves_, ray, time), stack + 1, ray.tnear,
+                      NearestHit{ray.tfar}};
   }
   ARBORETUM_INLINE Target first(const State&) const { return root_; }
   static ARBORETUM_INLINE unsigned kind(Target target) { return kind_of(target); }
@@ -210,8 +211,8 @@ class BvhNodeWalk {
 
  private:
   BvhNodeWalk(const bvh::BvhBase& tree, const KernelRow& row)
-      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()),
-        stack_entries_(tree.stack_entries()) {}
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()),
+        leaves_(leaves_of<Leaves>(tree, row)), stack_entries_(tree.stack_entries()) {}
 
   static constexpr std::size_t kSpareEntries = 6;
 

@@ -4,6 +4,7 @@
 // `Nodes` is one ray and how it meets the nodes of a format:
 //   Nodes(ray, max_coordinate): the ray's constants, its interval [tnear, tfar] among them;
 //   Nodes(box, first, last): the same where the constants are known (BoxRay), between two distances;
+//     both with the ray's time behind where kMoves says that the nodes' boxes move;
 //   kSlots: children that a node has room for; W: lanes of a test;
 //   test(node, entry): the children whose box the ray meets within its interval, as bits, and in those lanes of `entry`
 //     the distances at which it enters them, at least tnear;
@@ -17,6 +18,32 @@
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
+
+/// Of a format's node tests or packets' nodes: boxes stand where they are at a ray's time.
+template <class Nodes>
+inline constexpr bool kBoxesMove = requires {
+  Nodes::kMoves;
+};
+
+/// A ray of that time before the nodes.
+template <class Nodes>
+ARBORETUM_INLINE Nodes nodes_at(const Ray& ray, float max_coordinate, [[maybe_unused]] float time) {
+  if constexpr (kBoxesMove<Nodes>) {
+    return Nodes(ray, max_coordinate, time);
+  } else {
+    return Nodes(ray, max_coordinate);
+  }
+}
+
+/// What is beside a tree's blocks for its leaves: the mesh's vertices, or what they look for in the tree themselves.
+template <class Leaves>
+[[nodiscard]] Leaves leaves_of(const bvh::BvhBase& tree, const KernelRow& row) {
+  if constexpr (std::is_constructible_v<Leaves, const KernelRow&, const bvh::BvhBase&>) {
+    return Leaves(row, tree);
+  } else {
+    return Leaves(row, tree.vertices());
+  }
+}
 
 /// Nodes of bvh::SoaNodes<N>.
 template <int N, bool Padded>
@@ -128,9 +155,9 @@ struct BvhSingle {
         : Kernel(static_cast<const bvh::BvhBase&>(accel), row, counting) {}
 
     template <bool AnyHit>
-    ARBORETUM_INLINE bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
-      Nodes<Padded> nodes(ray, max_coordinate_);
-      typename Leaves::RayData data = leaves_.prepare(ray);
+    ARBORETUM_INLINE bool trace(const Ray& ray, float time, NearestHit& best) {
+      auto nodes = nodes_at<Nodes<Padded>>(ray, max_coordinate_, time);
+      typename Leaves::RayData data = prepare_at(leaves_, ray, time);
       const bool hit =
           search_bvh<AnyHit>(base_, root_, nodes, stack_.data(), ray, leaves_, data, best, form_, counting_);
       if constexpr (!AnyHit && !kLater) leaves_.finish(data, best);
@@ -146,8 +173,9 @@ struct BvhSingle {
 
    private:
     Kernel(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
-        : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()),
-          form_(*row.tests->form), counting_(counting), stack_(tree.stack_entries()) {}
+        : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()),
+          leaves_(leaves_of<Leaves>(tree, row)), form_(*row.tests->form), counting_(counting),
+          stack_(tree.stack_entries()) {}
 
     const std::byte* base_;
     bvh::NodeReference root_;

@@ -157,9 +157,9 @@ const StructureInfo& Bvh4Motion::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "4-wide BVH of a moving scene: boxes and triangles interpolated at the ray's time (BVH4MB)";
-    i.only_single_rays =
-        "not built: each ray has a time of its own, so a packet's rays would share visits, but each lane would "
-        "interpolate boxes and triangles anew";
+    i.no_streams =
+        "not built: a stream keeps a node's planes in registers, each plane of all children in one, for all its rays; "
+        "here each ray has a time of its own, and the planes stand elsewhere for it";
     i.builders = binary_builder_names();
     i.leaves = {Block::kName};
     i.holds_motion = i.needs_motion = true;
@@ -185,18 +185,21 @@ void Bvh4Motion::build(const TriangleMesh& mesh, const BuildSettings& settings, 
                     " MiB; its 32-bit references reach 4 GiB: use a smaller mesh");
   arena_ = Arena();
   arena_ = Arena(bytes);
-  bounds_ = {};
+  leaf_ = settings.leaf;
+  LinearBounds bounds;
   std::size_t next = 0;
-  root_ = converter.write(arena_.data(), still.root(), next, bounds_);
+  root_ = converter.write(arena_.data(), still.root(), next, bounds);
   stack_entries_ = still.stack_entries();
-  max_coordinate_ = std::max(largest_coordinate(bounds_.at0), largest_coordinate(bounds_.at1));
+  set_scene(mesh, at_half_time(bounds));
+  max_coordinate_ = std::max(largest_coordinate(bounds.at0), largest_coordinate(bounds.at1));
   report.phases.emplace_back("moving boxes", wall_seconds() - start);
 }
 
 void Bvh4Motion::archive(Archive& archive) {
   archive.expect(sizeof(Node));
-  archive(arena_, root_, stack_entries_, max_coordinate_, bounds_);
+  archive(leaf_, arena_, root_, stack_entries_, max_coordinate_, bounds_);
   mesh_ = &archive.mesh();
+  vertices_ = mesh_->vertices.data(), triangles_ = mesh_->size();
 }
 
 bool Bvh4Motion::visit(StructureVisitor& visitor) const {
@@ -205,7 +208,7 @@ bool Bvh4Motion::visit(StructureVisitor& visitor) const {
     Bounds3f bounds;
     unsigned depth;
   };
-  std::vector<Entry> stack{{root_, at_half_time(bounds_), 0}};
+  std::vector<Entry> stack{{root_, bounds_, 0}};
   std::vector<std::uint32_t> primitives;
   while (!stack.empty()) {
     const Entry e = stack.back();

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/arena.h"
 #include "core/type_list.h"
 #include "structures/accel.h"
 #include "structures/bvh/bvh.h"
@@ -32,7 +31,7 @@ struct LinearBounds {
 /// Holds the triangle at every time, as core/motion.h rounds its corners (the proof stands in bvh4_motion.cpp).
 [[nodiscard]] LinearBounds linear_bounds(const TriangleMesh& mesh, std::uint32_t triangle) noexcept;
 
-class Bvh4Motion final : public Accel {
+class Bvh4Motion final : public bvh::BvhBase {
  public:
   static constexpr std::string_view kName = "bvh4_motion";
 
@@ -43,22 +42,11 @@ class Bvh4Motion final : public Accel {
   void archive(Archive& archive) override;
   /// Boxes as they are at time 0.5.
   [[nodiscard]] bool visit(StructureVisitor& visitor) const override;
-  [[nodiscard]] std::size_t bytes() const noexcept override { return arena_.bytes(); }
-
-  [[nodiscard]] const std::byte* base() const noexcept { return arena_.data(); }
-  [[nodiscard]] bvh::NodeReference root() const noexcept { return root_; }
-  [[nodiscard]] std::size_t stack_entries() const noexcept { return stack_entries_; }
-  /// Largest |coordinate| of a box at any time.
-  [[nodiscard]] float max_coordinate() const noexcept { return max_coordinate_; }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
 
  private:
+  /// The base's bounds are those at time 0.5, its largest coordinate that of any time.
   const TriangleMesh* mesh_ = nullptr;
-  Arena arena_;
-  bvh::NodeReference root_ = 0;
-  std::size_t stack_entries_ = 1;
-  float max_coordinate_ = 0.0f;
-  LinearBounds bounds_;
 };
 
 using Structures = TypeList<Bvh4Motion>;

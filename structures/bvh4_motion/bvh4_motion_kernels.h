@@ -1,12 +1,20 @@
-// One ray of a time through the moving four-wide BVH: planes and vertices are interpolated in registers.
+// Rays of a time each through the moving four-wide BVH: planes and vertices are interpolated in registers. The ways of
+// traversal are those of the other wide BVHs (structures/bvh/), with a time beside each ray.
 //
 // Padded boxes: a plane is p + q t with |p|, |p + q| <= M, so |q| <= 2 M; computing it is off by u |q t| + u M <= 3 u M
 // (one rounding less where it is fused). Times |r| that is less than what box_test.h leaves of its pad: it needs 4 u (M
 // + |o|)|r| of 8 u (M + |o|)|r|.
+//
+// A packet's interval test takes planes where they are farthest out between its rays' first and last time. p + q t, as
+// it is computed, grows or falls with t, since rounding keeps order: it lies between its values at the two ends.
 #pragma once
 
+#include "structures/bvh/bvh_packet.h"
+#include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
+#include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -14,10 +22,15 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// One ray and a node's boxes at its time (structures/bvh/bvh_single.h).
 template <bool Padded>
 struct MovingNodeTest : SoaNodeTest<4, Padded> {
+  static constexpr bool kMoves = true;
+  static constexpr std::size_t kBytes = sizeof(bvh4_motion::Node);
+  using Base = SoaNodeTest<4, Padded>;
   vf<4> time;
 
   ARBORETUM_INLINE MovingNodeTest(const Ray& ray, float max_coordinate, float at)
-      : SoaNodeTest<4, Padded>(ray, max_coordinate), time(at) {}
+      : Base(ray, max_coordinate), time(within_frames(at)) {}
+  ARBORETUM_INLINE MovingNodeTest(const BoxRay<4, Padded>& constants, float first, float last, float at)
+      : Base(constants, first, last), time(at) {}
   ARBORETUM_INLINE unsigned test(const std::byte* node, vf<4>& entry) const {
     const auto planes = [&](unsigned offset) {
       return madd(vf<4>::load(node + offsetof(bvh4_motion::Node, motion) + offset), time, vf<4>::load(node + offset));
@@ -27,6 +40,31 @@ struct MovingNodeTest : SoaNodeTest<4, Padded> {
   static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
     return reinterpret_cast<const bvh4_motion::Node*>(node)->child;
   }
+};
+
+/// How packets read a node (structures/bvh/bvh_packet_nodes.h).
+struct MovingPacketNodes {
+  static constexpr int kBranching = 4, kLanes = 4;
+  static constexpr bool kMoves = true;
+  template <bool Padded>
+  using Single = MovingNodeTest<Padded>;
+
+  /// The farthest out between two times.
+  static ARBORETUM_INLINE vf<4> planes(const std::byte* node, unsigned k, float first, float last) {
+    const auto* n = reinterpret_cast<const bvh4_motion::Node*>(node);
+    const vf<4> p = vf<4>::load(n->planes[k]), q = vf<4>::load(n->motion[k]);
+    const vf<4> a = madd(q, vf<4>(first), p), b = madd(q, vf<4>(last), p);
+    return (k & 1u) != 0 ? max_x86(a, b) : min_x86(a, b);
+  }
+  template <class F>
+  static ARBORETUM_INLINE F distance(const std::byte* node, unsigned k, int i, F r, F c, F time) {
+    const auto* n = reinterpret_cast<const bvh4_motion::Node*>(node);
+    return plane_distance(madd(F(n->motion[k][i]), time, F(n->planes[k][i])), r, c);
+  }
+  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) {
+    return Single<true>::children(node)[i];
+  }
+  static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
 
 /// The block's triangles at a time: core/motion.h's interpolate(), lane by lane.
@@ -42,59 +80,87 @@ ARBORETUM_INLINE VertexBlock<M> posed(const IndexBlock<M>& block, const Vec3f* f
   return a;
 }
 
-/// Leaves hold indices; their vertices at the ray's time go to the intersector's tests of vertices.
-template <class Leaves, bool Padded, class Counting>
-class MotionKernel {
- public:
-  MotionKernel(const Accel& accel, const KernelRow& row, Counting counting)
-      : accel_(static_cast<const bvh4_motion::Bvh4Motion&>(accel)),
-        tests_(*find_leaf_tests(VertexBlock<4>::kName, row.intersector, kIsa)), form_(*row.tests->form),
-        counting_(counting), stack_(accel_.stack_entries()) {}
+/// Leaves (traversal/leaves.h) of indices, whose vertices at the ray's time go to the intersector's tests of vertices.
+class MovingLeaves {
+  using Block = IndexBlock<4>;
 
-  template <bool AnyHit>
-  bool trace(const Ray& ray, float time, NearestHit& best) {
-    const TriangleMesh& mesh = accel_.mesh();
-    const FrameTime at = frame_at(time, mesh.frames());
-    const Vec3f* from = mesh.frame(at.frame).data();
-    const Vec3f* to = mesh.moves() ? mesh.frame(at.frame + 1).data() : from;
-    MovingNodeTest<Padded> nodes(ray, accel_.max_coordinate(), time > 0.0f ? (time < 1.0f ? time : 1.0f) : 0.0f);
-    PreparedRay data;
-    tests_.prepare(ray, data);
-    const std::byte* const base = accel_.base();
-    const bool hit = walk_bvh<AnyHit>(base, accel_.root(), nodes, stack_.data(), best.t, counting_,
-                                      [&](bvh::NodeReference reference) {
-                                        const std::byte* const blocks = base + bvh::offset_of(reference);
-                                        const unsigned count = bvh::block_count(reference);
-                                        counting_.leaf(form_, blocks, AnyHit ? 0 : count);
-                                        const auto* block = reinterpret_cast<const IndexBlock<4>*>(blocks);
-                                        for (const auto* const end = block + count; block != end; ++block) {
-                                          const VertexBlock<4> now = posed(*block, from, to, at.weight);
-                                          const auto* bytes = reinterpret_cast<const std::byte*>(&now);
-                                          if constexpr (AnyHit) {
-                                            counting_.blocks(form_, reinterpret_cast<const std::byte*>(block), 1);
-                                            if (tests_.any_hit(data, bytes, 1, nullptr, ray.tnear, ray.tfar))
-                                              return true;
-                                          } else {
-                                            tests_.closest_hit(data, bytes, 1, nullptr, ray.tnear, best);
-                                          }
-                                        }
-                                        if constexpr (!AnyHit) nodes.shorten(best.t);
-                                        return false;
-                                      });
-    if (!AnyHit && tests_.finish && best.primitive != NearestHit::kNone) tests_.finish(data, best);
-    return hit;
+ public:
+  struct RayData {
+    PreparedRay prepared;
+    const Vec3f* from;  ///< the key frames before and behind the ray's time
+    const Vec3f* to;
+    float weight;
+  };
+  static constexpr bool kRaysInLanes = false, kBlockByBlock = false;
+  static constexpr std::size_t kBytesAhead = sizeof(Block);
+
+  MovingLeaves(const KernelRow& row, const bvh::BvhBase& tree)
+      : tests_(find_leaf_tests(VertexBlock<4>::kName, row.intersector, kIsa)),
+        mesh_(&static_cast<const bvh4_motion::Bvh4Motion&>(tree).mesh()) {}
+
+  RayData prepare(const Ray& ray, float time) const {
+    const FrameTime at = frame_at(time, mesh_->frames());
+    RayData data;
+    data.from = mesh_->frame(at.frame).data(), data.weight = at.weight;
+    data.to = mesh_->moves() ? mesh_->frame(at.frame + 1).data() : data.from;
+    tests_->prepare(ray, data.prepared);
+    return data;
+  }
+  bool closest_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, NearestHit& best) const {
+    bool nearer = false;
+    any_of(data, blocks, count, [&](const std::byte* now) {
+      nearer |= tests_->closest_hit(data.prepared, now, 1, nullptr, tnear, best);
+      return false;
+    });
+    return nearer;
+  }
+  bool any_hit(RayData& data, const std::byte* blocks, unsigned count, float tnear, float tfar) const {
+    return any_of(data, blocks, count,
+                  [&](const std::byte* now) { return tests_->any_hit(data.prepared, now, 1, nullptr, tnear, tfar); });
+  }
+  void finish(RayData& data, NearestHit& best) const {
+    if (tests_->finish && best.primitive != NearestHit::kNone) tests_->finish(data.prepared, best);
   }
 
  private:
-  const bvh4_motion::Bvh4Motion& accel_;
-  const LeafTests& tests_;
-  const LeafForm& form_;
-  Counting counting_;
-  TraversalStack stack_;
+  /// Whether test(block of vertices) is true for one of the blocks as they are at the ray's time.
+  template <class Test>
+  static ARBORETUM_INLINE bool any_of(const RayData& data, const std::byte* blocks, unsigned count, const Test& test) {
+    const auto* block = reinterpret_cast<const Block*>(blocks);
+    for (const auto* const end = block + count; block != end; ++block) {
+      const VertexBlock<4> now = posed(*block, data.from, data.to, data.weight);
+      if (test(reinterpret_cast<const std::byte*>(&now))) return true;
+    }
+    return false;
+  }
+
+  const LeafTests* tests_;
+  const TriangleMesh* mesh_;
+};
+
+/// The ways of traversal with MovingLeaves, whatever leaves they are asked for with.
+struct MovingRays {
+  template <class, bool Padded, class Counting>
+  using Kernel = typename BvhSingle<MovingNodeTest>::template Kernel<MovingLeaves, Padded, Counting>;
+  using Single = SingleRayFunctions<Kernel>;
+
+  template <class, bool Padded, bool AnyHit>
+  using Queue = QueuedRays<BvhNodeWalk<MovingNodeTest<Padded>, MovingLeaves, AnyHit>>;
+
+  struct PacketFamily : BvhPacketFamily<MovingPacketNodes> {
+    template <int W, class, bool AnyHit, class Counting>
+    using Packets = BvhPackets<MovingPacketNodes, W, MovingLeaves, AnyHit, Counting>;
+  };
 };
 
 inline void add_kernels(std::type_identity<bvh4_motion::Bvh4Motion>, KernelRows& rows) {
-  add_rows<bvh4_motion::Bvh4Motion, SingleRayFunctions<MotionKernel>>(rows, "single", TypeList<>{});
+  using Structure = bvh4_motion::Bvh4Motion;
+  using Incoherent = IncoherentInFlight<MovingRays::Queue, MovingRays::Single, 4>;
+  add_rows<Structure, MovingRays::Single>(rows, "single", TypeList<>{});
+  add_queued_rows<Structure, MovingRays::Queue, MovingRays::Single>(rows, TypeList<>{});
+  add_packet_rows<Structure, MovingRays::PacketFamily>(rows, TypeList<>{});
+  add_rows<Structure, AutoFunctions<MovingRays::PacketFamily, TypeList<>, Incoherent, MovingRays::Single, false>>(
+      rows, "auto", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

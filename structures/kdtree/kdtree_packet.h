@@ -70,15 +70,16 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   using Base::best, Base::set_width, Base::times_alone;
 
   KdPackets(const kdtree::KdTree& tree, const KernelRow& row, Counting counting)
-      : Base(row, tree.vertices(), counting), base_(tree.base()), root_(__builtin_bit_cast(std::uint64_t, tree.root())),
-        bounds_(tree.bounds()), max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f),
+      : Base(row, Leaves(row, tree.vertices()), counting), base_(tree.base()),
+        root_(__builtin_bit_cast(std::uint64_t, tree.root())), bounds_(tree.bounds()),
+        max_coordinate_(tree.max_coordinate()), pad_(row.box == "padded" ? KdRay::kPad : 0.0f),
         stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
 
-  /// Traces `count` rays, 1 to kMost; their hits are then in best().
-  void trace(const Ray* rays, int count, int threshold) {
+  /// Traces `rays`, 1 to kMost; their hits are then in best().
+  void trace(const RayBatch& rays, int threshold) {
     Base::trace(
-        rays, count, threshold,
-        [&](const auto& ray_at, const auto& each) {
+        rays, threshold,
+        [&](int count, const auto& ray_at, const auto& each) {
           lanes_.template prepare<W>(count, ray_at, pad_, max_coordinate_, each);
         },
         [&](Mask mask, unsigned octant) { traverse(mask, octant); });

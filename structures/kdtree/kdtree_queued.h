@@ -32,7 +32,7 @@ class KdQueuedWalk {
 
   std::size_t stack_entries() const { return stack_entries_; }
 
-  ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
+  ARBORETUM_INLINE void start(void* state, const Ray& ray, float /*time*/, Entry* stack) const {
     State& s = *new (state) State{KdRay(ray, max_coordinate_, pad_), stack + 1, ray.tnear, NearestHit{ray.tfar},
                                   leaves_.prepare(ray)};
     stack[0] = {kdtree::kEmptyCell, 0.0f, 0.0f};

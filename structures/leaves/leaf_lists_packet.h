@@ -18,7 +18,7 @@ class ListedPacketLeaves : protected PacketLeaves<W, Leaves, AnyHit, Counting, R
 
  protected:
   ListedPacketLeaves(const KernelRow& row, const LeafStore& store, Counting counting)
-      : Base(row, store.vertices(), counting), store_(store) {}
+      : Base(row, Leaves(row, store.vertices()), counting), store_(store) {}
 
   void leaf(LeafCode code, Mask mask) {
     const LongLeaf range = store_.range(code);

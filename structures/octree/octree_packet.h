@@ -27,11 +27,11 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
   OctreePackets(const octree::Octree& tree, const KernelRow& row, Counting counting)
       : Base(row, tree.leaves(), counting), tree_(tree), padded_(row.box == "padded") {}
 
-  /// Traces `count` rays, 1 to kMost; their hits are then in best().
-  void trace(const Ray* rays, int count, int threshold) {
+  /// Traces `rays`, 1 to kMost; their hits are then in best().
+  void trace(const RayBatch& rays, int threshold) {
     Base::trace(
-        rays, count, threshold,
-        [&](const auto& ray_at, const auto& each) {
+        rays, threshold,
+        [&](int count, const auto& ray_at, const auto& each) {
           lanes_.template prepare<W, 8>(count, ray_at, padded_, BoxPad{tree_.max_coordinate()}, each);
         },
         [&](Mask mask, unsigned octant) { traverse(mask, octant); });

@@ -33,7 +33,7 @@ class OctreeQueuedWalk : public ListedQueuedWalk<octree::Octree, Leaves, AnyHit>
 
   std::size_t stack_entries() const { return kMostOctreeCells; }
 
-  ARBORETUM_INLINE void start(void* state, const Ray& ray, Entry* stack) const {
+  ARBORETUM_INLINE void start(void* state, const Ray& ray, float /*time*/, Entry* stack) const {
     new (state) State{Base::template constants<OctreeRay, 8>(ray),
                       {{{0, 0, 0, 0}, tree_.nodes()[0], 0}, 0.0f},
                       stack,
