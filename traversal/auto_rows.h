@@ -79,17 +79,22 @@ struct AutoFunctions {
   /// tiles.
   template <class Packets, class Other>
   static void runs(RayBatch rays, float cone, const Packets& packets, const Other& other) {
-    std::size_t begin = 0, other_way = 0, next_other = kFirstOther, next_packets = kProbe;
+    // Of the rays before `begin` the last `waiting` are still to go the other way: together with what follows.
+    std::size_t begin = 0, waiting = 0, other_way = 0, next_other = kFirstOther, next_packets = kProbe;
+    const auto send_waiting = [&] {
+      if (waiting != 0) other(begin - waiting, waiting);
+      waiting = 0;
+    };
     const auto run = [&](std::size_t end, Way kind) {
       while (begin < end) {
         std::size_t count = end - begin;
         if (kind == Way::other) {
-          other(begin, count);
+          waiting += count;
         } else if (other_way != 0) {
           count = std::min(count, other_way);
-          other(begin, count);
-          other_way -= count;
+          waiting += count, other_way -= count;
         } else {
+          send_waiting();
           count = std::min(count, next_packets);
           if (float(packets(begin, count)) > kTimesAlone * float(count) && MayFallApart) {
             other_way = next_other;
@@ -110,6 +115,8 @@ struct AutoFunctions {
       if (kind == Way::any) kind = now;
       if (now == kind) {
         others = 0;
+        // Packets go while what was looked at is in the caches.
+        if (kind == Way::packets && at + kTile - begin >= kMostPackets) run(std::min(at + kTile, rays.size()), kind);
         continue;
       }
       if (others++ == 0) change = at;
@@ -118,6 +125,7 @@ struct AutoFunctions {
       kind = now, others = 0;
     }
     run(rays.size(), kind);
+    send_waiting();
   }
 
   template <class Packets, RowFunctions (*Other)(), RowFunctions (*Few)()>

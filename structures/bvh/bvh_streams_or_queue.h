@@ -14,8 +14,9 @@ namespace ARBORETUM_ISA_NAMESPACE {
 
 template <int N>
 class BvhStreamsOrQueue {
-  /// So many rays as a stream show how they share; then so many go the one way or the other until it is asked again.
-  static constexpr std::size_t kProbe = 4096, kThen = 8 * kProbe;
+  /// So many rays as a stream show how they share; then so many go the one way or the other until it is asked again,
+  /// each time that the answer is the same twice as many, and so many at most.
+  static constexpr std::size_t kProbe = 4096, kThen = 8 * kProbe, kMost = 8 * kThen;
   static constexpr float kShared = 4.5f;
   using Queue = QueuedFunctions<BvhQueue<N>::template Of, typename BvhQueue<N>::Single, 32, 64>;
 
@@ -64,13 +65,14 @@ class BvhStreamsOrQueue {
   /// rays are done.
   template <class Streams, class InFlight>
   static void run(const RayBatch& rays, const Streams& streams, const InFlight& queue) {
-    for (std::size_t begin = 0, stream_next = kProbe; begin < rays.size();) {
-      const std::size_t in_stream = std::min(stream_next, rays.size() - begin);
-      const bool shared = streams(begin, in_stream) >= kShared;
+    bool shared = false;
+    for (std::size_t begin = 0, then = kThen / 2; begin < rays.size();) {
+      const std::size_t in_stream = std::min(shared ? then : kProbe, rays.size() - begin);
+      const bool was_shared = std::exchange(shared, streams(begin, in_stream) >= kShared);
+      then = shared == was_shared ? std::min(2 * then, kMost) : kThen;
       begin += in_stream;
-      stream_next = shared ? kThen : kProbe;
       if (shared || begin == rays.size()) continue;
-      const std::size_t in_flight = std::min(kThen, rays.size() - begin);
+      const std::size_t in_flight = std::min(then, rays.size() - begin);
       queue(begin, in_flight);
       begin += in_flight;
     }
