@@ -142,6 +142,45 @@ TEST_CASE("bvh4_motion gives the answers of brute force over the mesh at the ray
   }
 }
 
+TEST_CASE("rays of many times in one batch get the bits that each gets alone, whatever the way of traversal") {
+  const TriangleMesh mesh = wandering(random_triangles(800, 0.15f, 12), 4, 0.1f, 6);
+  BuildSettings settings;
+  settings.leaf = "triangle4i", settings.isa = best_isa();
+  BuildReport report;
+  const auto accel = build_structure("bvh4_motion", mesh, settings, report);
+  // Some as they come, some beside each other towards one place, so that packets hold together; invalid ones between.
+  std::vector<Ray> rays = generic_rays(mesh, 300, 41);
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const Vec3f from{3.0f, 2.0f + 0.01f * random_float(9, i, 0), 0.01f * random_float(9, i, 1)};
+    const Vec3f to{0.5f * random_float(9, i, 2), 0.5f * random_float(9, i, 3), 0.5f};
+    rays.push_back({from, 0.0f, to - from, kInfinity});
+  }
+  for (const Ray& ray : invalid_rays()) rays.insert(rays.begin() + 350, ray);
+  std::vector<float> times;
+  for (std::uint64_t i = 0; i < rays.size(); ++i) times.push_back(random_float(8, i, 0));
+  times[3] = std::numeric_limits<float>::quiet_NaN(), times[4] = -2.0f, times[5] = 3.0f, times[400] = 7.0f;
+  std::size_t hits = 0, rows = 0;
+  for (const KernelRow& row : motion_rows()) {
+    if (row.box != "padded" || row.traversal == "single") continue;
+    const KernelRow* single = find_kernel(row.structure, row.leaf, row.intersector, row.box, "single", row.isa);
+    REQUIRE(single);
+    INFO(name_of(row));
+    const std::vector<Hit> got = closest_at(row, *accel, rays, times), want = closest_at(*single, *accel, rays, times);
+    REQUIRE(same_bits(got, want));
+    std::vector<std::uint8_t> occluded(rays.size(), 0xee);
+    row.any_hit(*accel, {rays, times}, occluded, nullptr);
+    for (std::size_t i = 0; i < rays.size(); ++i) REQUIRE(occluded[i] == std::uint8_t(want[i].is_hit()));
+    Counters counters;
+    std::vector<Hit> counted(rays.size());
+    row.closest_hit(*accel, {rays, times}, counted, &counters);
+    CHECK(same_bits(counted, want));
+    CHECK(counters.rays == rays.size());
+    hits += std::size_t(std::ranges::count_if(want, &Hit::is_hit)), ++rows;
+  }
+  CHECK(rows >= 14);
+  CHECK(hits > rows * 100);
+}
+
 TEST_CASE("the oracle answers a ray of any time as for the mesh that stands so") {
   const TriangleMesh mesh = wandering(random_triangles(300, 0.3f, 4), 4, 0.2f, 8);
   const Oracle oracle(mesh);
