@@ -35,7 +35,7 @@ struct AutoFunctions {
   /// most (docs/performance.md).
   static constexpr std::size_t kProbe = 4 * kTile, kMostPackets = 4 * kProbe, kFirstOther = 8 * kProbe,
                                kMostOther = 64 * kProbe;
-  static constexpr float kTimesAlone = 0.1f;
+  static constexpr float kTimesAlone = kRegisterWidth == 4 ? 0.15f : 0.1f;  ///< on SSE streams have less to offer
   /// So many tiles one after the other make a change: streams and packets both begin and end slowly.
   static constexpr unsigned kSwitch = 4;
   /// Smaller batches are too few to share anything; runs of tiles below the second too few for streams.
