@@ -39,6 +39,7 @@ Repetition BuildJob::measure(TimedLoop& loop) const {
       else
         known->second += seconds;
     }
+    if (accel->info().can_refit) repetition.refit_seconds += refit_structure(*accel, mesh_, cell_.threads);
   }
   return repetition;
 }

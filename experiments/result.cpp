@@ -18,7 +18,7 @@ double items(const CellResult& result) { return result.fact(result.is_trace() ? 
 double per_second(double amount, double seconds) { return seconds > 0.0 ? amount / seconds : 0.0; }
 
 /// The rates and times that change with the repetition.
-void add_measured(Json& entry, const CellResult& result, double wall, double cpu) {
+void add_measured(Json& entry, const CellResult& result, double wall, double cpu, double refit) {
   entry["real_time"] = wall * 1e3, entry["cpu_time"] = cpu * 1e3, entry["time_unit"] = "ms";
   if (result.is_trace()) {
     entry["rays_per_second"] = per_second(items(result), wall);
@@ -26,6 +26,7 @@ void add_measured(Json& entry, const CellResult& result, double wall, double cpu
   } else {
     entry["build_seconds"] = wall;
     entry["triangles_per_second"] = per_second(items(result), wall);
+    if (refit > 0.0) entry["refit_seconds"] = refit;
   }
 }
 
@@ -44,6 +45,7 @@ Json measured_fields(const Repetition& repetition) {
   json["iterations"] = repetition.iterations;
   json["wall_seconds"] = repetition.wall_seconds;
   json["cpu_seconds"] = repetition.cpu_seconds;
+  if (repetition.refit_seconds > 0.0) json["refit_wall_seconds"] = repetition.refit_seconds;
   if (!repetition.phases.empty()) {
     Json& phases = json["phase_seconds"] = Json::object();
     for (const auto& [name, seconds] : repetition.phases) phases[name] = seconds;
@@ -57,6 +59,7 @@ Repetition parse_measured_fields(const Json& json) {
   repetition.iterations = json.at("iterations").get<std::uint64_t>();
   repetition.wall_seconds = json.at("wall_seconds").get<double>();
   repetition.cpu_seconds = json.at("cpu_seconds").get<double>();
+  repetition.refit_seconds = json.value("refit_wall_seconds", 0.0);
   if (const auto phases = json.find("phase_seconds"); phases != json.end()) {
     for (const auto& [name, seconds] : phases->items()) repetition.phases.emplace_back(name, seconds.get<double>());
   }
@@ -187,7 +190,7 @@ Json repetition_entry(const CellResult& result, const Repetition& repetition) {
   entry["repetition_index"] = repetition.index;
   entry["iterations"] = repetition.iterations;
   const double n = static_cast<double>(repetition.iterations);
-  add_measured(entry, result, repetition.wall_seconds / n, repetition.cpu_seconds / n);
+  add_measured(entry, result, repetition.wall_seconds / n, repetition.cpu_seconds / n, repetition.refit_seconds / n);
   if (!repetition.phases.empty()) {
     Json& phases = entry["phase_seconds"] = Json::object();
     for (const auto& [name, seconds] : repetition.phases) phases[name] = seconds / n;
@@ -199,10 +202,10 @@ Json repetition_entry(const CellResult& result, const Repetition& repetition) {
 }
 
 std::vector<Json> aggregate_entries(const CellResult& result) {
-  std::vector<double> wall, cpu;
+  std::vector<double> wall, cpu, refit;
   for (const Repetition& r : result.repetitions) {
-    wall.push_back(r.wall_seconds / static_cast<double>(r.iterations));
-    cpu.push_back(r.cpu_seconds / static_cast<double>(r.iterations));
+    const double n = static_cast<double>(r.iterations);
+    wall.push_back(r.wall_seconds / n), cpu.push_back(r.cpu_seconds / n), refit.push_back(r.refit_seconds / n);
   }
   const auto cv = [](std::span<const double> v) { return mean(v) > 0.0 ? standard_deviation(v) / mean(v) : 0.0; };
   std::vector<Json> entries;
@@ -212,9 +215,9 @@ std::vector<Json> aggregate_entries(const CellResult& result) {
     entry["aggregate_name"] = what;
     entry["aggregate_unit"] = name == "cv" ? "percentage" : "time";
     entry["iterations"] = result.repetitions.size();
-    if (name == "mean") add_measured(entry, result, mean(wall), mean(cpu));
+    if (name == "mean") add_measured(entry, result, mean(wall), mean(cpu), mean(refit));
     if (name == "median") {
-      add_measured(entry, result, median(wall), median(cpu));
+      add_measured(entry, result, median(wall), median(cpu), median(refit));
       const Interval rate = bootstrap_median(result.rates(false)), cpu_rate = bootstrap_median(result.rates(true));
       const char* key = result.is_trace() ? "rays_per_second" : "triangles_per_second";
       entry[key] = rate.median;
@@ -248,7 +251,7 @@ Json cell_line(const CellResult& result, const std::string& configuration_hash) 
   for (const Repetition& repetition : result.repetitions) {
     Json entry = measured_fields(repetition);
     const double n = static_cast<double>(repetition.iterations);
-    add_measured(entry, result, repetition.wall_seconds / n, repetition.cpu_seconds / n);
+    add_measured(entry, result, repetition.wall_seconds / n, repetition.cpu_seconds / n, repetition.refit_seconds / n);
     list.push_back(std::move(entry));
   }
   return line;

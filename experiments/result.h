@@ -26,6 +26,7 @@ struct Repetition {
   double wall_seconds = 0.0;  ///< of all iterations
   double cpu_seconds = 0.0;   ///< of the thread; of the process where the cell has several threads
   std::vector<std::pair<std::string, double>> phases;  ///< of builds: wall seconds of all iterations
+  double refit_seconds = 0.0;  ///< of builds: wall seconds of all iterations; 0 where the structure has no refit
 };
 
 struct CellResult {

@@ -1,7 +1,5 @@
 #include "library/arboretum.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -160,7 +158,7 @@ void Tracer::save(const std::filesystem::path& file) const { save_structure(*acc
 void Tracer::refit(TriangleMesh mesh) {
   auto moved = std::make_unique<const TriangleMesh>(std::move(mesh));
   check_mesh(*moved);
-  tbb::task_arena(int(allowed_threads(settings_.threads)), 1).execute([&] { accel_->refit(*moved); });
+  refit_structure(*accel_, *moved, settings_.threads);
   mesh_ = std::move(moved);
 }
 

@@ -73,8 +73,8 @@ class Tracer {
   void save(const std::filesystem::path& file) const;
   /// Fits the structure to the same triangles with moved vertices, in `settings().threads` threads: quicker than a
   /// build, and the further the vertices moved the worse to trace. Answers are those of a structure built anew wherever
-  /// those do not depend on the structure (docs/numerics.md). Not for `kdtree`, `grid`, `octree`, `bih`, `two_level`,
-  /// `bvh4_motion` and `embree`. Throws UserError for these, for another number of triangles, for key frames, and for
+  /// those do not depend on the structure (docs/numerics.md). Wide BVHs alone can do it (StructureInfo::can_refit).
+  /// Throws UserError for others, for another number of triangles, for key frames, and for
   /// what the constructor refuses; the tracer is then as it was. No other call may run meanwhile.
   void refit(TriangleMesh mesh);
 

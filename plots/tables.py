@@ -139,7 +139,7 @@ def throughput_table(results):
             + table("throughput", heads, rows))
 
 
-STRUCTURE_COLUMNS = (("build_seconds", "build, ms", 1e3), ("triangles_per_second", "Mtri/s", 1e-6), ("sah_cost", "SAH cost", 1),
+STRUCTURE_COLUMNS = (("build_seconds", "build, ms", 1e3), ("triangles_per_second", "Mtri/s", 1e-6), ("refit_seconds", "refit, ms", 1e3), ("sah_cost", "SAH cost", 1),
                      ("sah_child_cost", "SAH, child boxes", 1), ("epo", "EPO", 1), ("lcv", "LCV", 1),
                      ("duplication", "references/triangle", 1), ("leaf_fill", "leaf fill", 1), ("nodes", "nodes", 1), ("leaves", "leaves", 1), ("depth", "depth", 1),
                      ("bytes_per_triangle", "bytes/triangle", 1), ("bytes", "MiB", 2.0**-20),

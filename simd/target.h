@@ -2,7 +2,7 @@
 //
 // A kernel unit includes every standard and baseline header first, then simd/target_begin.h, then the kernels, then
 // simd/target_end.h. What lies between is compiled for the ISA and lives in a namespace of its own, so that no inline
-// function compiled for AVX-512 can be merged by the linker into baseline code (tests/check_symbols).
+// function compiled for AVX-512 can be merged by the linker into baseline code (tests/symbols/check_symbols.py).
 #pragma once
 
 #define ARBORETUM_TARGET_SCALAR 0

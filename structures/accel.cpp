@@ -38,6 +38,14 @@ std::span<const StructureEntry> all_structures() {
   return entries;
 }
 
+void Accel::refit(const TriangleMesh&) {
+  throw UserError(std::string(info().name) + " cannot be refitted; build it anew");
+}
+
+void Accel::archive(Archive&) {
+  throw UserError(std::string(info().name) + " cannot be saved to a file; build it anew");
+}
+
 std::string why_not_below(const StructureInfo& below) {
   if (below.takes_below) return std::string(below.name) + " stands above other structures, not below one";
   if (below.build_depends_on_isa)
@@ -90,6 +98,12 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   report.cpu_seconds = process_cpu_seconds() - cpu;
   report.peak_bytes = MemoryMeter::peak() - before;
   return accel;
+}
+
+double refit_structure(Accel& accel, const TriangleMesh& mesh, unsigned threads) {
+  const double start = wall_seconds();
+  tbb::task_arena(int(allowed_threads(threads)), 1).execute([&] { accel.refit(mesh); });
+  return wall_seconds() - start;
 }
 
 }  // namespace arboretum

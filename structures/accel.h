@@ -106,6 +106,7 @@ struct StructureInfo {
   bool takes_below = false;   ///< stands above structures of another kind: BuilderParameters::below
   bool flat = false;          ///< no hierarchy: a ray looks at all of it, however many triangles there are
   bool root_is_node = false;  ///< above a single leaf, too: a grid of cells, a list of boxes
+  bool can_refit = false;     ///< Accel::refit() fits it to moved vertices; others refuse
   /// why it has no other way of traversal, where that is so: what skipped cells say
   std::string_view only_single_rays = {};
   /// why its rays do not go as streams, where they go in other ways than alone: the same
@@ -157,6 +158,8 @@ struct StructureEntry {
 [[nodiscard]] std::span<const StructureEntry> all_structures();
 /// nullptr where there is none of that name.
 [[nodiscard]] const StructureEntry* find_structure(std::string_view name);
+/// Accel::refit() with so many threads (0: all that there are). Returns wall seconds.
+double refit_structure(Accel& accel, const TriangleMesh& mesh, unsigned threads);
 /// Creates and builds, filling in the report's seconds and peak. Throws UserError for a name or setting that is not one
 /// of the structure's or do not go together, for a builder parameter out of its limits (structures/parameter_limits.h),
 /// for a mesh that moves where the structure holds one moment, and, before the clock starts, for what check_triangles()

@@ -13,14 +13,6 @@ constexpr const char* kOtherLayout =
 
 }  // namespace
 
-void Accel::refit(const TriangleMesh&) {
-  throw UserError(std::string(info().name) + " cannot be refitted; build it anew");
-}
-
-void Accel::archive(Archive&) {
-  throw UserError(std::string(info().name) + " cannot be saved to a file; build it anew");
-}
-
 void Archive::expect(std::uint64_t meaning) {
   std::uint64_t saved = meaning;
   value(saved);

@@ -156,7 +156,7 @@ void write_archive(Accel& accel, const TriangleMesh& mesh, const BuildSettings& 
     stream.write(reinterpret_cast<const char*>(&header), sizeof header);
     stream.close();
   }
-  if (!stream) throw std::runtime_error("write failed");
+  if (!stream) throw std::ios_base::failure("write failed");
 }
 
 /// No two savings have the same, whatever process and thread they are of.
@@ -231,11 +231,17 @@ void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings&
   try {
     write_archive(accel, mesh, settings, unfinished);
     std::filesystem::rename(unfinished, target);
-  } catch (const std::exception& e) {
+  } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(unfinished, ignored);
-    if (dynamic_cast<const UserError*>(&e)) throw;
-    refuse(file, "cannot be written; is the folder there, writable and not full?");
+    constexpr const char* kWhy = "cannot be written; is the folder there, writable and not full?";
+    try {
+      throw;
+    } catch (const std::system_error&) {  // of the stream or of the rename
+      refuse(file, kWhy);
+    } catch (const boost::interprocess::interprocess_exception&) {  // when it is read again for its checksum
+      refuse(file, kWhy);
+    }
   }
 }
 

@@ -54,6 +54,45 @@ TEST_CASE("reinsertion lowers the SAH cost of every builder's tree, and raises t
   CHECK(double(lowered) > 0.85 * double(trees));
 }
 
+TEST_CASE("no leaf names a triangle twice or is larger than it may be, whatever the builder splits") {
+  // Long triangles across each other: the more are split, the more come together again where leaves are merged
+  const TriangleMesh mesh = load_scene(parse_scene_word("needles:3000")).mesh;
+  struct Leaves final : StructureVisitor {
+    void node(const NodeView&) override {}
+    void leaf(const LeafView& leaf) override {
+      std::vector<std::uint32_t> ids(leaf.primitives.begin(), leaf.primitives.end());
+      std::ranges::sort(ids);
+      repeated += std::size_t(std::ranges::unique(ids).size());
+      most_blocks = std::max(most_blocks, leaf.blocks);
+      references += leaf.primitives.size();
+    }
+    std::size_t repeated = 0, references = 0;
+    unsigned most_blocks = 0;
+  };
+  std::size_t split = 0;
+  for (const StructureEntry& entry : all_structures()) {
+    const StructureInfo& info = entry.info;
+    if (info.takes_below || info.needs_motion) continue;
+    for (const std::string_view builder : info.builders) {
+      if (std::ranges::find(binary_builder_names(), builder) == binary_builder_names().end()) continue;
+      for (const unsigned most : {1u, 2u, 4u}) {
+        INFO(info.name << ", " << builder << ", max_leaf_blocks " << most);
+        BuildSettings settings;
+        settings.builder = builder, settings.leaf = "triangle4", settings.parameters.max_leaf_blocks = most;
+        settings.parameters.duplication_budget = 2.0f;
+        BuildReport report;
+        Leaves leaves;
+        if (!build_structure(info.name, mesh, settings, report)->visit(leaves)) continue;
+        CHECK(leaves.repeated == 0);
+        CHECK(leaves.most_blocks <= most);
+        CHECK(leaves.references >= mesh.size());
+        split += leaves.references > mesh.size();
+      }
+    }
+  }
+  CHECK(split > 10);
+}
+
 namespace {
 
 void append(TriangleMesh& mesh, const TriangleMesh& more) {

@@ -20,10 +20,14 @@
 
 namespace arboretum::bih {
 
-/// 12 bytes; the two children of a node stand next to each other.
-///   pair on axis k:  clip[0] the left child's upper face, clip[1] the right child's lower face, first the
-///   left child clip on axis k:  clip[0], clip[1] the lower and upper face of the one child, first leaf:
-///   clip[0] holds the bits of its LeafCode
+/// 12 bytes; the two children of a node stand next to each other. By its kind,
+///
+/// a pair on axis k: clip[0] is the left child's upper face, clip[1] the right child's lower face, first the left
+/// child;
+///
+/// a clip on axis k: clip[0] and clip[1] are the lower and the upper face of the one child, first is that child;
+///
+/// a leaf: clip[0] holds the bits of its LeafCode.
 struct Node {
   enum Kind : std::uint32_t { kPair = 0, kClip = 4, kLeaf = 3 };  ///< kPair and kClip plus the axis
   float clip[2];

@@ -152,6 +152,10 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
   const unsigned top = own_top ? found.entry->reinserted_top : p.reinsertion_top;
   const bool splits = found.reads("duplication_budget");
   require_budget(found.entry->name, mesh.size(), splits ? p.duplication_budget : 0.0f);
+  if (mesh.size() == 0) {
+    tree = {};
+    return;
+  }
 
   if (use.blocks && found.entry->in_blocks && top == 0 && !found.reinserts)
     return found.entry->in_blocks(mesh, p, leaf_width, *use.blocks, tree, report);

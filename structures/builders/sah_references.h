@@ -9,7 +9,7 @@ namespace sah {
 
 /// A vertex as four lanes, the fourth of any value; the array's last vertex is not read beyond.
 ARBORETUM_INLINE vf<4> vertex(const TriangleMesh& mesh, std::uint32_t v) {
-  if (__builtin_expect(v + 1 < mesh.vertices.size(), 1)) return vf<4>::load(&mesh.vertices[v]);
+  if (__builtin_expect(std::size_t{v} + 1 < mesh.vertices.size(), 1)) return vf<4>::load(&mesh.vertices[v]);
   const Vec3f p = mesh.vertices[v];
   const float lanes[4] = {p.x, p.y, p.z, 0.0f};
   return vf<4>::load(lanes);

@@ -126,6 +126,7 @@ const StructureInfo& WideBvh<Format>::static_info() {
     i.summary = Format::kSummary;
     i.builders = binary_builder_names();
     i.leaves = all_leaf_names();
+    i.can_refit = true;
     if constexpr (requires { Format::kNoStreams; }) i.no_streams = Format::kNoStreams;
     return i;
   }();
@@ -181,6 +182,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
     throw UserError(std::string(kName) + " with " + settings.leaf + " would take " + std::to_string(bytes >> 20) +
                     " MiB; its 32-bit references reach 4 GiB: use wider leaf blocks or a smaller mesh");
   }
+  arena_ = {};
   arena_ = wide.in_blocks ? blocks.take(node_bytes) : Arena(node_bytes);
   const Emitter<Format> emitter(mesh, form, wide, arena_.data());
   std::size_t next = nodes_begin;

@@ -4,6 +4,8 @@
 #pragma once
 
 #include "intersectors/leaf_block.h"
+#include "structures/bvh/bvh.h"
+#include "structures/grid/grid.h"
 #include "traversal/box_test.h"
 
 namespace arboretum {

@@ -156,7 +156,8 @@ void set_pads(Placed& placed, double size) {
   placed.pad_per_distance = rounded_up(magnification);
 }
 
-/// One triangle an instance, with the instance's bounds: what the top is built over. Metered.
+/// One triangle an instance, with the instance's bounds: what the top is built over, by builders that take a triangle
+/// as its box: one cut by a plane would be cut as the triangle, which stands for a box and is none. Metered.
 class BoxMesh {
  public:
   explicit BoxMesh(std::size_t count) {
@@ -289,6 +290,7 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
   BuildSettings top = settings;
   if (!has(binary_builder_names(), top.builder)) top.builder = binary_builder_names().front();
   top.leaf = kTopLeaf, top.parameters.max_leaf_blocks = 1;
+  top.parameters.duplication_budget = 0.0f;  // builders that split triangles must not (BoxMesh)
   BuildReport top_report;
   top_.build(boxes.mesh(), top, top_report);
   clock.ends("top");

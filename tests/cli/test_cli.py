@@ -196,6 +196,7 @@ class CommandLine(CommandLineCase):
                     self.assertEqual(row["cracks"], 0)
             else:
                 self.assertGreater(row["build_seconds"], 0)
+                self.assertEqual("refit_seconds" in row, row["structure"].startswith("bvh"))
         for key in ("cpu", "isa", "compiler", "git_revision", "git_dirty", "configuration_hash", "seed", "date", "memory_bytes"):
             self.assertIn(key, document["context"])
         # The revision is the program's, wherever catalogue and plot scripts are taken from.
