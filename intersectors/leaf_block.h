@@ -23,7 +23,7 @@
 //     k on that `in` names, a bit each, against triangle i: the ones inside, `again` those that it leaves to
 //     intersect();
 //   FilteredRays<W>, filter_rays<AnyHit, W>(...), PacketHits<Block>: in intersect_rays()'s place where a hit is an
-//     interval and the search has a state, which rays in lanes keep in lanes (exact.h): start(), take(), at() and
+//     interval and the search has a state, which rays in lanes keep in lanes (exact_packet.h): start(), take(), at() and
 //     corners(), bring() and take_back(). It needs Unfinished, and blocks that stay while a packet is traced;
 //   FromOrigin<M>(const Block&, Vec3f origin): a block as seen from a common origin, taken in the block's place by
 //     intersect() and intersect_rays(), with the same answers.

@@ -11,16 +11,16 @@
 // t is a mean of the vertices' depths, so its error grows with their distance, not with t: beside a large triangle a
 // ray that starts on it could meet it again. Let s be the largest less the smallest depth in units of t, R the sum of
 // the squares of all nine sheared coordinates, u = 2^-24. A sheared x or y is off by delta = u (2 L + 3 Z), or u (2 L +
-// 4 Z) unfused (exact.h), so by less than 4.5 u sqrt(R); an edge function of corners b, c then by sqrt(2) delta (|b| +
-// |c|), and by 2 u |b||c| in its own roundings. Where the ray meets the triangle, t moves by the sum of these times
-// |depth - t| over |det|: s times those of two edges at most, 15.6 u R s + 1.5 u R s. Its other roundings are under 9 u
-// max |depth| <= 9 u (s + |t|), and |det| <= R. So |error of t| < 27 u R s / |det| + 9 u |t|: all but the last, which
-// is t's own rounding, within 2^-19 R s / |det|. The products that t is a sum of may underflow besides: by less than
-// 2^-147 / |det| in all. Where these could turn t across tnear, where |det| (t - tnear) is below 2^-124, so that the
-// last is more than t's rounding, and where t is closer to tnear than 2^-10 of s and so inaccurate itself, t is
-// computed again from the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle
-// that is met only because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the
-// surface all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not.
+// 4 Z) unfused (exact_filter.h), so by less than 4.5 u sqrt(R); an edge function of corners b, c then by sqrt(2) delta
+// (|b| + |c|), and by 2 u |b||c| in its own roundings. Where the ray meets the triangle, t moves by the sum of these
+// times |depth - t| over |det|: s times those of two edges at most, 15.6 u R s + 1.5 u R s. Its other roundings are
+// under 9 u max |depth| <= 9 u (s + |t|), and |det| <= R. So |error of t| < 27 u R s / |det| + 9 u |t|: all but the
+// last, which is t's own rounding, within 2^-19 R s / |det|. The products that t is a sum of may underflow besides: by
+// less than 2^-147 / |det| in all. Where these could turn t across tnear, where |det| (t - tnear) is below 2^-124, so
+// that the last is more than t's rounding, and where t is closer to tnear than 2^-10 of s and so inaccurate itself, t
+// is computed again from the triangle's plane, in double, and kept between the nearest and the farthest corner: a
+// triangle that is met only because its corners are rounded, edge on, has its plane anywhere along the ray, and must
+// close the surface all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not.
 #pragma once
 
 #include "intersectors/sheared_packet.h"

@@ -53,8 +53,8 @@ struct RoundedDistance {
 
 /// A test that rounds to float32 is off in t by less than 328 u size^3 / |area * main|, size the largest sheared
 /// coordinate or depth, and not nearer or farther than the corners: edge functions are off by 14.5 u L (L + Z) < 29 u
-/// size^2 (intersectors/exact.h), which moves t by twice that times the corners' range of depth, 2 size; the other
-/// roundings of t are 9 u size, and |area| is under 4 size^2.
+/// size^2 (intersectors/exact_filter.h), which moves t by twice that times the corners' range of depth, 2 size; the
+/// other roundings of t are 9 u size, and |area| is under 4 size^2.
 [[nodiscard]] inline RoundedDistance rounded_distance(const Sheared& sheared, const Seen& a, const Seen& b,
                                                       const Seen& c) {
   const double u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x, area = u + v + w;

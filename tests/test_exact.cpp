@@ -3,9 +3,9 @@
 //
 // ARBORETUM_EXACT_EFFORT=100 takes a hundred times as many rays.
 //
-// What these tests see, tried by breaking intersectors/exact.h: the bound's 12.5 (14.5) made 1 gives wrong answers; so
-// do best.t left at the low end of its interval, and equal distances given to the last that comes. 12.5 made 2 is not
-// seen in the normal run.
+// What these tests see, tried by breaking intersectors/exact_filter.h: the bound's 12.5 (14.5) made 1 gives wrong
+// answers; so do best.t left at the low end of its interval, and equal distances given to the last that comes. 12.5
+// made 2 is not seen in the normal run.
 #include <cstdlib>
 #include <functional>
 #include <sstream>
