@@ -70,7 +70,8 @@ struct Facts {
 inline Facts check_tree(const BinaryTree& tree, const TriangleMesh& mesh, unsigned leaf_width, bool splits) {
   Facts facts;
   if (mesh.size() == 0) {
-    CHECK(tree.primitives.empty()), CHECK(tree.node_count == 0);
+    CHECK(tree.primitives.empty());
+    CHECK(tree.node_count == 0);
     return facts;
   }
   const auto put = [&](std::uint64_t x) { facts.hash = mix64(facts.hash ^ x); };

@@ -6,6 +6,7 @@
 #include "structures/builders/refit.h"
 #include "structures/bvh/bvh.h"
 #include "tests/catch.h"
+#include "tests/error_of.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
 
