@@ -12,6 +12,7 @@
 #include "rendering/workload.h"
 #include "scenes/layout.h"
 #include "structures/statistics.h"
+#include "structures/builders/builders.h"
 #include "structures/two_level/two_level.h"
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"
