@@ -118,9 +118,13 @@ TEST_CASE("the wide BVHs can be refitted, and what cannot says so") {
     if (entry.info.can_refit) able.insert(entry.info.name);
     BuildSettings settings;
     settings.builder = entry.info.builders.front(), settings.leaf = entry.info.leaves.front();
+    settings.isa = best_isa();
+    if (entry.info.name == "embree" && settings.isa == Isa::scalar) continue;
     BuildReport report;
     const auto accel = build_structure(entry.info.name, mesh, settings, report);
-    const std::string error = error_of([&] { CHECK(refit_structure(*accel, mesh, 1) > 0.0); });
+    double seconds = 1.0;
+    const std::string error = error_of([&] { seconds = refit_structure(*accel, mesh, 1); });
+    CHECK(seconds > 0.0);
     CHECK(error == (entry.info.can_refit ? "" : std::string(entry.info.name) + " cannot be refitted; build it anew"));
   }
   CHECK(able ==
