@@ -4,94 +4,42 @@
 
 #include <algorithm>
 #include <charconv>
-#include <span>
+#include <stdexcept>
 
 #include "structures/parameter_limits.h"
 
 namespace arboretum {
 namespace {
 
-struct Field {
-  std::string_view name;
-  ParameterLimits limits = {};
-  unsigned BuilderParameters::*integer = nullptr;
-  unsigned TraversalSettings::*setting = nullptr;  ///< of a way of traversal
-  float BuilderParameters::*real = nullptr;
-  std::string BuilderParameters::*word = nullptr;
-  std::span<const std::string_view> words = {};
-  std::span<const unsigned> choices = {};  ///< of an integer that may take no other value between low and high
-  bool has_own = setting != nullptr;       ///< `auto` is a value, and the default
-
-  /// Where has_own.
-  [[nodiscard]] unsigned& of(Parameters& all) const { return setting ? all.traversal.*setting : all.builder.*integer; }
-};
-
 constexpr std::string_view kOwn = "auto";  ///< the builder's or the way of traversal's own choice
-static_assert(BuilderParameters::kOwn == TraversalSettings::kOwn);
 
-/// What may stand below another structure, and what cannot: the plan says why not.
-std::span<const std::string_view> structure_names() {
-  static const std::vector<std::string_view> names = [] {
-    std::vector<std::string_view> list;
-    for (const StructureEntry& e : all_structures()) list.push_back(e.info.name);
-    return list;
-  }();
-  return names;
+/// f(parameter, the set that it is of) for the one of that name.
+template <class F>
+auto with(std::string_view name, Parameters& all, const F& f) {
+  for (const auto& parameter : traversal_setting_table())
+    if (parameter.name == name) return f(parameter, all.traversal);
+  for (const auto& parameter : builder_parameter_table())
+    if (parameter.name == name) return f(parameter, all.builder);
+  throw std::logic_error(fmt::format("there is no parameter {}", name));
 }
 
-const std::vector<Field>& fields() {
-  static const std::vector<Field> table{
-      {.name = "bins", .limits = kBuilderLimits.bins, .integer = &BuilderParameters::bins},
-      {.name = "traversal_cost", .limits = kBuilderLimits.traversal_cost, .real = &BuilderParameters::traversal_cost},
-      {.name = "intersection_cost",
-       .limits = kBuilderLimits.intersection_cost,
-       .real = &BuilderParameters::intersection_cost},
-      {.name = "max_leaf_blocks",
-       .limits = kBuilderLimits.max_leaf_blocks,
-       .integer = &BuilderParameters::max_leaf_blocks},
-      {.name = "morton_bits",
-       .limits = kBuilderLimits.morton_bits,
-       .integer = &BuilderParameters::morton_bits,
-       .choices = kMortonBits},
-      {.name = "ploc_radius", .limits = kBuilderLimits.ploc_radius, .integer = &BuilderParameters::ploc_radius},
-      {.name = "duplication_budget",
-       .limits = kBuilderLimits.duplication_budget,
-       .real = &BuilderParameters::duplication_budget},
-      {.name = "spatial_overlap",
-       .limits = kBuilderLimits.spatial_overlap,
-       .real = &BuilderParameters::spatial_overlap},
-      {.name = "spatial_gain", .limits = kBuilderLimits.spatial_gain, .real = &BuilderParameters::spatial_gain},
-      {.name = "reinsertion_rounds",
-       .limits = kBuilderLimits.reinsertion_rounds,
-       .integer = &BuilderParameters::reinsertion_rounds},
-      {.name = "reinsertion_top",
-       .limits = kBuilderLimits.reinsertion_top,
-       .integer = &BuilderParameters::reinsertion_top,
-       .has_own = true},
-      {.name = "empty_bonus", .limits = kBuilderLimits.empty_bonus, .real = &BuilderParameters::empty_bonus},
-      {.name = "max_depth", .limits = kBuilderLimits.max_depth, .integer = &BuilderParameters::max_depth},
-      {.name = "grid_density", .limits = kBuilderLimits.grid_density, .real = &BuilderParameters::grid_density},
-      {.name = "below", .word = &BuilderParameters::below, .words = structure_names()},
-      {.name = "collapse", .word = &BuilderParameters::collapse, .words = kCollapses},
-      {.name = "hybrid_threshold",
-       .limits = kTraversalLimits.hybrid_threshold,
-       .setting = &TraversalSettings::hybrid_threshold},
-      {.name = "rays_in_flight",
-       .limits = kTraversalLimits.rays_in_flight,
-       .setting = &TraversalSettings::rays_in_flight},
-  };
-  return table;
+/// What a word may be: where the table leaves it open, a structure's name. What cannot stand below, the plan says.
+template <class Set>
+std::vector<std::string_view> words_of(const Parameter<Set>& parameter) {
+  std::vector<std::string_view> words(parameter.words.begin(), parameter.words.end());
+  if (words.empty())
+    for (const StructureEntry& e : all_structures()) words.push_back(e.info.name);
+  return words;
 }
 
-const Field& field(std::string_view name) {
-  return *std::ranges::find_if(fields(), [&](const Field& f) { return f.name == name; });
-}
-
-std::string expectation(const Field& f) {
-  if (f.word) return fmt::format("one of {}", fmt::join(f.words, ", "));
-  if (!f.choices.empty()) return fmt::format("one of {}", fmt::join(f.choices, ", "));
-  if (f.has_own) return fmt::format("{} or an integer from {} to {}", kOwn, f.limits.low, f.limits.high);
-  return fmt::format("{} from {} to {}", f.integer ? "an integer" : "a number", f.limits.low, f.limits.high);
+/// What a value of type T may be, in words.
+template <class T, class Set>
+std::string expectation(const Parameter<Set>& p) {
+  if constexpr (std::is_same_v<T, std::string>) return fmt::format("one of {}", fmt::join(words_of(p), ", "));
+  if (!p.choices.empty()) return fmt::format("one of {}", fmt::join(p.choices, ", "));
+  if (p.has_own) return fmt::format("{} or an integer from {} to {}", kOwn, p.limits.low, p.limits.high);
+  return fmt::format("{} from {} to {}", std::is_integral_v<T> ? "an integer" : "a number", p.limits.low,
+                     p.limits.high);
 }
 
 template <class T>
@@ -107,41 +55,47 @@ bool parse_within(const std::string& text, const ParameterLimits& limits, T& out
 
 std::vector<std::string> parameter_names() {
   std::vector<std::string> names;
-  for (const Field& f : fields()) names.emplace_back(f.name);
+  for (const auto& p : builder_parameter_table()) names.emplace_back(p.name);
+  for (const auto& p : traversal_setting_table()) names.emplace_back(p.name);
   return names;
 }
 
 std::string default_parameter(std::string_view name) {
-  const BuilderParameters defaults;
-  const Field& f = field(name);
-  if (f.has_own) return std::string(kOwn);
-  if (f.word) return defaults.*f.word;
-  return f.integer ? fmt::format("{}", defaults.*f.integer) : fmt::format("{}", defaults.*f.real);
+  Parameters defaults;
+  return with(name, defaults, [](const auto& parameter, const auto& set) {
+    if (parameter.has_own) return std::string(kOwn);
+    return std::visit([&](auto member) { return fmt::format("{}", set.*member); }, parameter.member);
+  });
 }
 
 std::string set_parameter(Parameters& all, std::string_view name, const std::string& value) {
-  const Field& f = field(name);
-  BuilderParameters& parameters = all.builder;
-  bool done = false;
-  if (f.has_own) {
-    unsigned& setting = f.of(all);
-    done = value == kOwn || parse_within(value, f.limits, setting);
-    if (value == kOwn) setting = BuilderParameters::kOwn;
-  } else if (f.word) {
-    done = std::ranges::find(f.words, value) != f.words.end();
-    if (done) parameters.*f.word = value;
-  } else if (!f.choices.empty()) {
-    unsigned chosen = 0;
-    done = parse_within(value, f.limits, chosen) && std::ranges::find(f.choices, chosen) != f.choices.end();
-    if (done) parameters.*f.integer = chosen;
-  } else {
-    done = f.integer ? parse_within(value, f.limits, parameters.*f.integer)
-                     : parse_within(value, f.limits, parameters.*f.real);
-  }
-  return done ? std::string() : expectation(f);
+  return with(name, all, [&]<class Set>(const Parameter<Set>& parameter, Set& set) {
+    const auto assign = [&]<class T>(T Set::*member) {
+      T& to = set.*member;
+      bool done = false;
+      if constexpr (std::is_same_v<T, std::string>) {
+        const std::vector<std::string_view> words = words_of(parameter);
+        done = std::ranges::find(words, value) != words.end();
+        if (done) to = value;
+      } else if constexpr (std::is_same_v<T, unsigned>) {
+        const auto& choices = parameter.choices;
+        unsigned chosen = Set::kOwn;
+        done = (parameter.has_own && value == kOwn) || parse_within(value, parameter.limits, chosen);
+        done = done && (choices.empty() || std::ranges::find(choices, chosen) != choices.end());
+        if (done) to = chosen;
+      } else {
+        done = parse_within(value, parameter.limits, to);
+      }
+      return done ? std::string() : expectation<T>(parameter);
+    };
+    return std::visit(assign, parameter.member);
+  });
 }
 
-bool is_of_traversal(std::string_view name) { return field(name).setting != nullptr; }
+bool is_of_traversal(std::string_view name) {
+  return std::ranges::find(traversal_setting_table(), name, &Parameter<TraversalSettings>::name) !=
+         traversal_setting_table().end();
+}
 
 bool concerns(std::string_view name, std::string_view traversal) {
   return name == "hybrid_threshold" ? traversal.starts_with("hybrid")
@@ -150,10 +104,8 @@ bool concerns(std::string_view name, std::string_view traversal) {
 
 void reset_parameter(BuilderParameters& parameters, std::string_view name) {
   const BuilderParameters defaults;
-  const Field& f = field(name);
-  if (f.integer) parameters.*f.integer = defaults.*f.integer;
-  if (f.real) parameters.*f.real = defaults.*f.real;
-  if (f.word) parameters.*f.word = defaults.*f.word;
+  for (const auto& p : builder_parameter_table())
+    if (p.name == name) std::visit([&](auto member) { parameters.*member = defaults.*member; }, p.member);
 }
 
 void drop_label(std::string& label, std::string_view name) {

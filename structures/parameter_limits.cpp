@@ -1,9 +1,10 @@
 #include "structures/parameter_limits.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
-#include <string>
+#include <iterator>
 
 #include "core/error.h"
 #include "structures/bvh/bvh.h"
@@ -11,13 +12,54 @@
 namespace arboretum {
 namespace {
 
-static_assert(kBuilderLimits.max_leaf_blocks.high == bvh::kMaxLeafBlocks);
+constexpr std::array<unsigned, 2> kMortonBits{30, 63};
+constexpr std::array<std::string_view, 2> kCollapses{"optimal", "greedy"};
+constexpr ParameterLimits kCosts{1e-3, 1e3};
+
+using B = BuilderParameters;
+constexpr Parameter<B> kBuilderTable[] = {
+    {.name = "bins", .member = &B::bins, .limits = {4, 64}},
+    {.name = "traversal_cost", .member = &B::traversal_cost, .limits = kCosts},
+    {.name = "intersection_cost", .member = &B::intersection_cost, .limits = kCosts},
+    {.name = "max_leaf_blocks", .member = &B::max_leaf_blocks, .limits = {1, bvh::kMaxLeafBlocks}},
+    {.name = "morton_bits", .member = &B::morton_bits, .limits = {30, 63}, .choices = kMortonBits},
+    {.name = "ploc_radius", .member = &B::ploc_radius, .limits = {1, kMostPlocRadius}},
+    {.name = "duplication_budget", .member = &B::duplication_budget, .limits = {0, 4}},
+    {.name = "spatial_overlap", .member = &B::spatial_overlap, .limits = {0, 1}},
+    {.name = "spatial_gain", .member = &B::spatial_gain, .limits = {0.01, 1}},
+    {.name = "reinsertion_rounds", .member = &B::reinsertion_rounds, .limits = {1, 64}},
+    {.name = "reinsertion_top", .member = &B::reinsertion_top, .limits = {0, 65536}, .has_own = true},
+    {.name = "empty_bonus", .member = &B::empty_bonus, .limits = {0, 0.95}},
+    {.name = "max_depth", .member = &B::max_depth, .limits = {0, 63}},  // an octree's end at 21
+    {.name = "grid_density", .member = &B::grid_density, .limits = {0.01, 64}},
+    {.name = "below", .member = &B::below},
+    {.name = "collapse", .member = &B::collapse, .words = kCollapses},
+};
+
+using S = TraversalSettings;
+constexpr Parameter<S> kTraversalTable[] = {
+    {.name = "hybrid_threshold", .member = &S::hybrid_threshold, .limits = {0, S::kWidestHybrid}},
+    {.name = "rays_in_flight", .member = &S::rays_in_flight, .limits = {1, S::kMostInFlight}},
+};
+
+/// The compiler refuses these where a struct has another number of members.
+[[maybe_unused]] constexpr std::size_t members_of(const B& parameters) {
+  [[maybe_unused]] const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = parameters;
+  return 16;
+}
+[[maybe_unused]] constexpr std::size_t members_of(const S& settings) {
+  [[maybe_unused]] const auto& [a, b] = settings;
+  return 2;
+}
+static_assert(std::size(kBuilderTable) == 16 && std::size(kTraversalTable) == 2, "each member has a row");
+static_assert(B::kOwn == S::kOwn);
 
 template <class T>
 std::string text_of(T value) {
   char digits[32];
   return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
 }
+std::string text_of(std::string_view word) { return std::string(word); }
 
 template <class T>
 void require(std::string_view parameter, T value, const ParameterLimits& limits) {
@@ -26,13 +68,44 @@ void require(std::string_view parameter, T value, const ParameterLimits& limits)
                   text_of(limits.high));
 }
 
-}  // namespace
-
-void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits) {
-  require(parameter, value, limits);
+/// `value`, as it is to be shown, must be one of `choices`.
+template <class T, class Choice>
+void require_one(std::string_view parameter, const T& value, const std::string& shown,
+                 std::span<const Choice> choices) {
+  if (std::ranges::find(choices, value) != choices.end()) return;
+  std::string all;
+  for (const Choice& choice : choices) all += (all.empty() ? "neither " : " nor ") + text_of(choice);
+  throw UserError(std::string(parameter) + ": " + shown + " is " + all);
 }
 
-void require_within(std::string_view parameter, float value, const ParameterLimits& limits) {
+template <class Set>
+void check(std::span<const Parameter<Set>> table, const Set& set) {
+  for (const Parameter<Set>& parameter : table) {
+    const auto one = [&]<class T>(T Set::*member) {
+      const T& value = set.*member;
+      if constexpr (std::is_same_v<T, std::string>) {
+        if (!parameter.words.empty()) require_one(parameter.name, value, "'" + value + "'", parameter.words);
+      } else {
+        if constexpr (std::is_same_v<T, unsigned>) {
+          if (parameter.has_own && value == Set::kOwn) return;
+          if (!parameter.choices.empty()) return require_one(parameter.name, value, text_of(value), parameter.choices);
+        }
+        require(parameter.name, value, parameter.limits);
+      }
+    };
+    std::visit(one, parameter.member);
+  }
+}
+
+}  // namespace
+
+std::span<const Parameter<BuilderParameters>> builder_parameter_table() noexcept { return kBuilderTable; }
+std::span<const Parameter<TraversalSettings>> traversal_setting_table() noexcept { return kTraversalTable; }
+
+void check_parameters(const BuilderParameters& parameters) { check(builder_parameter_table(), parameters); }
+void check_settings(const TraversalSettings& settings) { check(traversal_setting_table(), settings); }
+
+void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits) {
   require(parameter, value, limits);
 }
 
@@ -40,36 +113,6 @@ void require_triangles(std::string_view structure, std::size_t triangles, std::s
   if (triangles <= most) return;
   throw UserError(std::string(structure) + " takes at most 2^" + std::to_string(std::bit_width(most)) +
                   " - 1 triangles");
-}
-
-void check_parameters(const BuilderParameters& p) {
-  constexpr const BuilderLimits& limits = kBuilderLimits;
-  require_within("bins", p.bins, limits.bins);
-  require_within("traversal_cost", p.traversal_cost, limits.traversal_cost);
-  require_within("intersection_cost", p.intersection_cost, limits.intersection_cost);
-  require_within("max_leaf_blocks", p.max_leaf_blocks, limits.max_leaf_blocks);
-  if (std::ranges::find(kMortonBits, p.morton_bits) == kMortonBits.end())
-    throw UserError("morton_bits: " + text_of(p.morton_bits) + " is neither 30 nor 63");
-  require_within("ploc_radius", p.ploc_radius, limits.ploc_radius);
-  require_within("duplication_budget", p.duplication_budget, limits.duplication_budget);
-  require_within("spatial_overlap", p.spatial_overlap, limits.spatial_overlap);
-  require_within("spatial_gain", p.spatial_gain, limits.spatial_gain);
-  require_within("reinsertion_rounds", p.reinsertion_rounds, limits.reinsertion_rounds);
-  if (p.reinsertion_top != BuilderParameters::kOwn)
-    require_within("reinsertion_top", p.reinsertion_top, limits.reinsertion_top);
-  require_within("empty_bonus", p.empty_bonus, limits.empty_bonus);
-  require_within("max_depth", p.max_depth, limits.max_depth);
-  require_within("grid_density", p.grid_density, limits.grid_density);
-  if (std::ranges::find(kCollapses, p.collapse) == kCollapses.end())
-    throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
-}
-
-void check_settings(const TraversalSettings& s) {
-  const auto check = [](std::string_view name, unsigned value, const ParameterLimits& limits) {
-    if (value != TraversalSettings::kOwn) require_within(name, value, limits);
-  };
-  check("hybrid_threshold", s.hybrid_threshold, kTraversalLimits.hybrid_threshold);
-  check("rays_in_flight", s.rays_in_flight, kTraversalLimits.rays_in_flight);
 }
 
 }  // namespace arboretum

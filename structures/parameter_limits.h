@@ -1,10 +1,12 @@
-// The limits of BuilderParameters and TraversalSettings, for the command line and for programs alike, and of meshes;
-// their checks.
+// The parameters of builders and of ways of traversal, one table each: what they are called, which values they may
+// have, where they are kept. Command line, saved structures and checks go by them. And limits of meshes.
 #pragma once
 
-#include <array>
 #include <cstddef>
+#include <span>
+#include <string>
 #include <string_view>
+#include <variant>
 
 #include "core/ray.h"
 #include "structures/accel.h"
@@ -22,41 +24,33 @@ struct ParameterLimits {
   }
 };
 
-struct BuilderLimits {
-  ParameterLimits bins{4, 64};
-  ParameterLimits traversal_cost{1e-3, 1e3}, intersection_cost{1e-3, 1e3};
-  ParameterLimits max_leaf_blocks{1, 8};
-  ParameterLimits morton_bits{30, 63};  ///< of these the ends alone: kMortonBits
-  ParameterLimits ploc_radius{1, 128};
-  ParameterLimits duplication_budget{0, 4}, spatial_overlap{0, 1}, spatial_gain{0.01, 1};
-  ParameterLimits reinsertion_rounds{1, 64}, reinsertion_top{0, 65536};  ///< the second one: or kOwn
-  ParameterLimits empty_bonus{0, 0.95};
-  ParameterLimits max_depth{0, 63};  ///< an octree's end at 21
-  ParameterLimits grid_density{0.01, 64};
+/// A member of `Set`, BuilderParameters or TraversalSettings.
+template <class Set>
+struct Parameter {
+  std::string_view name;
+  std::variant<unsigned Set::*, float Set::*, std::string Set::*> member;
+  ParameterLimits limits{};                               ///< of a number
+  std::span<const unsigned> choices{};                    ///< of a number that may have no other values
+  std::span<const std::string_view> words{};              ///< of a word; none: any, which is looked at where it is read
+  bool has_own = std::is_same_v<Set, TraversalSettings>;  ///< kOwn is a value, too, and the default
 };
-inline constexpr BuilderLimits kBuilderLimits;
-inline constexpr std::array<unsigned, 2> kMortonBits{30, 63};
-inline constexpr std::array<std::string_view, 2> kCollapses{"optimal", "greedy"};
 
-struct TraversalLimits {
-  ParameterLimits hybrid_threshold{0, TraversalSettings::kWidestHybrid};
-  ParameterLimits rays_in_flight{1, TraversalSettings::kMostInFlight};
-};
-inline constexpr TraversalLimits kTraversalLimits;
-
-/// References that a tree of two nodes each can have, numbered in 31 bits.
-inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 30) - 1;
-
-/// Throw UserError unless the limits hold `value`.
-void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits);
-void require_within(std::string_view parameter, float value, const ParameterLimits& limits);
-/// Throws UserError for more than `most` triangles, which is a power of two less one.
-void require_triangles(std::string_view structure, std::size_t triangles, std::size_t most = kMaxReferences);
+/// In the order of the members. A new one needs a row here and no other edit, but for the documents.
+[[nodiscard]] std::span<const Parameter<BuilderParameters>> builder_parameter_table() noexcept;
+[[nodiscard]] std::span<const Parameter<TraversalSettings>> traversal_setting_table() noexcept;
 
 /// Throws UserError, which names the first parameter that is out of its limits, whether or not a builder reads it. NaN
-/// is out of any. `below` is two_level's to look at.
+/// is out of any.
 void check_parameters(const BuilderParameters& parameters);
-/// As above of a way of traversal, whether or not it reads the setting; kOwn is within.
+/// As above of a way of traversal, whether or not it reads the setting.
 void check_settings(const TraversalSettings& settings);
+/// Throws UserError unless the limits hold `value`: for those that a structure has beside the table's.
+void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits);
+
+inline constexpr unsigned kMostPlocRadius = 128;
+/// References that a tree of two nodes each can have, numbered in 31 bits.
+inline constexpr std::size_t kMaxReferences = (std::size_t{1} << 30) - 1;
+/// Throws UserError for more than `most` triangles, which is a power of two less one.
+void require_triangles(std::string_view structure, std::size_t triangles, std::size_t most = kMaxReferences);
 
 }  // namespace arboretum

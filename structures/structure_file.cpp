@@ -24,6 +24,7 @@
 #include "core/instances.h"
 #include "core/whole_file.h"
 #include "structures/archive.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum {
 namespace {
@@ -87,20 +88,6 @@ StructureFileHeader header_of(const TriangleMesh& mesh) {
   header.mesh_hash = hash_of(mesh), header.mesh_vertices = mesh.vertices.size(),
   header.mesh_triangles = mesh.triangles.size();
   return header;
-}
-
-/// f(name, value) for every parameter. The compiler refuses it when BuilderParameters has one that is not named here.
-template <class F>
-void for_each_parameter(const BuilderParameters& parameters, F&& f) {
-  const auto& [bins, traversal_cost, intersection_cost, max_leaf_blocks, morton_bits, ploc_radius, duplication_budget,
-               spatial_overlap, spatial_gain, reinsertion_rounds, reinsertion_top, empty_bonus, max_depth, grid_density,
-               below, collapse] = parameters;
-  f("bins", bins), f("traversal_cost", traversal_cost), f("intersection_cost", intersection_cost),
-      f("max_leaf_blocks", max_leaf_blocks);
-  f("morton_bits", morton_bits), f("ploc_radius", ploc_radius), f("duplication_budget", duplication_budget);
-  f("spatial_overlap", spatial_overlap), f("spatial_gain", spatial_gain), f("reinsertion_rounds", reinsertion_rounds);
-  f("reinsertion_top", reinsertion_top), f("empty_bonus", empty_bonus), f("max_depth", max_depth);
-  f("grid_density", grid_density), f("below", below), f("collapse", collapse);
 }
 
 /// What of the settings' parameters the structure depends on.
@@ -169,15 +156,18 @@ std::filesystem::path unfinished_name(const std::filesystem::path& file) {
 
 std::string text_of(const BuilderParameters& parameters) {
   std::string text;
-  for_each_parameter(parameters, [&]<class T>(const char* name, const T& value) {
-    text.append(text.empty() ? "" : " ").append(name).append("=");
-    if constexpr (std::is_same_v<T, std::string>) {
-      text += value;
-    } else {
-      char digits[32];
-      text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
-    }
-  });
+  for (const Parameter<BuilderParameters>& parameter : builder_parameter_table()) {
+    text.append(text.empty() ? "" : " ").append(parameter.name).append("=");
+    const auto append = [&]<class T>(T BuilderParameters::*member) {
+      if constexpr (std::is_same_v<T, std::string>) {
+        text += parameters.*member;
+      } else {
+        char digits[32];
+        text.append(digits, std::to_chars(digits, digits + sizeof digits, parameters.*member).ptr);
+      }
+    };
+    std::visit(append, parameter.member);
+  }
   return text;
 }
 

@@ -5,6 +5,7 @@
 #include "structures/parameter_limits.h"
 #include "structures/parameters_read.h"
 #include "tests/builder_checks.h"
+#include "tests/error_of.h"
 
 using namespace arboretum;
 using namespace arboretum::test;
@@ -148,12 +149,31 @@ TEST_CASE("what is above another structure reads what that one reads; none is re
 }
 
 TEST_CASE("what is out of range is refused, with the limits") {
-  require_within("bins", 4u, kBuilderLimits.bins), require_within("bins", 64u, kBuilderLimits.bins);
-  CHECK_THROWS_WITH(require_within("bins", 3u, kBuilderLimits.bins), "bins: 3 is not within 4 .. 64");
-  CHECK_THROWS_WITH(require_within("bins", 65u, kBuilderLimits.bins), "bins: 65 is not within 4 .. 64");
-  CHECK_THROWS_WITH(require_within("x", 0.96f, {0, 0.95}), "x: 0.96 is not within 0 .. 0.95");
-  CHECK_THROWS_WITH(require_within("x", std::numeric_limits<float>::quiet_NaN(), {0, 1}),
-                    "x: nan is not within 0 .. 1");
+  const auto refusal = [](auto&& set) {
+    BuilderParameters p;
+    set(p);
+    return error_of([&] { check_parameters(p); });
+  };
+  for (const unsigned bins : {4u, 64u}) CHECK(refusal([&](auto& p) { p.bins = bins; }).empty());
+  CHECK(refusal([](auto& p) { p.bins = 3; }) == "bins: 3 is not within 4 .. 64");
+  CHECK(refusal([](auto& p) { p.bins = 65; }) == "bins: 65 is not within 4 .. 64");
+  CHECK(refusal([](auto& p) { p.bins = p.kOwn; }) == "bins: 4294967295 is not within 4 .. 64");
+  CHECK(refusal([](auto& p) { p.empty_bonus = 0.96f; }) == "empty_bonus: 0.96 is not within 0 .. 0.95");
+  CHECK(refusal([](auto& p) { p.spatial_gain = 0.01f; }).empty());
+  CHECK(refusal([](auto& p) { p.spatial_gain = std::numeric_limits<float>::quiet_NaN(); }) ==
+        "spatial_gain: nan is not within 0.01 .. 1");
+  CHECK(refusal([](auto& p) { p.morton_bits = 31; }) == "morton_bits: 31 is neither 30 nor 63");
+  CHECK(refusal([](auto& p) { p.collapse = "best"; }) == "collapse: 'best' is neither optimal nor greedy");
+  CHECK(refusal([](auto& p) { p.reinsertion_top = p.kOwn; }).empty());
+  CHECK(error_of([] {
+          require_within("octree: max_depth", 22u, {0, 21});
+        }) == "octree: max_depth: 22 is not within 0 .. 21");
+  // Every name once, and the defaults are within.
+  check_parameters({}), check_settings({});
+  std::set<std::string_view> names;
+  for (const auto& p : builder_parameter_table()) names.insert(p.name);
+  for (const auto& p : traversal_setting_table()) names.insert(p.name);
+  CHECK(names.size() == builder_parameter_table().size() + traversal_setting_table().size());
   require_triangles("bih", kMaxReferences);
   CHECK_THROWS_WITH(require_triangles("bih", kMaxReferences + 1), "bih takes at most 2^30 - 1 triangles");
   CHECK_THROWS_WITH(require_triangles("kdtree", 1u << 28, (1u << 28) - 1), "kdtree takes at most 2^28 - 1 triangles");

@@ -161,8 +161,6 @@ const StructureInfo& Bih::static_info() {
 
 void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  require_within("max_leaf_blocks", p.max_leaf_blocks, kBuilderLimits.max_leaf_blocks);
-  require_within("bins", p.bins, kBuilderLimits.bins);
   require_triangles(kName, mesh.size());
   static_cast<void>(require_leaf_form(kName, settings.leaf));
   LeafLists lists;

@@ -104,7 +104,6 @@ Found find_builder(std::string_view key) {
 }  // namespace
 
 void require_budget(std::string_view builder, std::size_t triangles, float budget) {
-  require_within("duplication_budget", budget, kBuilderLimits.duplication_budget);
   if (double(triangles) * (1.0 + double(budget)) > double(kMaxReferences)) {
     throw UserError(std::string(builder) + ": " + std::to_string(triangles) +
                     " triangles and a duplication_budget of " + std::to_string(budget) +
@@ -146,9 +145,8 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
     const std::vector<std::string> names(binary_builder_names().begin(), binary_builder_names().end());
     throw UserError(unknown_name_message("builder", settings.builder, names));
   }
-  if (found.reinserts) require_within("reinsertion_rounds", p.reinsertion_rounds, kBuilderLimits.reinsertion_rounds);
+  check_parameters(p);
   const bool own_top = p.reinsertion_top == BuilderParameters::kOwn;
-  if (!own_top) require_within("reinsertion_top", p.reinsertion_top, kBuilderLimits.reinsertion_top);
   const unsigned top = own_top ? found.entry->reinserted_top : p.reinsertion_top;
   const bool splits = found.reads("duplication_budget");
   require_budget(found.entry->name, mesh.size(), splits ? p.duplication_budget : 0.0f);

@@ -36,7 +36,7 @@ void build_binary_tree(const TriangleMesh& mesh, const BuildSettings& settings, 
                        BuildReport& report, const TreeUse& use = {});
 
 /// Throws UserError where so many triangles and, of those, a share `budget` of references more are above
-/// kMaxReferences, or the budget is not within 0 .. 4.
+/// kMaxReferences.
 void require_budget(std::string_view builder, std::size_t triangles, float budget);
 
 }  // namespace arboretum

@@ -198,8 +198,6 @@ class Lbvh {
 template <class MakeLeaves>
 void build(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
            BuildReport& report, const MakeLeaves& make_leaves) {
-  check_morton_bits(parameters.morton_bits);
-  if (mesh.size() == 0) return;
   PhaseClock phase(report);
   MortonOrder order(mesh, parameters.morton_bits, mesh.size() <= kSmall ? 21 : MortonOrder::kAtOnce);
   phase.ends("order");

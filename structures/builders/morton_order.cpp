@@ -126,14 +126,9 @@ __attribute__((always_inline)) inline void MortonCells::put_keys(const __m128 (&
   put(keys + 2, _mm_unpackhi_epi32(high, zero), _mm_unpackhi_epi32(low, zero), _mm_unpackhi_epi32(id, zero));
 }
 
-void check_morton_bits(unsigned bits) {
-  if (bits != 30 && bits != 63) throw UserError("morton_bits: " + std::to_string(bits) + " is neither 30 nor 63");
-}
-
 MortonOrder::MortonOrder(const TriangleMesh& mesh, unsigned bits, unsigned sorted)
     : boxes_(mesh), bits_(bits), sorted_(sorted), id_bits_(unsigned(std::bit_width(mesh.size()))),
       held_(std::min(bits, boxes_.are_far() ? (64 - id_bits_) / 3 * 3 : kAtOnce)), keys_(mesh.size()) {
-  check_morton_bits(bits);
   const std::size_t n = mesh.size();
   if (n == 0) return;
   // The vertices' bounds are had sooner than the centroids', and as good, unless vertices that no triangle has lie far

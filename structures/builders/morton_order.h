@@ -17,9 +17,6 @@
 
 namespace arboretum {
 
-/// Throws UserError unless `bits` is 30 or 63.
-void check_morton_bits(unsigned bits);
-
 /// Cells of a cube around (doubled) points: cells as wide on each axis make better boxes than the scene's own
 /// proportions.
 class MortonCells {

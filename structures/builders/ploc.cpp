@@ -24,7 +24,6 @@ namespace {
 constexpr std::size_t kChunk = 1u << 12;
 constexpr std::size_t kFew = 1024;       ///< with this many clusters any round is cheap
 constexpr std::size_t kLeastShare = 64;  ///< one cluster in so many has to merge
-constexpr auto kMaxRadius = unsigned(kBuilderLimits.ploc_radius.high);
 /// Triangles that may share the first bits of their codes and stand in order of their ids
 constexpr std::size_t kShortRun = 8;
 
@@ -108,7 +107,7 @@ class Ploc {
   void find_best(std::size_t begin, std::size_t end) noexcept {
     std::uint64_t key[kChunk];  // area's bits, which order as the area does, then i xor j
     std::fill(key, key + (end - begin), std::numeric_limits<std::uint64_t>::max());
-    float area[kMaxRadius];
+    float area[kMostPlocRadius];
     for (std::size_t i = begin > radius_ ? begin - radius_ : 0; i < end; ++i) {
       const std::size_t count = std::min<std::size_t>(radius_, current_.size - 1 - i);
       areas_behind(i, count, area);
@@ -184,9 +183,6 @@ class Ploc {
 
 void build_ploc(const TriangleMesh& mesh, const BuilderParameters& parameters, unsigned leaf_width, BinaryTree& tree,
                 BuildReport& report) {
-  check_morton_bits(parameters.morton_bits);
-  require_within("ploc_radius", parameters.ploc_radius, kBuilderLimits.ploc_radius);
-  if (mesh.size() == 0) return;
   PhaseClock phase(report);
   LinkedTree clusters;
   {

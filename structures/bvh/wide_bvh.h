@@ -137,10 +137,6 @@ template <class Format>
 void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   constexpr std::uint64_t kReach = std::numeric_limits<NodeReference>::max();
   const BuilderParameters& p = settings.parameters;
-  require_within("max_leaf_blocks", p.max_leaf_blocks, kBuilderLimits.max_leaf_blocks);
-  require_within("bins", p.bins, kBuilderLimits.bins);
-  if (p.collapse != "optimal" && p.collapse != "greedy")
-    throw UserError("collapse: '" + p.collapse + "' is neither optimal nor greedy");
   require_triangles(kName, mesh.size());
   const LeafForm& form = require_leaf_form(kName, settings.leaf);
 

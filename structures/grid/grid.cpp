@@ -49,7 +49,6 @@ const StructureInfo& Grid::static_info() {
 
 void Grid::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
   const BuilderParameters& p = settings.parameters;
-  require_within("grid_density", p.grid_density, kBuilderLimits.grid_density);
   require_triangles(kName, mesh.size());
   const LeafForm& form = require_leaf_form(kName, settings.leaf);
   if (settings.builder != "two_level" && settings.builder != "uniform") {

@@ -28,14 +28,6 @@ constexpr std::size_t kMostTriangles = (std::size_t{1} << 28) - 1;
   return p.max_depth != 0 ? p.max_depth : std::min(kDeepest, unsigned(8.0 + 1.3 * std::log2(double(n) + 1.0)));
 }
 
-void check(const BuilderParameters& p, const TriangleMesh& mesh) {
-  require_within("bins", p.bins, kBuilderLimits.bins);
-  require_within("max_depth", p.max_depth, {0, kDeepest});
-  require_within("empty_bonus", p.empty_bonus, kBuilderLimits.empty_bonus);
-  if (p.max_leaf_blocks < 1) throw UserError("max_leaf_blocks: 0 is not at least 1");
-  require_triangles("kdtree", mesh.size(), kMostTriangles);
-}
-
 }  // namespace
 
 const StructureInfo& KdTree::static_info() {
@@ -52,7 +44,7 @@ const StructureInfo& KdTree::static_info() {
 }
 
 void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
-  check(settings.parameters, mesh);
+  require_triangles(kName, mesh.size(), kMostTriangles);
   const Builder builder = settings.builder == "binned_sah"  ? &build_binned
                           : settings.builder == "sweep_sah" ? &build_sweep
                                                             : nullptr;
