@@ -1,6 +1,7 @@
 // Packets: up to 64 rays go through a wide BVH together, with masks of those that are still in it.
 //
-// Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant. A node's N
+// Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant, but a small one
+// of many octants goes as one, each lane with its own near planes, without the interval test. A node's N
 // children are first tested at once against an interval that holds all rays of the packet, then each that is left
 // against the rays, W at a time, with the very arithmetic of single rays. Children go on the stack with the mask of
 // their rays, nearest on top by the interval's entry. Where no more than `threshold` rays are in a node they go on
@@ -45,7 +46,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
           lanes_.template prepare<W, N>(count, ray_at, padded_, BoxPad{max_coordinate_}, each);
           if constexpr (kMoves) times_.load(rays);
         },
-        [&](Mask mask, unsigned) { traverse(mask); });
+        [&](Mask mask, unsigned) { traverse<false>(mask); }, [&] { return mix(int(rays.size())); });
   }
 
  private:
@@ -76,6 +77,31 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     float low, high;
     [[nodiscard]] float largest() const { return -low > high ? -low : high; }
   };
+
+  /// Packets of no more rays go through the tree as one where these are of so many octants or more: of four rays, of
+  /// more (docs/performance/packets.md).
+  static constexpr int kMostMixed = 16, kMixedOfFour = 3, kMixedOfMore = 4;
+
+  /// Traces the rays as one where that is better than octant by octant; else returns false.
+  ARBORETUM_INLINE bool mix(int count) {
+    if constexpr (Leaves::kRaysInLanes) {
+      return false;  // packets of 32 and 64 rays
+    } else {
+      if (count > kMostMixed || lanes_.valid == 0) return false;
+      int octants = 0;
+      Base::by_octant([&](Mask, unsigned) { ++octants; });
+      if (octants < (count > 4 ? kMixedOfMore : kMixedOfFour)) return false;
+      for (int k = 0; k < chunks_ * W; k += W) {
+        for (int a = 0; a < 3; ++a) {
+          const vm<W> negative = sign_bits(F::load(lanes_.r[a] + k)) < vi<W>(0);
+          const F near = F::load(lanes_.near[a] + k), far = F::load(lanes_.far[a] + k);
+          select(negative, far, near).store(of_lower_[a] + k), select(negative, near, far).store(of_upper_[a] + k);
+        }
+      }
+      traverse<true>(lanes_.valid);
+      return true;
+    }
+  }
 
   Interval interval_of(Mask mask) {
     Interval v;
@@ -170,6 +196,43 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     return N == kLanes ? bits : bits & ((1u << N) - 1u);
   }
 
+  /// Where the W rays from k on meet plane `plane` of child i; `c`: their offsets for it.
+  ARBORETUM_INLINE F distance(const std::byte* node, unsigned plane, int i, F r, const float* c, int k) const {
+    if constexpr (kMoves) {
+      return Format::template distance<F>(node, plane, i, r, F::load(c + k), F::load(times_.of_ray + k));
+    } else {
+      return Format::template distance<F>(node, plane, i, r, F::load(c + k));
+    }
+  }
+
+  /// Those of `mask`, of any octants, that meet child i, and where the first of them enters it. Of each lane these are
+  /// the operations of its own octant.
+  ARBORETUM_INLINE Mask mixed_rays_met(const std::byte* node, int i, Mask mask, float& entry) const {
+    Mask met = 0;
+    const F infinity(std::numeric_limits<float>::infinity());
+    F first = infinity;
+    for (int c = 0; c < chunks_; ++c) {
+      const unsigned in = Base::lanes_of(mask, c);
+      if (in == 0) continue;
+      const int k = c * W;
+      F near[3], far[3];
+      for (unsigned a = 0; a < 3; ++a) {
+        const F r = F::load(lanes_.r[a] + k);
+        const vm<W> negative = sign_bits(r) < vi<W>(0);
+        const F lower = distance(node, 2 * a, i, r, of_lower_[a], k),
+                upper = distance(node, 2 * a + 1, i, r, of_upper_[a], k);
+        near[a] = select(negative, upper, lower), far[a] = select(negative, lower, upper);
+      }
+      const F enter = max_x86(max_x86(near[0], near[1]), max_x86(near[2], F::load(lanes_.first + k)));
+      const F leave = min_x86(min_x86(far[0], far[1]), min_x86(far[2], F::load(lanes_.t + k)));
+      const unsigned inside = (enter <= leave).bits() & in;
+      met |= Mask(inside) << k;
+      first = min_x86(select(vm<W>::from_bits(inside), enter, infinity), first);
+    }
+    entry = reduce_min(first);
+    return met;
+  }
+
   /// Those of `mask` that meet child i.
   ARBORETUM_INLINE Mask rays_met(const unsigned (&near)[3], const std::byte* node, int i, Mask mask) const {
     Mask met = 0;
@@ -178,13 +241,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       if (in == 0) continue;
       const int k = c * W;
       const F rx = F::load(lanes_.r[0] + k), ry = F::load(lanes_.r[1] + k), rz = F::load(lanes_.r[2] + k);
-      const auto at = [&](unsigned plane, F r, const float* c) {
-        if constexpr (kMoves) {
-          return Format::template distance<F>(node, plane, i, r, F::load(c + k), F::load(times_.of_ray + k));
-        } else {
-          return Format::template distance<F>(node, plane, i, r, F::load(c + k));
-        }
-      };
+      const auto at = [&](unsigned plane, F r, const float* c) { return distance(node, plane, i, r, c, k); };
       const F enter = max_x86(max_x86(at(near[0], rx, lanes_.near[0]), at(near[1], ry, lanes_.near[1])),
                               max_x86(at(near[2], rz, lanes_.near[2]), F::load(lanes_.first + k)));
       const F leave = min_x86(min_x86(at(1 - near[0], rx, lanes_.far[0]), at(5 - near[1], ry, lanes_.far[1])),
@@ -194,14 +251,20 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     return met;
   }
 
+  /// `Mixed`: rays of any octants; else all are of one.
+  template <bool Mixed>
   void traverse(Mask group) {
-    const Interval interval = interval_of(group);
-    Base::look_for_common_origin(group);
-    float tfar = interval.from_end ? 0.0f : Base::farthest(group);
+    [[maybe_unused]] Interval interval;
+    bool from_end = false;
+    if constexpr (!Mixed) {
+      interval = interval_of(group), from_end = interval.from_end;
+      Base::look_for_common_origin(group);
+    }
+    float tfar = from_end ? 0.0f : Base::farthest(group);
     Entry* const stack = stack_.data();
     Entry* top = stack;
     typename Counting::Depths depths{typename Counting::Depth{}};
-    Entry e{root_, interval.tnear, group};
+    Entry e{root_, 0.0f, group};
     for (;;) {
       while (!bvh::is_leaf(e.reference)) {
         if (Base::few(e.mask)) {
@@ -210,22 +273,26 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
           goto pop;
         }
         const std::byte* node = base_ + bvh::offset_of(e.reference);
-        Children entry;
-        unsigned hit;
-        if (__builtin_expect(interval.usable, 1)) {
-          hit = children_met(interval, node, tfar, entry);
-        } else {
-          entry = Children(interval.tnear);
-          hit = (1u << Format::boxes(node)) - 1u;
-        }
         alignas(64) float t[kLanes];
-        entry.store(t);
+        unsigned hit;
+        if constexpr (Mixed) {
+          hit = (1u << Format::boxes(node)) - 1u;
+        } else {
+          Children entry;
+          if (__builtin_expect(interval.usable, 1)) {
+            hit = children_met(interval, node, tfar, entry);
+          } else {
+            entry = Children(interval.tnear);
+            hit = (1u << Format::boxes(node)) - 1u;
+          }
+          entry.store(t);
+        }
         Entry* const bottom = top;
         [[maybe_unused]] MetChildren met;
         [[maybe_unused]] const unsigned tested = hit;
         for (; hit; hit &= hit - 1) {
           const int i = __builtin_ctz(hit);
-          const Mask mask = rays_met(interval.near, node, i, e.mask);
+          const Mask mask = Mixed ? mixed_rays_met(node, i, e.mask, t[i]) : rays_met(interval.near, node, i, e.mask);
           if (mask == 0) continue;
           met.add(mask);
           const bvh::NodeReference child = Format::child(node, i);
@@ -237,7 +304,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
           *p = {child, t[i], mask};
         }
         if constexpr (Counting::kCounting) {
-          if (interval.usable) counting_.interval(Format::boxes(node));
+          if constexpr (!Mixed) {
+            if (interval.usable) counting_.interval(Format::boxes(node));
+          }
           count(e.mask, unsigned(__builtin_popcount(tested)), met, depths.current());
         }
         if (top == bottom) goto pop;
@@ -311,6 +380,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   };
   struct Nothing {};
 
+  /// Offsets of mixed rays for lower and for upper planes, whichever of them a ray meets first.
+  alignas(64) float of_lower_[3][Leaves::kRaysInLanes ? 1 : kMostMixed],
+      of_upper_[3][Leaves::kRaysInLanes ? 1 : kMostMixed];
   const std::byte* base_;
   const bvh::NodeReference root_;
   const float max_coordinate_;
