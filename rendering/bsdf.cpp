@@ -39,12 +39,16 @@ Vec3f Bsdf::coat_lets_through(double cosine) const noexcept {
   return Vec3f{1, 1, 1} - schlick(surface_.specular, cosine);
 }
 
+Vec3f Bsdf::mirror_reflects() const noexcept {
+  return surface_.fresnel ? schlick(surface_.specular, out_.z) : surface_.specular;
+}
+
 Bsdf::Value Bsdf::evaluate(Vec3d in) const noexcept {
   Value value;
   if (!(in.z > 0.0)) return value;
   if (has_diffuse_) {
     value.diffuse = diffuse_ * float(in.z / std::numbers::pi);
-    if (glossy()) value.diffuse = value.diffuse * coat_lets_through(out_.z) * coat_lets_through(in.z);
+    if (has_coat()) value.diffuse = value.diffuse * coat_lets_through(out_.z) * coat_lets_through(in.z);
   }
   if (glossy()) {
     const Vec3d half = normalize(out_ + in);
@@ -60,7 +64,7 @@ double Bsdf::share_of_diffuse(Lobes lobes) const noexcept {
   const double diffuse = lobes.diffuse && has_diffuse_ ? luminance(diffuse_) : 0.0;
   double specular = 0.0;
   if (glossy() && lobes.glossy) specular = luminance(schlick(surface_.specular, out_.z));
-  if (surface_.lobe == SpecularLobe::mirror && lobes.perfect) specular = luminance(surface_.specular);
+  if (surface_.lobe == SpecularLobe::mirror && lobes.perfect) specular = luminance(mirror_reflects());
   return diffuse + specular > 0.0 ? diffuse / (diffuse + specular) : -1.0;
 }
 
@@ -99,7 +103,7 @@ Vec3d Bsdf::glossy_direction(double u, double v) const noexcept {
 }
 
 Scatter Bsdf::mirrored() const noexcept {
-  return {{-out_.x, -out_.y, out_.z}, surface_.specular, 0.0, ScatterKind::mirror};
+  return {{-out_.x, -out_.y, out_.z}, mirror_reflects(), 0.0, ScatterKind::mirror};
 }
 
 Bsdf::Glass Bsdf::glass() const noexcept {
@@ -124,7 +128,7 @@ std::optional<Scatter> Bsdf::scatter(Lobes lobes, double choice, double u, doubl
   if (share < 0.0) return std::nullopt;
   if (choice < share) {
     const Vec3d in = cosine_direction(u, UnitCircle(v));
-    if (glossy()) return smooth(in, lobes, ScatterKind::diffuse);
+    if (has_coat()) return smooth(in, lobes, ScatterKind::diffuse);
     if (!(in.z > 0.0)) return std::nullopt;
     return Scatter{in, share == 1.0 ? diffuse_ : diffuse_ * float(1.0 / share), share * in.z / std::numbers::pi,
                    ScatterKind::diffuse};

@@ -1,8 +1,8 @@
 // Bsdf: how a surface scatters light at one hit, in a frame whose z axis is the normal on the viewer's side.
 //
 // GGX (Walter et al. 2007) with height-correlated Smith shadowing (Heitz, JCGT 3(2), 2014), its visible normals sampled
-// as spherical caps (Dupuy and Benyoub, 2023). Beside a glossy lobe the diffuse one gets what neither way through the
-// coat reflects.
+// as spherical caps (Dupuy and Benyoub, 2023). Beside a glossy lobe, and a mirror with Fresnel, the diffuse one gets
+// what neither way through the coat reflects.
 #pragma once
 
 #include <array>
@@ -53,6 +53,9 @@ class Bsdf {
 
  private:
   [[nodiscard]] bool glossy() const noexcept { return surface_.lobe == SpecularLobe::glossy; }
+  /// Light passes it on the way to the diffuse lobe and back.
+  [[nodiscard]] bool has_coat() const noexcept { return glossy() || surface_.fresnel; }
+  [[nodiscard]] Vec3f mirror_reflects() const noexcept;
   [[nodiscard]] double share_of_diffuse(Lobes lobes) const noexcept;
   [[nodiscard]] Vec3f coat_lets_through(double cosine) const noexcept;
   [[nodiscard]] double glossy_pdf(Vec3d half) const noexcept;

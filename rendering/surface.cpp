@@ -29,6 +29,7 @@ Surface make_surface(const Material& m, EffectSet effects) {
   }
   s.lobe = lobe_of(m, effects);
   if (s.lobe != SpecularLobe::none) s.specular = specular;
+  s.fresnel = s.lobe == SpecularLobe::mirror && is_fresnel_mirror(m);
   if (s.lobe == SpecularLobe::dielectric) {
     if (!is_bright(s.specular)) s.specular = {1, 1, 1};  // many MTL files leave Ks of glass out
     s.transmission = within_one(m.transmission);

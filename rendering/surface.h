@@ -1,9 +1,9 @@
 // Surface: a material made ready for shading, with the lobes that the effects leave it.
 //
-// Diffuse: Lambert. Mirror: Ks, perfect. Glossy: GGX with Schlick's Fresnel, F0 = Ks, alpha = Pr^2, or sqrt(2 / (Ns +
-// 2)) without a Pr. Dielectric: smooth glass, Fresnel's equations, Ks and Tf as filters of what it reflects and lets
-// through. Beside a specular lobe Kd is lowered to 1 - Ks where it is more, so that no surface gives back more light
-// than it gets.
+// Diffuse: Lambert. Mirror: Ks, perfect; with Schlick's Fresnel, F0 = Ks, of illum 5. Glossy: GGX with Schlick's
+// Fresnel, F0 = Ks, alpha = Pr^2, or sqrt(2 / (Ns + 2)) without a Pr. Dielectric: smooth glass, Fresnel's equations, Ks
+// and Tf as filters of what it reflects and lets through. Beside a specular lobe Kd is lowered to 1 - Ks where it is
+// more, so that no surface gives back more light than it gets.
 #pragma once
 
 #include "core/vec3.h"
@@ -18,8 +18,9 @@ enum class SpecularLobe : unsigned char { none, mirror, glossy, dielectric };
 struct Surface {
   Vec3f diffuse{}, specular{}, transmission{}, emission{};  ///< light is emitted on both sides
   SpecularLobe lobe = SpecularLobe::none;
-  double alpha = 1.0;  ///< of GGX
-  double ior = 1.0;    ///< of what is behind the side that sees the corners counter-clockwise
+  bool fresnel = false;  ///< of a mirror: it reflects by Schlick's approximation, and what is below lies under a coat
+  double alpha = 1.0;    ///< of GGX
+  double ior = 1.0;      ///< of what is behind the side that sees the corners counter-clockwise
   float opacity = 1.0f;
   int diffuse_map = -1, opacity_map = -1;  ///< numbers of textures, or -1
 

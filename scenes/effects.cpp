@@ -86,9 +86,10 @@ class Effects {
   }
 
   void surfaces() {
-    by_material("mirror", is_mirror, "perfect reflection (illum 3, Ks > 0, Pr 0)");
+    by_material("mirror", is_mirror, "perfect reflection (illum 3, 5 or 8, Ks > 0, Pr 0)");
     by_material("glossy", is_glossy, "rough specular lobe (Ks > 0)");
-    by_material("dielectric", is_dielectric, "glass (illum 4 to 7 or 9, Tf > 0; Ni other than 1 or a coloured Tf)");
+    by_material("dielectric", is_dielectric,
+                "glass (illum 4 to 7 or 9, Tf not black; Ni other than 1 or a coloured Tf)");
     if (emitters_ == 0)
       set("diffuse_gi", false, "nothing emits light");
     else

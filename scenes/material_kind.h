@@ -8,9 +8,12 @@ namespace arboretum {
 
 [[nodiscard]] inline bool is_bright(Vec3f c) noexcept { return c.x > 0.0f || c.y > 0.0f || c.z > 0.0f; }
 
-/// Lets light through by its illumination model: illum 4 to 7 and 9, a filter Tf that is not black.
+/// Lets light through by its illumination model: illum 4, 6, 7 and 9, a filter Tf that is not black. The format's 5 is
+/// reflection alone, but files have it for glass too: those that give a Ni or a coloured Tf.
 [[nodiscard]] inline bool is_transparent(const Material& m) noexcept {
-  return ((m.illum >= 4 && m.illum <= 7) || m.illum == 9) && is_bright(m.transmission);
+  const bool says_glass = m.ior != 1.0f || m.transmission != Vec3f{1, 1, 1};
+  return (m.illum == 4 || (m.illum == 5 && says_glass) || m.illum == 6 || m.illum == 7 || m.illum == 9) &&
+         is_bright(m.transmission);
 }
 /// Refracts, or filters: glass of Ni 1 bends nothing and reflects nothing, but may have a colour.
 [[nodiscard]] inline bool is_dielectric(const Material& m) noexcept {
@@ -25,6 +28,8 @@ namespace arboretum {
   return !is_dielectric(m) && !is_invisible(m) && (m.illum == 3 || m.illum == 5 || m.illum == 8) &&
          is_bright(m.specular) && m.roughness == 0.0f;
 }
+/// A mirror that reflects more the flatter it is looked at.
+[[nodiscard]] inline bool is_fresnel_mirror(const Material& m) noexcept { return is_mirror(m) && m.illum == 5; }
 [[nodiscard]] inline bool is_glossy(const Material& m) noexcept {
   return !is_dielectric(m) && !is_invisible(m) && !is_mirror(m) && is_bright(m.specular) && m.illum >= 2;
 }

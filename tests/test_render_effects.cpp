@@ -54,6 +54,7 @@ TEST_CASE("generated scenes: the detected effects give the picture of all effect
 TEST_CASE("small scenes of every material: the detected effects give the picture of all") {
   const Material materials[] = {
       {.name = "mirror", .diffuse = {0.1f, 0.2f, 0.1f}, .specular = {0.8f, 0.7f, 0.9f}, .illum = 3},
+      {.name = "varnish", .diffuse = {0.8f, 0.2f, 0.2f}, .specular = {0.1f, 0.1f, 0.1f}, .illum = 5},
       {.name = "metal", .diffuse = {0, 0, 0}, .specular = {0.8f, 0.7f, 0.3f}, .roughness = 0.3f, .illum = 3},
       {.name = "plastic", .diffuse = {0.1f, 0.6f, 0.3f}, .specular = {0.04f, 0.04f, 0.04f}, .roughness = 0.1f},
       {.name = "shiny", .diffuse = {0.1f, 0.6f, 0.3f}, .specular = {0.5f, 0.5f, 0.5f}, .shininess = 100},

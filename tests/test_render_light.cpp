@@ -207,6 +207,30 @@ TEST_CASE("furnace: mirrors and clear glass lose nothing but what Ks and Tf say"
   check_near(seen(scene, 1, Integrator::whitted), {1, 1, 1}, 0.01);  // branches that hold less than 2^-10 end
 }
 
+TEST_CASE("illum 5 is opaque: a mirror that reflects more at a slant, and a coat on what is diffuse") {
+  Scene scene = floor_scene();
+  scene.environment = {1, 1, 1};
+  scene.materials[0] = {.diffuse = {0, 0, 0}, .specular = {0.1f, 0.5f, 1}, .illum = 5};
+  for (const float height : {0.05f, 0.5f, 3.0f}) {
+    scene.camera = aimed({1, height, 0.5f}, {0, 0, 0});
+    const double cosine = double(height) / length(Vec3d(scene.camera->position));
+    const auto fresnel = [&](double normal) { return normal + (1 - normal) * std::pow(1 - cosine, 5); };
+    const Vec3f mirrored{float(fresnel(0.1f)), float(fresnel(0.5f)), 1};
+    INFO("height " << height);
+    scene.materials[0].diffuse = {0, 0, 0};
+    for (const Integrator integrator : {Integrator::path, Integrator::whitted})
+      check_near(seen(scene, 4, integrator), mirrored, 1e-3);
+    // Light passes the coat at a cosine-distributed direction, where it lets 20 / 21 of 1 - Ks through, and then at the
+    // viewer's.
+    scene.materials[0].diffuse = {0.5f, 0.9f, 0.9f};
+    const auto below = [&](double kd, double ks) { return float(kd * (1 - ks) * 20 / 21 * (1 - fresnel(ks))); };
+    const Vec3f both = mirrored + Vec3f{below(0.5, 0.1), below(0.5, 0.5), 0};
+    check_near(seen(scene, 20000), both, 0.01);
+    check_near(seen(scene, 20000, Integrator::whitted), both, 0.01);
+    CHECK(std::max({both.x, both.y, both.z}) <= 1.0f);
+  }
+}
+
 TEST_CASE("point, directional and spot lights over a floor") {
   Scene scene = floor_scene();
   const Vec3f at{0.5f, 0, -0.25f};

@@ -273,6 +273,10 @@ TEST_CASE("effects: called for exactly where something needs them") {
     Names names;
   } materials[] = {
       {Material{.name = "mirror", .specular = {1, 1, 1}, .illum = 3}, {"mirror"}},
+      {Material{.name = "varnish", .specular = {0.1f, 0.1f, 0.1f}, .illum = 5}, {"mirror"}},
+      {Material{.name = "five", .illum = 5}, {}},
+      {Material{.name = "five of glass", .specular = {1, 1, 1}, .ior = 1.5f, .illum = 5}, {"dielectric"}},
+      {Material{.name = "a filter of five", .transmission = {1, 0.5f, 0.5f}, .illum = 5}, {"dielectric"}},
       {Material{.name = "brushed", .specular = {1, 1, 1}, .roughness = 0.2f, .illum = 3}, {"glossy"}},
       {Material{.name = "plastic", .specular = {0.04f, 0.04f, 0.04f}, .illum = 2}, {"glossy"}},
       {Material{.name = "glass", .specular = {1, 1, 1}, .ior = 1.5f, .opacity = 0, .illum = 7}, {"dielectric"}},
