@@ -52,6 +52,16 @@ class LogCapture {
 
 Vec3f color(const aiColor4D& c) { return {c.r, c.g, c.b}; }
 
+/// Assimp gives what has no material one of its own, glossy in some formats. That of glTF is what its specification
+/// says.
+bool is_stand_in(const aiMaterial& material) {
+  aiString name;
+  float metallic = 0.0f;
+  return material.Get(AI_MATKEY_NAME, name) == AI_SUCCESS &&
+         std::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME &&
+         material.Get(AI_MATKEY_METALLIC_FACTOR, metallic) != AI_SUCCESS;
+}
+
 /// `folder`: of the file, which the paths of images are relative to.
 Material convert(const aiMaterial& in, const std::filesystem::path& folder) {
   Material out;
@@ -90,8 +100,11 @@ class AssimpReader {
   AssimpReader(const std::filesystem::path& path, const aiScene& in) : name_(path.string()), in_(in) {}
 
   Scene read() {
-    for (unsigned i = 0; i < in_.mNumMaterials; ++i)
-      scene_.materials.push_back(convert(*in_.mMaterials[i], std::filesystem::path(name_).parent_path()));
+    const std::filesystem::path folder = std::filesystem::path(name_).parent_path();
+    for (unsigned i = 0; i < in_.mNumMaterials; ++i) {
+      const aiMaterial& material = *in_.mMaterials[i];
+      scene_.materials.push_back(is_stand_in(material) ? Material{.name = "default"} : convert(material, folder));
+    }
     if (scene_.materials.size() > 65534) throw UserError(name_ + ": more than 65534 materials");
     add_node(*in_.mRootNode, aiMatrix4x4t<double>());
     if (short_faces_ > 0)

@@ -73,6 +73,24 @@ inline std::string stl_ascii() {
   return s + "endsolid pyramid\n";
 }
 
+inline std::string ply_ascii() {
+  std::string s = ply_header("ascii");
+  for (const auto& v : kCorners)
+    s += std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + "\n";
+  for (const auto& f : kFaces)
+    s += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + "\n";
+  return s;
+}
+
+inline std::string off_text() {
+  std::string s = "OFF\n5 4 0\n";
+  for (const auto& v : kCorners)
+    s += std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + "\n";
+  for (const auto& f : kFaces)
+    s += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + "\n";
+  return s;
+}
+
 inline void check_pyramid(const Scene& scene, Vec3f moved = {0, 0, 0}) {
   REQUIRE(scene.mesh.size() == 4);
   CHECK(scene.report.triangles_read == 4);

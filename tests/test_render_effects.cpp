@@ -89,6 +89,24 @@ TEST_CASE("small scenes of every material: the detected effects give the picture
   }
 }
 
+TEST_CASE("a model without materials gives the same picture from every kind of file") {
+  const Folder folder;
+  Scene obj = load_file(folder.write("a.obj", obj_text()));
+  obj.lights.push_back({.position = {2, 3, 4}, .intensity = {60, 60, 60}});
+  for (const auto& [name, text] : {std::pair{"a.stl", stl_ascii()}, {"a.off", off_text()}, {"a.ply", ply_ascii()}}) {
+    INFO(name);
+    Scene other = load_file(folder.write(name, text));
+    other.lights = obj.lights;
+    for (const Integrator integrator : {Integrator::path, Integrator::whitted}) {
+      RenderSettings settings = kSmall;
+      settings.integrator = integrator;
+      const Picture picture = picture_of(obj, detected(obj), settings);
+      CHECK_FALSE(is_black(picture));
+      CHECK(same_bits(picture, picture_of(other, detected(other), settings)));
+    }
+  }
+}
+
 TEST_CASE("a light of intensity 0 is no light") {
   Scene scene = floor_scene();
   scene.lights.push_back({.position = {0, 3, 0}, .intensity = {0, 0, 0}});

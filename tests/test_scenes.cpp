@@ -25,15 +25,6 @@ extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp"; 
 
 namespace {
 
-std::string ply_ascii() {
-  std::string s = ply_header("ascii");
-  for (const auto& v : kCorners)
-    s += std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + "\n";
-  for (const auto& f : kFaces)
-    s += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + "\n";
-  return s;
-}
-
 std::string stl_binary() {
   std::string s(80, ' ');
   put(s, std::uint32_t(4), false);
@@ -43,15 +34,6 @@ std::string stl_binary() {
       for (const float x : kCorners[i]) put(s, x, false);
     put(s, std::uint16_t(0), false);
   }
-  return s;
-}
-
-std::string off_text() {
-  std::string s = "OFF\n5 4 0\n";
-  for (const auto& v : kCorners)
-    s += std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + "\n";
-  for (const auto& f : kFaces)
-    s += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + "\n";
   return s;
 }
 
