@@ -20,6 +20,7 @@
 #include "rendering/heat_map.h"
 #include "rendering/render.h"
 #include "scenes/camera.h"
+#include "scenes/sanitise.h"
 
 namespace arboretum {
 namespace {
@@ -160,6 +161,12 @@ class Bar {
   double begin_, drawn_ = 0.0;
 };
 
+/// Of the loading.
+void print_warnings(const LoadReport& report) {
+  if (const std::string dropped = dropped_in_words(report); !dropped.empty()) fmt::print("warning       {}\n", dropped);
+  for (const std::string& warning : report.warnings) fmt::print("warning       {}\n", warning);
+}
+
 /// The work of the camera's rays in place of light.
 void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSettings settings,
                      const std::filesystem::path& out) {
@@ -186,7 +193,7 @@ void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSet
   const DrawnPicture picture = draw(map, unit);
   fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
   fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
-  for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
+  print_warnings(scene.report);
   if (!no_part.empty())
     fmt::print("effects       no part of heat maps, though asked for: {}\n", fmt::join(no_part, ", "));
   fmt::print("heat map      {} a camera ray: mean {:.2f}, median {}, most {}; the brightest colour is {}\n",
@@ -228,7 +235,7 @@ ExitStatus command_render(const RenderCommand& command) {
     fmt::print("paths         depth {}, {}\n", settings.depth,
                std::isinf(settings.clamp) ? "no clamp" : fmt::format("clamp {}", settings.clamp));
   fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
-  for (const std::string& warning : scene.report.warnings) fmt::print("warning       {}\n", warning);
+  print_warnings(scene.report);
   for (const std::string& warning : ready.warnings()) fmt::print("warning       {}\n", warning);
   print_effects(effects, chosen, set, settings.integrator);
   flush_output();

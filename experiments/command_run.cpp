@@ -64,9 +64,10 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
 
 /// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each
 /// that is read or placed is loaded for this, one at a time. Where it is the only scene it stays; of several each is
-/// loaded again when its turn comes: a long sweep does not hold all of them. `geometry`: as PlanRecord's.
-LoadedScene require_scenes(const Experiment& experiment, const Plan& plan,
-                           std::map<std::string, std::string>& geometry) {
+/// loaded again when its turn comes: a long sweep does not hold all of them. `geometry`: as PlanRecord's; `scenes`: as
+/// RunOutcome's.
+LoadedScene require_scenes(const Experiment& experiment, const Plan& plan, std::map<std::string, std::string>& geometry,
+                           Json& scenes) {
   LoadedScene loaded;
   std::size_t wanted = 0;
   for (std::size_t i = 0; i < experiment.scenes.size(); ++i) {
@@ -78,6 +79,7 @@ LoadedScene require_scenes(const Experiment& experiment, const Plan& plan,
     try {
       loaded = {i, std::make_unique<SceneData>(scene, experiment.measure)};
       geometry[scene.name] = loaded.data->geometry();
+      scenes[scene.name] = loaded.data->load_report();
     } catch (const UserError& e) {
       throw UserError(fmt::format("{}: {}", scene.where, e.what()));
     }
@@ -159,6 +161,15 @@ std::vector<Json> other_contexts(const std::filesystem::path& folder, const Json
     if (!same(now) && std::ranges::none_of(others, same)) others.push_back(context);
   }
   return others;
+}
+
+/// Adds what the folder says of scenes that are not loaded now.
+void take_up_scenes(const std::filesystem::path& folder, Json& scenes) {
+  const std::optional<PlanRecord> before = read_plan_record(folder);
+  if (!before) return;
+  const Json earlier = before->context.value("scenes", Json::object());
+  for (const auto& [name, report] : earlier.items())
+    if (!scenes.contains(name)) scenes[name] = report;
 }
 
 std::filesystem::path default_folder(const Experiment& experiment, const Shard& shard) {
@@ -249,7 +260,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   Json context = machine_context(experiment, hash, command.command_line);
   add_custom_context(context, command.benchmark);
   if (!command.no_plots && command.benchmark.format == "console") require_chosen_python();
-  LoadedScene loaded = require_scenes(experiment, plan, record.geometry);
+  Json scenes = Json::object();
+  LoadedScene loaded = require_scenes(experiment, plan, record.geometry, scenes);
   require_structure_cache(experiment);
   make_output_folder(folder);
   const FolderLock lock(folder, "give another --out");
@@ -267,6 +279,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
               fmt::format("# configuration hash: {}\n{}{}", hash,
                           shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
   if (!shard.is_whole()) context["shard"] = shard.text();
+  if (command.resume) take_up_scenes(folder, scenes);
+  context["scenes"] = scenes;
   record.context = context;
   if (command.resume) record.earlier = other_contexts(folder, context);
   std::vector<std::string> changed;
@@ -281,7 +295,9 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
 
   RunOutcome outcome = run_plan(experiment, plan, registry, journal,
                                 {.fail_fast = command.fail_fast, .geometry = record.geometry}, std::move(loaded));
+  context["scenes"].update(outcome.scenes);
   outcome.warnings = changed;
+  std::ranges::move(dropped_warnings(context["scenes"]), std::back_inserter(outcome.warnings));
   std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
                     std::back_inserter(outcome.warnings));
   try {

@@ -156,6 +156,9 @@ Json merged_context(const std::vector<ResultFolder>& parts, const std::string& c
     if (values.size() > 1) context[key] = fmt::format("{}", fmt::join(values, " | "));
   }
   context["merged_from"] = std::move(from);
+  for (const ResultFolder& part : parts)
+    if (const auto scenes = part.context.find("scenes"); scenes != part.context.end() && scenes->is_object())
+      context["scenes"].update(*scenes);
   return context;
 }
 
@@ -270,6 +273,8 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
   const std::vector<std::string> usual =
       machine_warnings(merged.outcome, measured, cores.is_number() ? cores.get<unsigned>() : ~0u);
   merged.outcome.warnings.insert(merged.outcome.warnings.end(), usual.begin(), usual.end());
+  const std::vector<std::string> dropped = dropped_warnings(merged.context.value("scenes", Json::object()));
+  merged.outcome.warnings.insert(merged.outcome.warnings.end(), dropped.begin(), dropped.end());
   return merged;
 }
 

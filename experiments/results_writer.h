@@ -16,7 +16,7 @@ struct ResultForm {
 
 /// What the context is given after the machine's: the shard, and by results_json() what the run came to.
 inline constexpr const char* kLaterContextKeys[] = {
-    "shard", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"};
+    "shard", "scenes", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"};
 
 /// `context`, `benchmarks` (every cell's repetitions, then its aggregates) `skipped` (name and reason)
 /// and, of a merge that lacks some, `missing`.

@@ -89,6 +89,7 @@ class Runner {
     }
     SceneData& data = *scene;
     refuse_changed(data);
+    outcome_.scenes[data.name()] = data.load_report();
     data.note_to([this](const std::string& line) { progress_.note(line); });
     StructurePool pool(data.mesh(), registry_, experiment_.metrics.quality, cache_);
     if (!builds.empty()) run_builds(builds, data, pool);

@@ -23,8 +23,9 @@ struct RunOutcome {
   std::vector<SkippedCell> failed;        ///< cells that turned out impossible while running, each with its reason
   std::vector<std::string> missing = {};  ///< of a merge: cells of the plan that none of the parts holds
   std::vector<std::string> warnings;
-  std::string error;     ///< what ended the run early; empty when it went through
-  bool stopped = false;  ///< by fail_fast
+  Json scenes = Json::object();  ///< SceneData::load_report() of each that was loaded, by name
+  std::string error;             ///< what ended the run early; empty when it went through
+  bool stopped = false;          ///< by fail_fast
 };
 
 /// Cells of one scene and workload whose structures fit the memory together are interleaved. Takes up what

@@ -39,12 +39,9 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
   scene_ = load_scene(choice.spec);
   if (!choice.placing.label.empty()) place(choice.placing);
   note_(fmt::format("{}: {} triangles, loaded in {:.2f} s", name_, mesh().size(), wall_seconds() - begin));
-  const LoadReport& report = scene_.report;
-  if (report.non_finite + report.out_of_range + report.degenerate > 0) {
-    note_(fmt::format("{}: dropped {} triangles with NaN or infinity, {} out of range, {} of zero area", name_,
-                      report.non_finite, report.out_of_range, report.degenerate));
-  }
-  for (const std::string& warning : report.warnings) note_(fmt::format("{}: {}", name_, warning));
+  if (const std::string dropped = dropped_in_words(scene_.report); !dropped.empty())
+    note_(fmt::format("{}: {}", name_, dropped));
+  for (const std::string& warning : scene_.report.warnings) note_(fmt::format("{}: {}", name_, warning));
 }
 
 std::string SceneData::geometry() const {
@@ -64,6 +61,16 @@ std::string SceneData::geometry() const {
             fmt::format("{} {} {} {} {} ", m.shininess, m.roughness, m.ior, m.opacity, m.illum);
   }
   return fmt::format("{:016x}", fnv1a(rest, hash_of(mesh())));
+}
+
+Json SceneData::load_report() const {
+  const LoadReport& report = scene_.report;
+  Json json{{"triangles", mesh().size()}, {"triangles_read", report.triangles_read}};
+  json["dropped"] =
+      Json{{"non_finite", report.non_finite}, {"out_of_range", report.out_of_range}, {"degenerate", report.degenerate}};
+  if (const std::string dropped = dropped_in_words(report); !dropped.empty()) json["dropped_in_words"] = dropped;
+  if (!report.warnings.empty()) json["warnings"] = report.warnings;
+  return json;
 }
 
 void SceneData::note_to(NoteFunction note) {

@@ -56,6 +56,9 @@ class SceneData {
   /// Of rays that start on surfaces.
   [[nodiscard]] StartCheck check_starts(const Workload& workload, std::span<const Hit> answers);
   [[nodiscard]] StartCheck check_starts(const Workload& workload, std::span<const std::uint8_t> answers);
+  /// What of the scene was read and what dropped, for the context of results: `triangles`, `triangles_read`, `dropped`
+  /// by reason, `warnings`.
+  [[nodiscard]] Json load_report() const;
   /// How far from their hit points rays begin on average, as a share of the scene's diagonal.
   [[nodiscard]] double start_distance(const Workload& workload) const;
 

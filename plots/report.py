@@ -29,6 +29,8 @@ def write(results, drawn):
     parts.append('<h2 id="all-cells">All cells</h2>' + beside + tables.throughput_table(results))
     parts.append('<h2 id="built">Structures as built</h2>' + tables.embree_note(results, results.structures) + tables.structure_table(results))
     parts.append('<h2 id="skipped">Skipped cells</h2>' + tables.skipped_list(results.skipped, results.complete))
+    if results.context.get("scenes"):
+        parts.append('<h2 id="scenes">Scenes</h2>' + tables.facts_table(scene_facts(results.context["scenes"])))
     parts.append('<h2 id="machine">Machine and build</h2>' + tables.facts_table(facts(results.context)))
     parts.append('<h2 id="again">How to reproduce</h2>' + reproduce(results))
     template = Template((Path(__file__).parent / "report_template.html").read_text(encoding="utf-8"))
@@ -89,7 +91,7 @@ def facts(context):
     """The context, flattened to lines that a person reads; long texts come with the reproduction."""
     found = []
     for key, value in context.items():
-        if key in ("experiment", "warnings", "warning", "plots", "executable", "library_build_type", "command", "load_avg"):
+        if key in ("experiment", "scenes", "warnings", "warning", "plots", "executable", "library_build_type", "command", "load_avg"):
             continue
         if key == "memory_bytes" and isinstance(value, int):
             key, value = "memory", f"{value / 2**30:.1f} GiB"
@@ -99,6 +101,13 @@ def facts(context):
             value = json.dumps(value)
         found.append((key.replace("_", " "), value))
     return found
+
+
+def scene_facts(scenes):
+    """Of each scene its triangles, and what the loader found wrong."""
+    def words(told):
+        return [counted(told["triangles"], "triangle"), told.get("dropped_in_words"), *told.get("warnings", [])]
+    return [(name, "; ".join(w for w in words(told) if w)) for name, told in scenes.items()]
 
 
 def without_resume(command):

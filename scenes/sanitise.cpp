@@ -39,7 +39,7 @@ Faults faults_of(const TriangleMesh& mesh, std::size_t i) {
 void sanitise(Scene& scene, const std::string& source) {
   TriangleMesh& mesh = scene.mesh;
   LoadReport& report = scene.report;
-  report.triangles_read += mesh.triangles.size();
+  if (report.triangles_read == 0) report.triangles_read = mesh.triangles.size();  // a placed scene comes again
   const bool has_materials = mesh.materials.size() == mesh.triangles.size();
   if (!has_materials) mesh.materials.clear();
   const bool has_texture_coordinates = scene.texture_coordinates.size() == mesh.triangles.size();
@@ -83,6 +83,18 @@ void sanitise(Scene& scene, const std::string& source) {
     scene.materials.push_back(Material{.name = "default"});
     mesh.materials.clear();
   }
+}
+
+std::string dropped_in_words(const LoadReport& report) {
+  std::string reasons;
+  const auto add = [&](std::size_t count, const char* what) {
+    if (count > 0) reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", count, what);
+  };
+  add(report.non_finite, "with NaN or infinity"), add(report.out_of_range, "out of range");
+  add(report.degenerate, "of zero area");
+  if (reasons.empty()) return {};
+  return fmt::format("dropped {} of {} triangles: {}", report.non_finite + report.out_of_range + report.degenerate,
+                     report.triangles_read, reasons);
 }
 
 }  // namespace arboretum

@@ -12,4 +12,8 @@ namespace arboretum {
 /// are set to the origin. Throws UserError, led by `source`, when no triangle is left.
 void sanitise(Scene& scene, const std::string& source);
 
+/// "dropped 528 of 1056 triangles: 528 out of range": those of its reasons that there are; empty where none was
+/// dropped.
+[[nodiscard]] std::string dropped_in_words(const LoadReport& report);
+
 }  // namespace arboretum

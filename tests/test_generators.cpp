@@ -37,6 +37,7 @@ TEST_CASE("every generator makes the count asked for, of sound triangles") {
       INFO(generator.name << " " << count);
       const Scene scene = generate_scene(generator.name, count, 1);
       CHECK(scene.mesh.size() == (even ? std::max<std::size_t>(6, count / 2 * 2) : count));
+      CHECK(scene.report.warnings.empty() == (scene.mesh.size() == count));
       CHECK(scene.report.degenerate + scene.report.non_finite + scene.report.out_of_range == 0);
       CHECK(scene.mesh.materials.size() == (scene.mesh.materials.empty() ? 0 : scene.mesh.size()));
       for (const std::uint16_t m : scene.mesh.materials) REQUIRE(m < scene.materials.size());
@@ -44,6 +45,11 @@ TEST_CASE("every generator makes the count asked for, of sound triangles") {
       for (const Triangle& t : scene.mesh.triangles) REQUIRE(std::max({t.a, t.b, t.c}) < scene.mesh.vertices.size());
     }
   }
+}
+
+TEST_CASE("a generator that makes another count than asked for says so") {
+  CHECK(generate_scene("sphere", 1, 1).report.warnings ==
+        std::vector<std::string>{"sphere:1 has 6 triangles, not 1 (closed: the next lower even count, 6 at least)"});
 }
 
 // Golden hashes: a change here changes every measurement made on these scenes; say so in the change log.

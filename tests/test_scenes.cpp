@@ -477,6 +477,12 @@ TEST_CASE("sanitising drops and counts, and keeps the order of the rest") {
   CHECK(scene.report.non_finite == 2);
   CHECK(scene.report.out_of_range == 1);
   CHECK(scene.report.degenerate == 2);
+  CHECK(dropped_in_words(scene.report) ==
+        "dropped 5 of 7 triangles: 2 with NaN or infinity, 1 out of range, 2 of zero area");
+  sanitise(scene, "test");  // again, as of a placed scene
+  CHECK(scene.report.triangles_read == 7);
+  CHECK(dropped_in_words({.triangles_read = 7, .degenerate = 1}) == "dropped 1 of 7 triangles: 1 of zero area");
+  CHECK(dropped_in_words({.triangles_read = 7}) == "");
   for (const Vec3f& v : scene.mesh.vertices) CHECK(is_finite(v));
 }
 

@@ -64,7 +64,11 @@ void check_generated(std::string_view name, std::size_t triangles, std::uint64_t
 }
 
 Scene generate_scene(std::string_view name, std::size_t triangles, std::uint64_t seed) {
-  Scene scene = kFunctions[checked(name, triangles, seed)](triangles, seed);
+  const std::size_t place = checked(name, triangles, seed);
+  Scene scene = kFunctions[place](triangles, seed);
+  if (const std::size_t made = scene.mesh.size(); made != triangles)
+    scene.report.warnings.push_back(
+        fmt::format("{}:{} has {} triangles, not {} ({})", name, triangles, made, triangles, kInfos[place].rule));
   sanitise(scene, fmt::format("generator {}", name));
   return scene;
 }

@@ -113,7 +113,7 @@ class CommandLine(CommandLineCase):
         self.write("model.obj", CUBE + "v nan 0 0\nf 1 2 9\n")
         result = self.call("run", path, "--no-plots")
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn("dropped 1 triangles with NaN", result.stderr)
+        self.assertIn("model: dropped 1 of 9 triangles: 1 with NaN or infinity", result.stderr)
 
     def test_a_scene_that_does_not_load_leaves_earlier_results(self):
         bad = self.write("bad.yaml", CONFIG.replace("[{generate: sphere_flake, triangles: 2000}]", "\n  - {generate: sphere_flake, triangles: 2000}\n  - {file: model.obj}"))

@@ -47,6 +47,33 @@ class Files(CommandLineCase):
         self.write("model.obj", CUBE.replace("v 0 0 0", "v 0 0 -1"))
         self.assertEqual(self.model("--out", "out", "--resume").returncode, 0)
 
+    def test_what_a_scene_lost_is_told_wherever_its_results_are(self):
+        self.write("model.obj", CUBE.replace("v 0 0 0", "v 1e-30 0 0"))  # too small to be scaled down with the rest
+        self.write("half.yaml", "meshes: [model.obj]\ninstances: [{mesh: model, transforms: [{translate: [1e20, 0, 0]}, {translate: [0, 0, 0]}]}]\n")
+        config = self.write("sweep.yaml", MODEL.replace("{file: model.obj}", "{scene: half.yaml}, sphere:1"))
+        lost = "dropped 8 of 16 triangles: 8 out of range"
+        whole = self.call("run", config, "--no-plots", "--out", "out")
+        self.assertEqual(whole.returncode, 0, whole.stderr)
+        self.assertIn(f"warning: half: {lost}", whole.stderr)
+        context = json.loads((self.folder / "out/results.json").read_text())["context"]
+        self.assertEqual(context["scenes"]["half"]["dropped"], {"non_finite": 0, "out_of_range": 8, "degenerate": 0})
+        self.assertEqual((context["scenes"]["half"]["triangles"], context["scenes"]["half"]["triangles_read"]), (8, 16))
+        self.assertEqual(context["scenes"]["sphere-1"]["warnings"], ["sphere:1 has 6 triangles, not 1 (closed: the next lower even count, 6 at least)"])
+        self.assertIn(f"half: {lost}", context["warnings"])
+        self.assertEqual(json.loads((self.folder / "out/plan.json").read_text())["context"]["scenes"]["half"], context["scenes"]["half"])
+        # Gone on with, merged, and drawn
+        again = self.call("run", config, "--no-plots", "--out", "out", "--resume", "--filter", "sphere")
+        self.assertIn(f"warning: half: {lost}", again.stderr)
+        for part, words in enumerate(("half", "sphere")):
+            self.assertEqual(self.call("run", config, "--no-plots", "--out", f"part{part}", "--filter", words).returncode, 0)
+        merged = self.call("merge", "merged", "part0", "part1", "--no-plots")
+        self.assertEqual(merged.returncode, 0, merged.stderr)
+        self.assertIn(f"warning: half: {lost}", merged.stderr)
+        self.assertEqual(json.loads((self.folder / "merged/results.json").read_text())["context"]["scenes"], context["scenes"])
+        self.assertIn(f"warning       {lost}\n", self.call("render", "half.yaml", "--resolution", "8x8", "--spp", "1").stdout)
+        self.assertIn(f"warning       {lost}\n", self.call("render", "half.yaml", "--resolution", "8x8", "--heatmap", "nodes").stdout)
+        self.assertIn("warning       sphere:1 has 6 triangles, not 1", self.call("info", "sphere:1").stdout)
+
     def test_a_scene_file_with_another_camera_is_another_scene(self):
         self.write("model.obj", CUBE)
         scene = "name: yard\nmeshes: [{file: model.obj}]\ncamera: {position: [%s, 2, 5], look_at: [0, 0, 0]}\n"

@@ -333,6 +333,14 @@ class Drawing(unittest.TestCase):
             self.assertIn(words, shown)
         self.assertNotIn("http", page.replace("http://www.w3.org", ""))
 
+    def test_report_says_what_scenes_lost(self):
+        scenes = {"half": {"triangles": 528, "dropped_in_words": "dropped 528 of 1056 triangles: 528 out of range", "warnings": ["a.mtl: <odd>"]}, "whole": {"triangles": 1}}
+        folder = Folder(whole(), {"scenes": scenes})
+        self.assertEqual(report.scene_facts(scenes), [("half", "528 triangles; dropped 528 of 1056 triangles: 528 out of range; a.mtl: <odd>"), ("whole", "1 triangle")])
+        page = report.write(load(folder.path), []).read_text()
+        self.assertIn("528 out of range; a.mtl: &lt;odd&gt;</td>", page)
+        self.assertEqual(page.count("out of range"), 1)
+
     def test_report_says_what_was_checked(self):
         unchecked = {k: v for k, v in other("primary").items() if k != "wrong_answers"}
         right = other("shadow", wrong_answers=0)
