@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "scenes/appearance.h"
 #include "scenes/camera.h"
 #include "scenes/layout.h"
 
@@ -25,7 +26,7 @@ void check_materials(const Scene& scene) {
 }  // namespace
 
 RenderScene::RenderScene(const Scene& scene, EffectSet effects)
-    : effects_(effects), camera_(view_of(scene)), shutter_(scene.shutter) {
+    : effects_(effects), camera_(view_of(scene)), shutter_(scene.shutter), warnings_(unseen_materials(scene)) {
   take_mesh(scene);
   settle_motion(scene);
   if (!effects.has(EffectKind::dof)) camera_.aperture_radius = 0.0f;
@@ -77,7 +78,7 @@ void RenderScene::settle_motion(const Scene& scene) {
     mesh_ = pose(mesh_, scene.shutter.open);
 }
 
-int RenderScene::texture(const std::string& path) {
+int RenderScene::texture(const std::string& path, const std::string& place) {
   const auto known = std::ranges::find(texture_numbers_, path, &std::pair<std::string, int>::first);
   if (known != texture_numbers_.end()) return known->second;
   int number = -1;
@@ -85,7 +86,7 @@ int RenderScene::texture(const std::string& path) {
     number = int(textures_.size());
     textures_.emplace_back(*image);
   } else {
-    warnings_.push_back(path + ": no image that can be read; its material goes without");
+    warnings_.push_back(unread_image(place, path));
   }
   texture_numbers_.emplace_back(path, number);
   return number;
@@ -101,7 +102,8 @@ void RenderScene::read_maps(const std::vector<Material>& materials) {
       unplaced = unplaced || (texture_coordinates_.empty() && !map.is_constant());
       return map.is_constant() || texture_coordinates_.empty();
     };
-    if (const int number = materials[i].diffuse_map.empty() ? -1 : texture(materials[i].diffuse_map); number >= 0) {
+    const Material& m = materials[i];
+    if (const int number = m.diffuse_map.empty() ? -1 : texture(m.diffuse_map, m.diffuse_map_place); number >= 0) {
       const Texture& map = textures_[std::size_t(number)];
       // a map without a Kd, which many files leave out
       if (!is_bright(s.diffuse)) s.diffuse = Vec3f{1, 1, 1} - s.specular;
@@ -110,9 +112,8 @@ void RenderScene::read_maps(const std::vector<Material>& materials) {
       else
         s.diffuse_map = number;
     }
-    if (!effects_.has(EffectKind::alpha_cutout) || is_dielectric(materials[i]) || materials[i].opacity_map.empty())
-      continue;
-    if (const int number = texture(materials[i].opacity_map); number >= 0) {
+    if (!effects_.has(EffectKind::alpha_cutout) || is_dielectric(m) || m.opacity_map.empty()) continue;
+    if (const int number = texture(m.opacity_map, m.opacity_map_place); number >= 0) {
       const Texture& map = textures_[std::size_t(number)];
       if (stands_for_itself(map))
         s.opacity *= map.mean_opacity();

@@ -45,14 +45,14 @@ class RenderScene {
   [[nodiscard]] float opacity(const Surface& surface, const Hit& hit) const noexcept;
   /// Some surface lets rays through.
   [[nodiscard]] bool has_holes() const noexcept { return has_holes_; }
-  /// One line each: maps that cannot be read or placed.
+  /// One line each: maps that cannot be read or placed, materials that cannot be seen.
   [[nodiscard]] const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
  private:
   void take_mesh(const Scene& scene);
   void settle_motion(const Scene& scene);
   void read_maps(const std::vector<Material>& materials);
-  int texture(const std::string& path);
+  int texture(const std::string& path, const std::string& place);
   [[nodiscard]] std::array<float, 2> coordinates(const Hit& hit) const noexcept;
 
   TriangleMesh mesh_;

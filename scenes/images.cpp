@@ -14,12 +14,28 @@
 
 namespace arboretum {
 
+std::string fault_of_image(const std::filesystem::path& image) {
+  std::error_code error;
+  const auto status = std::filesystem::status(image, error);
+  if (!std::filesystem::exists(status)) return "no such file";
+  if (!std::filesystem::is_regular_file(status)) return "no regular file";
+  int width = 0, height = 0, channels = 0;
+  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(stbi_load(image.c_str(), &width, &height, &channels, 0),
+                                                         stbi_image_free);
+  if (pixels) return {};
+  const std::string reason = stbi_failure_reason();
+  if (reason == "unknown image type")
+    return "no image of a kind that is read, which are PNG, JPEG, BMP, TGA, GIF, PSD, PNM, PIC and HDR";
+  if (reason == "can't fopen") return "cannot be opened";
+  return "broken or truncated: " + reason;
+}
+
 RadianceImage read_radiance(const std::filesystem::path& image) {
   check_readable_file(image);
   int width = 0, height = 0, channels = 0;
   const std::unique_ptr<float, void (*)(void*)> pixels(stbi_loadf(image.c_str(), &width, &height, &channels, 3),
                                                        stbi_image_free);
-  if (!pixels) throw UserError(image.string() + ": no image that can be read: " + stbi_failure_reason());
+  if (!pixels) throw UserError(image.string() + ": " + fault_of_image(image));
   RadianceImage read{unsigned(width), unsigned(height), {}};
   read.pixels.resize(std::size_t(width) * std::size_t(height));
   for (std::size_t i = 0; i < read.pixels.size(); ++i) {

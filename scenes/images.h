@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/vec3.h"
@@ -15,6 +16,9 @@ struct RadianceImage {
   unsigned width = 0, height = 0;
   std::vector<Vec3f> pixels;
 };
+/// Why `image` cannot be read: "no such file", "no image of a kind that is read: …", "broken or truncated: …". Empty
+/// where it can.
+[[nodiscard]] std::string fault_of_image(const std::filesystem::path& image);
 /// HDR as it is, PNG, JPEG … made linear. Throws UserError where it cannot be read or holds values that are not finite.
 [[nodiscard]] RadianceImage read_radiance(const std::filesystem::path& image);
 /// Mean over all directions of a latitude-longitude image.

@@ -8,6 +8,7 @@
 #include <tbb/parallel_sort.h>
 
 #include "core/instances.h"
+#include "scenes/appearance.h"
 #include "scenes/images.h"
 #include "scenes/vec3d.h"
 
@@ -96,11 +97,15 @@ SceneInfo inspect_scene(const Scene& scene) {
   info.named_instances = scene.instances;
   info.effects = effects_of(scene);
   std::set<std::string> images;
-  for (std::size_t i = 0; i < scene.materials.size(); ++i)
-    if (used[i])
-      for (const std::string& image : {scene.materials[i].diffuse_map, scene.materials[i].opacity_map})
-        if (!image.empty() && images.insert(image).second && !value_range(image))
-          info.report.warnings.push_back(image + ": no image that can be read; its material goes without");
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    if (!used[i]) continue;
+    const Material& m = scene.materials[i];
+    for (const auto& [image, place] :
+         {std::pair(m.diffuse_map, m.diffuse_map_place), {m.opacity_map, m.opacity_map_place}})
+      if (!image.empty() && images.insert(image).second && !value_range(image))
+        info.report.warnings.push_back(unread_image(place, image));
+  }
+  for (std::string& line : unseen_materials(scene)) info.report.warnings.push_back(std::move(line));
   return info;
 }
 

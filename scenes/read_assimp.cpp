@@ -62,10 +62,12 @@ bool is_stand_in(const aiMaterial& material) {
          material.Get(AI_MATKEY_METALLIC_FACTOR, metallic) != AI_SUCCESS;
 }
 
-/// `folder`: of the file, which the paths of images are relative to.
-Material convert(const aiMaterial& in, const std::filesystem::path& folder) {
+/// `file`: of the model, to whose folder the paths of images are relative.
+Material convert(const aiMaterial& in, const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.parent_path();
   Material out;
   if (aiString name; in.Get(AI_MATKEY_NAME, name) == AI_SUCCESS) out.name = name.C_Str();
+  const std::string place = fmt::format("{}: material '{}':", file.string(), one_line(out.name));
   aiColor4D c;
   if (in.Get(AI_MATKEY_COLOR_DIFFUSE, c) == AI_SUCCESS) out.diffuse = color(c);
   if (in.Get(AI_MATKEY_COLOR_SPECULAR, c) == AI_SUCCESS) out.specular = color(c);
@@ -74,9 +76,9 @@ Material convert(const aiMaterial& in, const std::filesystem::path& folder) {
   in.Get(AI_MATKEY_OPACITY, out.opacity);
   in.Get(AI_MATKEY_REFRACTI, out.ior);
   if (aiString map; in.GetTexture(aiTextureType_DIFFUSE, 0, &map) == AI_SUCCESS)
-    out.diffuse_map = (folder / map.C_Str()).string();
+    out.diffuse_map = (folder / map.C_Str()).string(), out.diffuse_map_place = place;
   if (aiString map; in.GetTexture(aiTextureType_OPACITY, 0, &map) == AI_SUCCESS)
-    out.opacity_map = (folder / map.C_Str()).string();
+    out.opacity_map = (folder / map.C_Str()).string(), out.opacity_map_place = place;
 
   // The metallic-roughness model of glTF.
   float metallic = 0.0f, transmission = 0.0f;
@@ -100,10 +102,9 @@ class AssimpReader {
   AssimpReader(const std::filesystem::path& path, const aiScene& in) : name_(path.string()), in_(in) {}
 
   Scene read() {
-    const std::filesystem::path folder = std::filesystem::path(name_).parent_path();
     for (unsigned i = 0; i < in_.mNumMaterials; ++i) {
       const aiMaterial& material = *in_.mMaterials[i];
-      scene_.materials.push_back(is_stand_in(material) ? Material{.name = "default"} : convert(material, folder));
+      scene_.materials.push_back(is_stand_in(material) ? Material{.name = "default"} : convert(material, name_));
     }
     if (scene_.materials.size() > 65534) throw UserError(name_ + ": more than 65534 materials");
     add_node(*in_.mRootNode, aiMatrix4x4t<double>());

@@ -28,22 +28,26 @@ constexpr Numbers kNumbers[] = {{"Ka", 3},           {"Kd", 3},       {"Ks", 3},
                                 {"Kt", 3},           {"Ns", 1},       {"Ni", 1},      {"d", 1, 0, 1}, {"Tr", 1, 0, 1},
                                 {"illum", 1, 0, 10}, {"Pr", 1, 0, 1}, {"Pm", 1, 0, 1}};
 
-/// tinyobjloader takes what is no number, numbers that are missing and `-halo` for 0. Throws UserError.
-void check_line(std::string_view line, const std::string& where) {
-  const std::string_view keyword = next_word(line);
+/// The line, a colour of one number written out, which stands for all three: tinyobjloader takes what is no number,
+/// numbers that are missing and `-halo` for 0. Throws UserError.
+std::string checked_line(std::string_view line, const std::string& where) {
+  const std::string_view whole = line, keyword = next_word(line);
   if (keyword.starts_with("map_") && line.find_first_not_of(" \t\r") == std::string_view::npos)
     throw UserError(fmt::format("{}: {} names no file", where, keyword));
   const auto* known = std::ranges::find(kNumbers, keyword, &Numbers::keyword);
-  if (known == std::end(kNumbers)) return;
+  if (known == std::end(kNumbers)) return std::string(whole);
+  std::string_view first;
   for (int i = 0; i < known->count; ++i) {
     const std::string_view word = next_word(line);
+    if (i == 1 && word.empty()) return fmt::format("{} {} {} {}", keyword, first, first, first);
+    if (i == 0) first = word;
     float value;
     const char* const end = parse_float(word.data(), word.data() + word.size(), value);
     const bool is_number =
         !word.empty() && end == word.data() + word.size() && (keyword != "illum" || value == std::trunc(value));
     if (!is_number) {
       throw UserError(word.empty() ? fmt::format("{}: {} needs {}", where, keyword,
-                                                 known->count == 3 ? "three numbers" : "a number")
+                                                 known->count == 3 ? "three numbers, or one for all" : "a number")
                                    : fmt::format("{}: {}: '{}' is no {}", where, keyword, one_line(word),
                                                  keyword == "illum" ? "whole number" : "number"));
     }
@@ -54,22 +58,38 @@ void check_line(std::string_view line, const std::string& where) {
                                       : "a finite number from 0 on"));
     }
   }
+  return std::string(whole);
 }
 
-void check_lines(std::string_view text, const std::filesystem::path& path) {
+/// Where a material's maps are named.
+struct MapPlaces {
+  std::string diffuse, opacity;
+};
+
+/// `text` as tinyobjloader reads it right, and the places of the maps of each material, in their order.
+std::pair<std::string, std::vector<MapPlaces>> checked_lines(std::string_view text, const std::filesystem::path& path) {
+  std::pair<std::string, std::vector<MapPlaces>> result;
+  auto& [checked, places] = result;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-    check_line(text.substr(0, end), fmt::format("{}:{}", path.string(), number));
+    std::string_view line = text.substr(0, end);
+    const std::string where = fmt::format("{}:{}", path.string(), number);
+    checked += checked_line(line, where) + "\n";
+    const std::string_view keyword = next_word(line);
+    if (keyword == "newmtl" && line.find_first_not_of(" \t\r") != std::string_view::npos) places.emplace_back();
+    if (keyword == "map_Kd" && !places.empty()) places.back().diffuse = where + ": map_Kd";
+    if (keyword == "map_d" && !places.empty()) places.back().opacity = where + ": map_d";
     text.remove_prefix(std::min(end + (text.substr(end).starts_with("\r\n") ? 2 : 1), text.size()));
   }
+  return result;
 }
 
 }  // namespace
 
 std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<std::string>& warnings) {
   const FileBytes bytes(path);
-  check_lines(without_mark(bytes.text()), path);
-  std::istringstream stream{std::string(without_mark(bytes.text()))};
+  const auto [text, places] = checked_lines(without_mark(bytes.text()), path);
+  std::istringstream stream(text);
   std::map<std::string, int> ids;
   std::vector<tinyobj::material_t> read;
   std::string warning, error;
@@ -94,6 +114,10 @@ std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<st
     if (material.transmission == Vec3f{0, 0, 0}) material.transmission = {1, 1, 1};
     if (!m.diffuse_texname.empty()) material.diffuse_map = beside(path, m.diffuse_texname).string();
     if (!m.alpha_texname.empty()) material.opacity_map = beside(path, m.alpha_texname).string();
+    if (const std::size_t number = materials.size(); number < places.size()) {
+      material.diffuse_map_place = places[number].diffuse;
+      material.opacity_map_place = places[number].opacity;
+    }
     materials.push_back(std::move(material));
   }
   return materials;

@@ -37,7 +37,8 @@ struct Material {
   float ior = 1.0f;             ///< Ni
   float opacity = 1.0f;         ///< d
   int illum = 2;
-  std::string diffuse_map{}, opacity_map{};  ///< paths of the images; empty: none
+  std::string diffuse_map{}, opacity_map{};              ///< paths of the images; empty: none
+  std::string diffuse_map_place{}, opacity_map_place{};  ///< "room.mtl:7: map_Kd", for messages; empty: not known
 };
 
 struct Light {
@@ -50,12 +51,12 @@ struct Light {
 /// What was counted while loading. Nothing of it stops a load; every line of it is reported.
 struct LoadReport {
   std::size_t triangles_read = 0;
-  std::size_t non_finite = 0;         ///< dropped: a vertex is NaN or infinite
-  std::size_t out_of_range = 0;       ///< dropped: a coordinate beyond kMaxCoordinate
-  std::size_t degenerate = 0;         ///< dropped: exactly zero area
-  int scaled_by = 0;                  ///< the exponent of the power of two that rescale() multiplied by; 0: it did not
-  std::size_t polygons_split = 0;     ///< faces of more than three corners, triangulated
-  std::vector<std::string> warnings;  ///< one line each
+  std::size_t non_finite = 0;      ///< dropped: a vertex is NaN or infinite
+  std::size_t out_of_range = 0;    ///< dropped: a coordinate beyond kMaxCoordinate
+  std::size_t degenerate = 0;      ///< dropped: exactly zero area
+  int scaled_by = 0;               ///< the exponent of the power of two that rescale() multiplied by; 0: it did not
+  std::size_t polygons_split = 0;  ///< faces of more than three corners, triangulated
+  std::vector<std::string> warnings{};  ///< one line each
 };
 
 /// Texture coordinates of a triangle's corners, v upwards; [0, 1] is one image.

@@ -123,7 +123,7 @@ TEST_CASE("bad scene files: file, line, and the nearest key") {
        ":2: a light's intensity must not be negative"},
       {"meshes: [a.obj]\nenvironment: {radiance: 1, image: x.hdr}\n", ":2: environment needs either"},
       {"meshes: [a.obj]\nenvironment: {image: x.hdr}\n", "x.hdr: no such file"},
-      {"meshes: [a.obj]\nenvironment: {image: a.obj}\n", "a.obj: no image that can be read"},
+      {"meshes: [a.obj]\nenvironment: {image: a.obj}\n", "a.obj: no image of a kind that is read"},
       {"meshes: [a.obj]\ncamera:\n  position: [0, 0, 1]\n  look_at: [0, 0, 0]\n  aperture_radius: 1\n  focus_distance: "
        "0\n",
        ":6: a camera with an aperture_radius needs a focus_distance above 0"},
@@ -231,11 +231,40 @@ TEST_CASE("inspection tells images that cannot be read, of used materials alone,
       "instances: [{mesh: a, transforms: [{translate: [2, 0, 0]}, {translate: [4, 0, 0]}]}]\nmeshes: [a.obj, ";
   const SceneInfo still = inspect_scene(load_file(folder.write("still.yaml", meshes + "b.obj]\n")));
   REQUIRE(still.report.warnings.size() == 1);
-  CHECK_THAT(still.report.warnings[0], Catch::Contains("none.png: no image that can be read"));
+  CHECK(still.report.warnings[0] == (folder / "a.mtl").string() + ":3: map_Kd " + (folder / "none.png").string() +
+                                        ": no such file; its material goes without");
   CHECK((still.instances == 3 && still.named_instances == 2));
   const SceneInfo moving =
       inspect_scene(load_file(folder.write("moving.yaml", meshes + "{keyframes: [b.obj, c.obj]}]\nshutter: [0, 1]\n")));
   CHECK((moving.instances == 0 && moving.named_instances == 2 && moving.key_frames == 2));
+}
+
+TEST_CASE("inspection tells why an image cannot be read, and glass that cannot be seen") {
+  const Folder folder;
+  folder.write("a.webp", "RIFF\x10\0\0\0WEBPVP8 and so on");
+  folder.write("cut.png", "\x89PNG\r\n\x1a\n");
+  fs::create_directory(folder / "folder.png");
+  const fs::path model = folder.write("a.obj", "mtllib a.mtl\nusemtl #1\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const std::string mtl = (folder / "a.mtl").string(), place = mtl + ":3: map_d ";
+  for (const auto& [image, why] :
+       {std::pair{"a.webp",
+                  "no image of a kind that is read, which are PNG, JPEG, BMP, TGA, GIF, PSD, PNM, PIC and HDR"},
+        {"cut.png", "broken or truncated"},
+        {"folder.png", "no regular file"},
+        {"none.png", "no such file"}}) {
+    INFO(image);
+    folder.write("a.mtl", std::string("newmtl #1\nKd 1 1 1\nmap_d ") + image + "\n");
+    const std::vector<std::string> warnings = inspect_scene(load_file(model)).report.warnings;
+    REQUIRE(warnings.size() == 1);
+    CHECK_THAT(warnings[0], Catch::StartsWith(place + (folder / image).string() + ": " + why));
+  }
+  folder.write("a.mtl", "newmtl #1\nKd 1 1 1\nillum 4\n");
+  const std::vector<std::string> warnings = inspect_scene(load_file(model)).report.warnings;
+  REQUIRE(warnings.size() == 1);
+  CHECK_THAT(warnings[0],
+             Catch::Contains("material '#1' is glass (illum 4) of Ni 1 without colour: 1 triangle cannot"));
+  folder.write("a.mtl", "newmtl #1\nKd 1 1 1\nillum 5\nnewmtl unused\nillum 4\n");
+  CHECK(inspect_scene(load_file(model)).report.warnings.empty());
 }
 
 TEST_CASE("effects: called for exactly where something needs them") {

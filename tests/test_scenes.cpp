@@ -147,7 +147,7 @@ TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
   const std::pair<const char*, const char*> wrong[] = {
       {"Ns abc", "m.mtl:2: Ns: 'abc' is no number"},
       {"Kd a b c", "m.mtl:2: Kd: 'a' is no number"},
-      {"Kd 0.5", "m.mtl:2: Kd needs three numbers"},
+      {"Kd 0.5 0.5", "m.mtl:2: Kd needs three numbers, or one for all"},
       {"Ke -1 0 0", "m.mtl:2: Ke is -1, not a finite number from 0 on"},
       {"Ks 1 1 nan", "m.mtl:2: Ks is nan, not a finite number"},
       {"Ke 1e39 0 0", "m.mtl:2: Ke is 1e39, not a finite number"},
@@ -167,10 +167,23 @@ TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
     INFO(line);
     CHECK_THAT(refusal(line), Catch::Contains(says));
   }
-  for (const char* line : {"", "Kd 2 +1 .5  # bright", "map_Kd #1.png", "Ns 1e3", "a_word_of_others abc", "# Ns abc"}) {
+  for (const char* line :
+       {"", "Kd 0.5", "Kd 2 +1 .5  # bright", "map_Kd #1.png", "Ns 1e3", "a_word_of_others abc", "# Ns abc"}) {
     INFO(line);
     CHECK(refusal(line) == "");
   }
+}
+
+TEST_CASE("MTL: one number of a colour stands for all three") {
+  const Folder folder;
+  std::vector<std::string> warnings;
+  const std::vector<Material> read = read_mtl(
+      folder.write("m.mtl", "newmtl #1\nKd 0.5\r\n  Ks\t.25  # and so on\nnewmtl b\nTf 0.75\nKe 1 2 3\n"), warnings);
+  REQUIRE(read.size() == 2);
+  CHECK(read[0].diffuse == Vec3f{0.5f, 0.5f, 0.5f});
+  CHECK(read[0].specular == Vec3f{0.25f, 0.25f, 0.25f});
+  CHECK(read[1].transmission == Vec3f{0.75f, 0.75f, 0.75f});
+  CHECK(read[1].emission == Vec3f{1, 2, 3});
 }
 
 TEST_CASE("OBJ and MTL: a byte-order mark costs no line") {
