@@ -1,5 +1,6 @@
 #include "scenes/gltf_check.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <unordered_map>
 #include <vector>
@@ -24,7 +25,7 @@ struct Child {
 /// Notes all of `nodes[.].children[.]` while the text is read; nodes are an array in glTF 2, an object in glTF 1.
 class NodeHandler final : public nlohmann::json_sax<nlohmann::json> {
  public:
-  explicit NodeHandler(const std::string& name) : name_(name) {}
+  NodeHandler(std::string_view json, const std::string& name) : json_(json), name_(name) {}
 
   bool null() override { return value(); }
   bool boolean(bool) override { return value(); }
@@ -42,7 +43,15 @@ class NodeHandler final : public nlohmann::json_sax<nlohmann::json> {
   bool end_object() override { return close(); }
   bool end_array() override { return close(); }
   bool parse_error(std::size_t at, const std::string&, const nlohmann::detail::exception& error) override {
-    throw UserError(fmt::format("{}: broken or truncated: byte {} of its JSON: {}", name_, at, one_line(error.what())));
+    // "[json.exception.…] parse error at line 1, column 26: syntax error while … - what was found; what is expected"
+    std::string_view what = error.what();
+    if (const std::size_t dash = what.find(" - "); dash != std::string_view::npos)
+      what.remove_prefix(dash + 3);
+    else if (const std::size_t colon = what.find(": "); colon != std::string_view::npos)
+      what.remove_prefix(colon + 2);
+    const std::string_view before = json_.substr(0, at > 0 ? at - 1 : 0);
+    throw UserError(fmt::format("{}: broken or truncated: line {} of its JSON: {}; copy or export it anew", name_,
+                                1 + std::ranges::count(before, '\n'), one_line(what)));
   }
 
   std::vector<std::string> nodes;
@@ -77,6 +86,7 @@ class NodeHandler final : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
 
+  std::string_view json_;
   const std::string& name_;
   std::vector<Level> path_;
 };
@@ -120,8 +130,9 @@ std::string plain(std::string_view json) {
 }  // namespace
 
 void check_gltf(std::string_view json, const std::string& name) {
-  NodeHandler handler(name);
-  (void)nlohmann::json::sax_parse(plain(without_mark(json)), &handler);
+  const std::string text = plain(without_mark(json));
+  NodeHandler handler(text, name);
+  (void)nlohmann::json::sax_parse(text, &handler);
   check_forest(handler.nodes, handler.children, name);
 }
 

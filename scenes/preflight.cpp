@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "scenes/file_bytes.h"
 #include "scenes/gltf_check.h"
+#include "scenes/stl_check.h"
 
 namespace arboretum {
 namespace {
@@ -128,20 +129,6 @@ void check_glb(std::string_view bytes, const std::string& name) {
       throw UserError(name + ": broken or truncated: a chunk of the GLB is longer than the file");
   }
   check_gltf(bytes.substr(20, word(12)), name);
-}
-
-/// Assimp reads an STL file of text up to where it is cut off, and says nothing.
-void check_stl(std::string_view bytes, const std::string& path) {
-  constexpr std::size_t kHead = 80 + sizeof(std::uint32_t), kTriangle = 50;
-  std::uint32_t triangles = 0;
-  if (bytes.size() >= kHead) std::memcpy(&triangles, bytes.data() + 80, sizeof triangles);
-  const bool binary = bytes.size() >= kHead && bytes.size() == kHead + kTriangle * std::size_t(triangles);
-  const std::string_view text = without_mark(bytes);
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  if (binary || first == std::string_view::npos || !text.substr(first).starts_with("solid")) return;
-  const std::size_t end = std::max(text.rfind("endsolid") + 1, text.rfind("end solid") + 1),
-                    facet = text.rfind("facet normal") + 1;  // 0 where there is none
-  if (end == 0 || end < facet) throw UserError(path + ": broken or truncated: no 'endsolid' behind its triangles");
 }
 
 }  // namespace

@@ -178,6 +178,20 @@ class AssimpReader {
   std::size_t short_faces_ = 0;
 };
 
+/// What assimp says of a file that it cannot read, as far as a user can do something about it.
+[[noreturn]] void fail(const std::filesystem::path& path, std::string_view said) {
+  constexpr std::string_view kNoFile = "could not open referenced file \"";
+  if (const std::size_t at = said.find(kNoFile); at != std::string_view::npos) {
+    const std::string_view name = said.substr(at + kNoFile.size());
+    throw UserError(fmt::format("{}: it refers to '{}', and there is no such file beside it; put that there",
+                                path.string(), one_line(name.substr(0, name.find('"')))));
+  }
+  if (said.starts_with("GLTF: ")) said.remove_prefix(6);
+  std::string reason = one_line(said);
+  while (reason.ends_with('.')) reason.pop_back();
+  throw UserError(fmt::format("{}: broken or truncated: {}; copy or export it anew", path.string(), reason));
+}
+
 }  // namespace
 
 Scene read_assimp(const std::filesystem::path& path) {
@@ -195,10 +209,9 @@ Scene read_assimp(const std::filesystem::path& path) {
     const LogCapture capture(said);
     in = importer.ReadFile(path.string(), 0);
   } catch (const std::exception& error) {
-    throw UserError(path.string() + ": broken or truncated: " + one_line(error.what()));
+    fail(path, error.what());
   }
-  if (!in || !in->mRootNode)
-    throw UserError(path.string() + ": broken or truncated: " + one_line(importer.GetErrorString()));
+  if (!in || !in->mRootNode) fail(path, importer.GetErrorString());
   for (const std::string& line : said) {
     if (line.find("out of range") != std::string::npos) throw UserError(path.string() + ": " + line);
   }
