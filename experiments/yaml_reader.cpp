@@ -32,25 +32,6 @@ std::string read_text(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// A tab outside a comment is refused: YAML forbids it as indentation, and yaml-cpp reads some as something
-/// else.
-void refuse_tabs(const std::string& text, const std::filesystem::path& file) {
-  std::size_t line = 1;
-  bool comment = false;
-  char before = '\n';
-  for (char c : text) {
-    if (c == '\n')
-      ++line, comment = false;
-    else if (c == '#' && (before == ' ' || before == '\n' || before == '\t'))
-      comment = true;
-    else if (c == '\t' && !comment) {
-      throw UserError(
-          fmt::format("{}:{}: a tab; YAML is indented with spaces: put spaces in its place", file.string(), line));
-    }
-    before = c;
-  }
-}
-
 /// For a message of one line: a file that is no YAML may be one scalar from end to end.
 std::string shown(const YAML::Node& node) {
   constexpr std::size_t kMostShown = 60;
@@ -71,17 +52,7 @@ std::string one_spelling(const std::string& word) {
 }  // namespace
 
 YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
-  const std::string text = read_text(file_);
-  refuse_tabs(text, file_);
-  if (text.find('\0') != std::string::npos) {
-    throw UserError(fmt::format("{}: holds zero bytes, so it is no YAML text", file_.string()));
-  }
-  try {
-    root_ = read_document(text, file_, "a configuration");
-  } catch (const YAML::Exception& e) {
-    throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it", file_.string(),
-                                e.mark.line + 1, e.msg));
-  }
+  root_ = read_document(read_text(file_), file_, "a configuration");
   if (!root_ || root_.IsNull())
     throw UserError(fmt::format("{}: empty; a configuration has at least `scenes`", file_.string()));
 }

@@ -13,9 +13,43 @@
 #include "scenes/vec3d.h"
 
 namespace arboretum {
+namespace {
+
+/// A tab outside a comment is refused: YAML forbids it as indentation, and yaml-cpp reads some as something
+/// else.
+void refuse_tabs(const std::string& text, const std::filesystem::path& file) {
+  std::size_t line = 1;
+  bool comment = false;
+  char before = '\n';
+  for (char c : text) {
+    if (c == '\n')
+      ++line, comment = false;
+    else if (c == '#' && (before == ' ' || before == '\n' || before == '\t'))
+      comment = true;
+    else if (c == '\t' && !comment) {
+      throw UserError(
+          fmt::format("{}:{}: a tab; YAML is indented with spaces: put spaces in its place", file.string(), line));
+    }
+    before = c;
+  }
+}
+
+std::vector<YAML::Node> read_documents(const std::string& text, const std::filesystem::path& file) {
+  refuse_tabs(text, file);
+  if (text.find('\0') != std::string::npos)
+    throw UserError(fmt::format("{}: holds zero bytes, so it is no YAML text", file.string()));
+  try {
+    return YAML::LoadAll(text);
+  } catch (const YAML::Exception& error) {
+    throw UserError(fmt::format("{}:{}: not valid YAML: {}; mend the line or the one above it", file.string(),
+                                error.mark.line + 1, one_line(error.msg)));
+  }
+}
+
+}  // namespace
 
 YAML::Node read_document(const std::string& text, const std::filesystem::path& path, std::string_view what) {
-  const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+  const std::vector<YAML::Node> documents = read_documents(text, path);
   if (documents.size() > 1)
     throw UserError(fmt::format("{}: {} YAML documents; {} is one: put the others into files of their own",
                                 path.string(), documents.size(), what));
@@ -24,11 +58,7 @@ YAML::Node read_document(const std::string& text, const std::filesystem::path& p
 
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
   const FileBytes bytes(path_);
-  try {
-    root_ = read_document(std::string(bytes.text()), path_, "a scene");
-  } catch (const YAML::Exception& error) {
-    throw UserError(fmt::format("{}:{}: {}", path_.string(), error.mark.line + 1, one_line(error.msg)));
-  }
+  root_ = read_document(std::string(bytes.text()), path_, "a scene");
   if (!root_.IsMap())
     throw UserError(path_.string() + ": is no scene file: expected keys such as 'meshes:' at its top");
 }

@@ -15,7 +15,7 @@
 namespace arboretum {
 
 /// The YAML document that `text` is; null where it is empty. `what`: the kind of file, "a scene", for messages. Throws
-/// UserError where there are several, and YAML::Exception.
+/// UserError where it is none, or there are several.
 [[nodiscard]] YAML::Node read_document(const std::string& text, const std::filesystem::path& path,
                                        std::string_view what);
 
