@@ -95,6 +95,21 @@ Integrator chosen_integrator(const std::string& word, const std::vector<Effect>&
   return is_lit(called_for(effects)) ? Integrator::path : Integrator::ambient_occlusion;
 }
 
+/// A picture without light is black, and a user may wonder why; empty where something shines.
+std::string why_dark(const std::vector<Effect>& effects, EffectSet simulated, Integrator integrator) {
+  if (!draws_light(integrator)) return {};
+  const EffectSet lights = called_for(effects);
+  if (!is_lit(lights))
+    return fmt::format(
+        "nothing in the scene emits light, so {} draws it black; take --integrator ambient_occlusion or normals, or "
+        "give "
+        "it lights, an environment or a material with Ke (docs/scenes.md)",
+        to_string(integrator));
+  for (const EffectKind kind : {EffectKind::shadow_hard, EffectKind::shadow_soft, EffectKind::env_light})
+    if (lights.has(kind) && simulated.has(kind)) return {};
+  return "--effects leaves out all light that the scene has, so the picture is black";
+}
+
 EffectSet simulated(EffectSet chosen, Integrator integrator) {
   for (std::size_t i = 0; i < kEffectNames.size(); ++i)
     if (!takes_part(EffectKind(i), integrator)) chosen = chosen.without(EffectKind(i));
@@ -161,6 +176,15 @@ class Bar {
   double begin_, drawn_ = 0.0;
 };
 
+/// Where no light is drawn most effects are none, and a list of such alone is likely a mistake.
+void note_idle_effects(const RenderCommand& command, EffectSet set, EffectSet called_for, Integrator integrator) {
+  if (draws_light(integrator) || command.effects == "auto" || set != simulated(called_for, integrator)) return;
+  fmt::print(stderr,
+             "--effects {} changes nothing: {} has no part for effects but dof, motion_blur, alpha_cutout and "
+             "instancing\n",
+             command.effects, to_string(integrator));
+}
+
 /// Of the loading.
 void print_warnings(const LoadReport& report) {
   if (const std::string dropped = dropped_in_words(report); !dropped.empty()) fmt::print("warning       {}\n", dropped);
@@ -187,12 +211,14 @@ void render_heat_map(const RenderCommand& command, const Scene& scene, RenderSet
   }
   const RenderScene ready(scene, set);
   KernelChoice choice = command.kernel;
-  if (choice.traversal == "auto") choice.traversal = "single";
+  const bool was_auto = choice.traversal == "auto";
+  if (was_auto) choice.traversal = "single";  // each pixel's ray is to visit what it visits alone
   const BuiltKernel built = build_kernel(choice, ready.mesh(), this_registry());
   const HeatMap map = count_work(BatchTracer(ready, *built.accel, *built.kernel), settings, what);
   const DrawnPicture picture = draw(map, unit);
   fmt::print("scene         {}, {} triangles\n", scene.name, scene.mesh.size());
-  fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
+  fmt::print("kernel        {}, built in {:.3f} s{}\n", built.name(), built.report.seconds,
+             was_auto ? "; heat maps take single rays where the traversal is auto" : "");
   print_warnings(scene.report);
   if (!no_part.empty())
     fmt::print("effects       no part of heat maps, though asked for: {}\n", fmt::join(no_part, ", "));
@@ -210,6 +236,9 @@ ExitStatus command_render(const RenderCommand& command) {
   check_picture_path(out);
   refuse_doubled_effects(command.effects);
   static_cast<void>(parse_exposure(command.exposure, Integrator::path));  // before the scene is read
+  if (!command.exposure.empty() && out.extension() == ".pfm")
+    throw UserError(fmt::format("--exposure has no effect: {} holds the radiance itself; take it out, or write a .png",
+                                out.string()));
   const Scene scene = load_scene(parse_scene_word(command.scene));
   const std::vector<Effect> effects = effects_of(scene);
   RenderSettings settings = command.settings;
@@ -237,8 +266,11 @@ ExitStatus command_render(const RenderCommand& command) {
   fmt::print("kernel        {}, built in {:.3f} s\n", built.name(), built.report.seconds);
   print_warnings(scene.report);
   for (const std::string& warning : ready.warnings()) fmt::print("warning       {}\n", warning);
+  if (const std::string why = why_dark(effects, set, settings.integrator); !why.empty())
+    fmt::print("warning       {}\n", why);
   print_effects(effects, chosen, set, settings.integrator);
   flush_output();
+  note_idle_effects(command, set, called_for(effects), settings.integrator);
 
   const BatchTracer tracer(ready, *built.accel, *built.kernel);
   RenderStatistics statistics;
@@ -252,8 +284,10 @@ ExitStatus command_render(const RenderCommand& command) {
     fmt::print("warning       {} samples were no finite number and are left out\n", statistics.not_finite);
   flush_output();
   write_picture(out, picture, stops);
-  fmt::print("picture       {} ({}exposure {:+.2f} stops; {:.2f} s)\n", out.string(), exposure ? "" : "automatic ",
-             stops, seconds);
+  const std::string developed = out.extension() == ".pfm"
+                                    ? std::string("radiance")
+                                    : fmt::format("{}exposure {:+.2f} stops", exposure ? "" : "automatic ", stops);
+  fmt::print("picture       {} ({}; {:.2f} s)\n", out.string(), developed, seconds);
   return ExitStatus::kDone;
 }
 

@@ -12,8 +12,8 @@ f 1 2 3\nf 1 3 4\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 3 4 8\nf 3 8 7\n"""
 
 
 class Render(CommandLineCase):
-    def render(self, *words):
-        result = self.call("render", "cornell_box:600", "--resolution", "16x12", "--spp", "2", *words)
+    def render(self, *words, spp=2):
+        result = self.call("render", "cornell_box:600", "--resolution", "16x12", *(("--spp", spp) if spp else ()), *words)
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stdout
 
@@ -29,7 +29,7 @@ class Render(CommandLineCase):
     def test_render_is_the_same_for_all_effects_structures_and_threads(self):
         pictures = set()
         for i, words in enumerate(((), ("--effects", "all"), ("--structure", "kdtree"), ("--structure", "bvh16", "--traversal", "queued"), ("--threads", "2"))):
-            self.render("--out", f"{i}.pfm", *words)
+            self.assertIn(f"picture       {i}.pfm (radiance; ", self.render("--out", f"{i}.pfm", *words))
             pictures.add((self.folder / f"{i}.pfm").read_bytes())
         self.assertEqual(len(pictures), 1)
         self.render("--seed", "2", "--out", "other.pfm")
@@ -38,6 +38,9 @@ class Render(CommandLineCase):
     def test_render_other_integrators_and_heat_maps(self):
         for integrator in ("whitted", "ambient_occlusion", "normals"):
             self.assertIn(f"integrator    {integrator}", self.render("--integrator", integrator))
+        self.assertNotIn("warning", self.render())
+        self.assertIn("heat maps take single rays where the traversal is auto\n", self.render("--heatmap", "nodes", spp=None))
+        self.assertNotIn("take single rays", self.render("--heatmap", "nodes", "--traversal", "packet8", spp=None))
         normals = self.render("--integrator", "normals", "--effects", "mirror,env_light", "--threads", "2")
         self.assertIn("  - mirror        no part of normals; the scene has", normals)
         self.assertIn("  - env_light     no part of normals, though asked for", normals)
@@ -58,6 +61,15 @@ class Render(CommandLineCase):
         (self.folder / "cube.obj").write_text(CUBE)
         dark = self.call("render", "cube.obj", "--resolution", "8x8")
         self.assertIn("ambient_occlusion", dark.stdout)  # nothing emits light
+        self.assertNotIn("warning", dark.stdout)
+        for integrator in ("path", "whitted"):
+            black = self.call("render", "cube.obj", "--resolution", "8x8", "--spp", "1", "--integrator", integrator, "--effects", "all")
+            self.assertIn(f"warning       nothing in the scene emits light, so {integrator} draws it black; take --integrator ambient_occlusion", black.stdout)
+        self.assertIn("warning       --effects leaves out all light that the scene has", self.render("--effects", "mirror,env_light"))
+        idle = self.call("render", "cornell_box:600", "--resolution", "8x8", "--integrator", "normals", "--effects", "mirror,env_light")
+        self.assertEqual((idle.returncode, idle.stderr), (0, "--effects mirror,env_light changes nothing: normals has no part for effects but dof, motion_blur, alpha_cutout and instancing\n"))
+        lens = self.call("render", "cornell_box:600", "--resolution", "8x8", "--integrator", "normals", "--effects", "dof")
+        self.assertEqual((lens.returncode, lens.stderr), (0, ""))
         self.assert_error(self.call("render", "cube.obj", "--resolution", "8x8", "--depth", "9"), "--depth has no effect: ambient_occlusion", "nothing in the scene emits light")
 
     def test_render_errors(self):
@@ -78,6 +90,7 @@ class Render(CommandLineCase):
             (("--heatmap", "nodes", "--resolution", "65000x65000"), ".pfm"),
             (("--resolution", "40000x40000"), ".pfm"),
             (("--out", "folder.png"), "cannot be written"),
+            (("--exposure", "1", "--out", "a.pfm"), "--exposure has no effect: a.pfm holds the radiance itself; take it out"),
             (("--clamp", "nan"), "clamp"),
             (("--clamp", "0"), "--clamp"),
             (("--integrator", "whitted", "--depth", "33"), "0 to 32"),
