@@ -1,4 +1,7 @@
 // Scene files, the words that name scenes, the catalogue, inspection, effects.
+#include <iterator>
+#include <sstream>
+
 #include "scenes/catalogue.h"
 #include "scenes/effects.h"
 #include "scenes/inspect.h"
@@ -144,6 +147,59 @@ TEST_CASE("bad scene files: file, line, and the nearest key") {
   for (const auto& c : cases) {
     INFO(c.first);
     CHECK_THAT(error_of([&] { (void)load_file(folder.write("s.yaml", c.first)); }), Catch::Contains(c.second));
+  }
+}
+
+namespace {
+
+/// The keys that the reader names as valid where it meets one that is not.
+std::vector<std::string> valid_keys(const std::string& error) {
+  const std::size_t begin = error.find("(valid: ");
+  REQUIRE(begin != std::string::npos);
+  std::string list = error.substr(begin + 8, error.rfind(')') - begin - 8);
+  std::ranges::replace(list, ',', ' ');
+  std::istringstream words(list);
+  return {std::istream_iterator<std::string>(words), {}};
+}
+
+}  // namespace
+
+TEST_CASE("docs/scenes.md has a row for every key that scene files may hold, and for no other") {
+  const Folder folder;
+  folder.write("a.obj", obj_text());
+  std::ifstream stream(fs::path(ARBORETUM_SOURCE_DIR) / "docs" / "scenes.md");
+  const std::string page(std::istreambuf_iterator<char>(stream), {});
+  const std::string mesh = "meshes: [a.obj]\n", instance = mesh + "instances: [{mesh: a, transforms: [";
+  const std::pair<const char*, std::string> kinds[] = {
+      {"The scene", mesh + "zzzz: 1\n"},
+      {"A mesh", "meshes: [{zzzz: 1}]\n"},
+      {"An instance", mesh + "instances: [{zzzz: 1}]\n"},
+      {"A transform", instance + "{zzzz: 1}]}]\n"},
+      {"A rotation", instance + "{rotate: {zzzz: 1}}]}]\n"},
+      {"The camera", mesh + "camera: {zzzz: 1}\n"},
+      {"The environment", mesh + "environment: {zzzz: 1}\n"},
+      {"A point light", mesh + "lights: [{type: point, zzzz: 1}]\n"},
+      {"A directional light", mesh + "lights: [{type: directional, zzzz: 1}]\n"},
+      {"A spot light", mesh + "lights: [{type: spot, zzzz: 1}]\n"},
+  };
+  std::size_t sections = 0;
+  for (std::size_t at = page.find("\n## "); at != std::string::npos; at = page.find("\n## ", at + 1)) ++sections;
+  CHECK(sections == std::size(kinds));
+  for (const auto& [heading, text] : kinds) {
+    INFO(heading);
+    const std::size_t begin = page.find(std::string("\n## ") + heading + "\n");
+    REQUIRE(begin != std::string::npos);
+    const std::string section = page.substr(begin, page.find("\n## ", begin + 1) - begin);
+    const std::vector<std::string> keys =
+        valid_keys(error_of([&, &text = text] { (void)load_file(folder.write("s.yaml", text)); }));
+    CHECK(keys.size() >= 2);
+    for (const std::string& key : keys) {
+      INFO(key);
+      CHECK(section.find("\n| `" + key + "` | ") != std::string::npos);
+    }
+    std::size_t rows = 0;
+    for (std::size_t at = section.find("\n| `"); at != std::string::npos; at = section.find("\n| `", at + 1)) ++rows;
+    CHECK(rows == keys.size());
   }
 }
 
