@@ -53,15 +53,17 @@ ExitStatus command_info(const std::string& word, bool json) {
   fmt::print("surface       {} ({} edges, {} at a border, {} of more than two triangles)\n",
              info.closed ? "closed" : "open", info.edges, info.boundary_edges, info.non_manifold_edges);
   fmt::print("materials     {}\n", info.materials);
-  fmt::print("lights        {}, {} emissive triangles\n", info.lights, info.emissive_triangles);
+  fmt::print("lights        {}, {} emissive triangle{}\n", info.lights, info.emissive_triangles,
+             info.emissive_triangles == 1 ? "" : "s");
   if (info.key_frames > 1)
     fmt::print("motion        {} key frames, {} triangles move; shutter open from {:g} to {:g} of [0, 1]\n",
                info.key_frames, info.moving_triangles, info.shutter.open, info.shutter.close);
   else
     fmt::print("motion        nothing moves\n");
   if (info.instances > 0)
-    fmt::print("instances     {} of {} meshes with {} triangles; {} named by the scene\n", info.instances,
-               info.prototypes, info.prototype_triangles, info.named_instances);
+    fmt::print("instances     {} of {} mesh{} with {} triangle{}; {} named by the scene\n", info.instances,
+               info.prototypes, info.prototypes == 1 ? "" : "es", info.prototype_triangles,
+               info.prototype_triangles == 1 ? "" : "s", info.named_instances);
   else if (info.named_instances > 0)
     fmt::print("instances     {} named by the scene, laid out in one mesh{}\n", info.named_instances,
                info.key_frames > 1 ? " because it moves" : "");

@@ -6,6 +6,7 @@
 
 #include "scenes/images.h"
 #include "scenes/material_kind.h"
+#include "scenes/readers.h"
 
 namespace arboretum {
 namespace {
@@ -53,10 +54,14 @@ class Effects {
       if (materials++ == 0) first = i;
       triangles += usage_.triangles[i];
     }
-    set(name, materials > 0,
-        materials > 0 ? fmt::format("{}: {} triangles of {} material{}, first {}", what, triangles, materials,
-                                    materials == 1 ? "" : "s", scene_.materials[first].name)
-                      : fmt::format("no {}", what));
+    const auto found = [&] {
+      const std::string& first_name = scene_.materials[first].name;
+      return fmt::format(
+          "{}: {} triangle{} of {} material{}{}", what, triangles, triangles == 1 ? "" : "s", materials,
+          materials == 1 ? "" : "s",
+          first_name.empty() ? "" : fmt::format(", {}{}", materials == 1 ? "" : "first ", one_line(first_name)));
+    };
+    set(name, materials > 0, materials > 0 ? found() : fmt::format("no {}", what));
     return materials > 0;
   }
 

@@ -97,8 +97,9 @@ void check_forest(const std::vector<std::string>& nodes, const std::vector<Child
   for (const Child& child : children) {
     const auto found = parent_of.find(child.node);
     if (found == parent_of.end())
-      throw UserError(fmt::format("{}: node {} names child {}, and there are {} nodes", name, one_line(child.parent),
-                                  one_line(child.node), nodes.size()));
+      throw UserError(fmt::format("{}: node {} names child {}, and there {} {} node{}", name, one_line(child.parent),
+                                  one_line(child.node), nodes.size() == 1 ? "is" : "are", nodes.size(),
+                                  nodes.size() == 1 ? "" : "s"));
     if (!found->second.empty())
       throw UserError(fmt::format("{}: node {} is a child of node {} and again of node {}; give each node one parent",
                                   name, one_line(child.node), one_line(found->second), one_line(child.parent)));

@@ -109,7 +109,8 @@ class AssimpReader {
     if (scene_.materials.size() > 65534) throw UserError(name_ + ": more than 65534 materials");
     add_node(*in_.mRootNode, aiMatrix4x4t<double>());
     if (short_faces_ > 0)
-      scene_.report.warnings.push_back(fmt::format("{}: {} points and lines left out", name_, short_faces_));
+      scene_.report.warnings.push_back(fmt::format("{}: {} point{} or line{} left out", name_, short_faces_,
+                                                   short_faces_ == 1 ? "" : "s", short_faces_ == 1 ? "" : "s"));
     if (scene_.mesh.triangles.empty()) throw UserError(name_ + ": no triangle in it");
     if (!scene_.texture_coordinates.empty()) scene_.texture_coordinates.resize(scene_.mesh.size());
     return std::move(scene_);

@@ -344,6 +344,19 @@ TEST_CASE("effects: called for exactly where something needs them") {
   Scene scene = plain;
   scene.lights.push_back(Light{});
   CHECK(called(scene) == Names{"shadow_hard", "diffuse_gi"});
+  const auto why_gi = [&] {
+    return effects_of(scene)[std::size_t(std::ranges::find(kEffectNames, "diffuse_gi") - kEffectNames.begin())].reason;
+  };
+  const std::string gi = "diffuse surface (Kd > 0) in a lit scene: ";
+  CHECK(why_gi() == gi + "1 triangle of 1 material, grey");
+  scene.materials[0].name = "";
+  CHECK(why_gi() == gi + "1 triangle of 1 material");
+  scene.mesh.triangles.resize(3, {0, 1, 2}), scene.mesh.materials = {1, 0, 0};
+  CHECK(why_gi() == gi + "3 triangles of 2 materials");
+  scene.materials[0].name = "grey";
+  CHECK(why_gi() == gi + "3 triangles of 2 materials, first grey");
+  scene = plain;
+  scene.lights.push_back(Light{});
   scene.lights[0].intensity = {0, 0, 0};
   CHECK(called(scene) == Names{});
 

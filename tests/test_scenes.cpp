@@ -174,6 +174,17 @@ TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
   }
 }
 
+TEST_CASE("OBJ: faces of too few corners are counted in words") {
+  const Folder folder;
+  const std::string text = obj_text();
+  for (const auto& [faces, says] : {std::pair{"f 1 2\n", ": 1 face of fewer than three corners left out"},
+                                    {"f 1 2\nf 3\n", ": 2 faces of fewer than three corners left out"}}) {
+    const std::vector<std::string> warnings = load_file(folder.write("a.obj", text + faces)).report.warnings;
+    REQUIRE(warnings.size() == 1);
+    CHECK_THAT(warnings[0], Catch::EndsWith(says));
+  }
+}
+
 TEST_CASE("MTL: one number of a colour stands for all three") {
   const Folder folder;
   std::vector<std::string> warnings;
@@ -412,7 +423,7 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
       {"parents.gltf", R"({"nodes":[{"children":[1,1]},{"children":[2]},{}]})",
        "node 1 is a child of node 0 and again of node 0"},
       {"cycle.gltf", R"({"nodes":[{},{"children":[2]},{"children":[1]}]})", "node 1 is below itself"},
-      {"child.gltf", R"({"nodes":[{"children":[7]}]})", "node 0 names child 7, and there are 1 nodes"},
+      {"child.gltf", R"({"nodes":[{"children":[7]}]})", "node 0 names child 7, and there is 1 node"},
       {"ids.gltf", R"({"nodes":{"a":{"children":["b"]},"b":{"children":["a"]}}})", "is below itself"},
       {"latin1.gltf", "{\"asset\": \"\xe9\", \"nodes\": [{\"children\": [0]}]}", "node 0 is below itself"},
       {"cut.gltf", "{\n\"nodes\":[{\"children\":[",
