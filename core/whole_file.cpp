@@ -100,7 +100,15 @@ void require_writable(const std::filesystem::path& path) {
   if (target.in_place) return;
   const std::filesystem::path folder =
       target.path.has_parent_path() ? target.path.parent_path() : std::filesystem::path(".");
-  if (::access(folder.c_str(), W_OK | X_OK) != 0) cannot_write(path, errno);
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    const int error = errno;
+    // Written in place, a failure would leave neither the old file nor the new one.
+    if (::access(target.path.c_str(), W_OK) == 0)
+      throw UserError(path.string() +
+                      ": cannot be written: the file may be, but its folder may not, and a file is made " +
+                      "whole beside the old one before it takes its place; name a file in another folder");
+    cannot_write(path, error);
+  }
   if (!std::filesystem::is_directory(folder, ignored)) cannot_write(path, ENOTDIR);
 }
 

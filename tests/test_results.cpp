@@ -1,4 +1,9 @@
 // Samples, journal, results and verdict of a run; Google Benchmark's flags and interleaving.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+
 #include "experiments/append_file.h"
 #include "experiments/benchmark_flags.h"
 #include "experiments/config.h"
@@ -25,6 +30,29 @@ TEST_CASE("median and bootstrap interval") {
   CHECK((many.low >= 9.8 && many.low <= 10.0 && many.high >= 10.0 && many.high <= 50.0));
 }
 
+namespace {
+
+/// error_of() by a process that is not root, who may write everywhere.
+std::string as_nobody(const auto& action) {
+  if (::geteuid() != 0) return error_of(action);
+  int ends[2];
+  REQUIRE(::pipe(ends) == 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const bool nobody = ::setuid(65534) == 0;
+    const std::string said = nobody ? error_of(action) : "setuid failed";
+    ::_exit(::write(ends[1], said.data(), said.size()) < 0);
+  }
+  ::close(ends[1]);
+  std::string said(4096, ' ');
+  said.resize(std::size_t(std::max<ssize_t>(0, ::read(ends[0], said.data(), said.size()))));
+  ::close(ends[0]);
+  ::waitpid(child, nullptr, 0);
+  return said;
+}
+
+}  // namespace
+
 TEST_CASE("files of lines: a torn last line is dropped, an impossible write is one clear line") {
   const Folder folder;
   const fs::path file = folder.write("lines", "{\"a\":1}\n{\"b\":");
@@ -38,6 +66,12 @@ TEST_CASE("files of lines: a torn last line is dropped, an impossible write is o
   }
   CHECK(error_of([&] { write_whole(folder.path() / "none" / "file", "x"); }).find("cannot be written") !=
         std::string::npos);
+  fs::permissions(file, fs::perms::all), fs::permissions(folder.path(), fs::perms::all);
+  CHECK(as_nobody([&] { require_writable(file); }) == "");
+  fs::permissions(folder.path(), fs::perms(0555));
+  CHECK_THAT(as_nobody([&] { require_writable(file); }), Catch::Contains("the file may be, but its folder may not"));
+  CHECK_THAT(as_nobody([&] { require_writable(folder / "new"); }), Catch::Contains("Permission denied"));
+  fs::permissions(folder.path(), fs::perms::owner_all);
   CHECK(error_of([&] { make_output_folder(file / "below"); }).find("output folder") != std::string::npos);
   write_whole(file, "whole");
   CHECK(read_lines(file).empty());
