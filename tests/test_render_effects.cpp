@@ -107,6 +107,19 @@ TEST_CASE("a model without materials gives the same picture from every kind of f
   }
 }
 
+TEST_CASE("a map that cannot be read is named by its place, once, and its material goes without") {
+  Scene scene = floor_scene();
+  scene.environment = {1, 1, 1};
+  const Picture plain = picture_of(scene, detected(scene), kSmall);
+  scene.materials[0].diffuse_map = scene.materials[0].opacity_map = "none.png";
+  scene.materials[0].diffuse_map_place = "floor.mtl:3: map_Kd",
+  scene.materials[0].opacity_map_place = "floor.mtl:4: map_d";
+  const EffectSet effects = detected(scene).with(EffectKind::texture).with(EffectKind::alpha_cutout);
+  CHECK(RenderScene(scene, effects).warnings() ==
+        std::vector<std::string>{"floor.mtl:3: map_Kd none.png: no such file; its material goes without"});
+  CHECK(same_bits(plain, picture_of(scene, effects, kSmall)));
+}
+
 TEST_CASE("a light of intensity 0 is no light") {
   Scene scene = floor_scene();
   scene.lights.push_back({.position = {0, 3, 0}, .intensity = {0, 0, 0}});
@@ -135,6 +148,10 @@ TEST_CASE("glass of ior exactly 1 is as if it were not there") {
   Scene without = scene;
   without.mesh.triangles.resize(4), without.mesh.materials.resize(4);
   CHECK(same_bits(picture_of(scene, detected(scene), kSmall), picture_of(without, detected(without), kSmall)));
+  const std::vector<std::string> warnings = RenderScene(scene, detected(scene)).warnings();
+  REQUIRE(warnings.size() == 1);
+  CHECK_THAT(warnings[0], Catch::StartsWith("material 'air' is glass (illum 7) of Ni 1 without colour: 12 triangles"));
+  CHECK(RenderScene(without, detected(without)).warnings().empty());
   scene.materials[2].ior = 1.5f;
   CHECK_FALSE(same_bits(picture_of(scene, detected(scene), kSmall), picture_of(without, detected(without), kSmall)));
 }
