@@ -120,6 +120,15 @@ void refuse_other_shard(const std::filesystem::path& folder, const Shard& shard)
       before->shard.is_whole() ? "results of the whole plan" : "shard " + before->shard.text(), shard.text()));
 }
 
+/// Adds what the folder says of scenes that are not loaded now.
+void take_up_scenes(const std::filesystem::path& folder, Json& scenes) {
+  const std::optional<PlanRecord> before = read_plan_record(folder);
+  if (!before) return;
+  const Json earlier = before->context.value("scenes", Json::object());
+  for (const auto& [name, report] : earlier.items())
+    if (!scenes.contains(name)) scenes[name] = report;
+}
+
 /// What was measured of a scene stays beside what will be: both must be of the same triangles. Takes up what the folder
 /// says of scenes that are not measured now. Folders of older revisions say nothing.
 void refuse_other_geometry(const std::filesystem::path& folder, const Experiment& experiment,
@@ -161,15 +170,6 @@ std::vector<Json> other_contexts(const std::filesystem::path& folder, const Json
     if (!same(now) && std::ranges::none_of(others, same)) others.push_back(context);
   }
   return others;
-}
-
-/// Adds what the folder says of scenes that are not loaded now.
-void take_up_scenes(const std::filesystem::path& folder, Json& scenes) {
-  const std::optional<PlanRecord> before = read_plan_record(folder);
-  if (!before) return;
-  const Json earlier = before->context.value("scenes", Json::object());
-  for (const auto& [name, report] : earlier.items())
-    if (!scenes.contains(name)) scenes[name] = report;
 }
 
 std::filesystem::path default_folder(const Experiment& experiment, const Shard& shard) {
@@ -268,7 +268,9 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   if (command.resume) {
     refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
     refuse_other_geometry(folder, experiment, record.geometry);
+    take_up_scenes(folder, scenes);
   }
+  context["scenes"] = scenes;
   if (!command.benchmark.out.empty()) require_writable(command.benchmark.out);
   if (!command.resume) set_aside(folder);
   Journal journal(folder, hash, whole, command.resume);
@@ -279,8 +281,6 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
               fmt::format("# configuration hash: {}\n{}{}", hash,
                           shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
   if (!shard.is_whole()) context["shard"] = shard.text();
-  if (command.resume) take_up_scenes(folder, scenes);
-  context["scenes"] = scenes;
   record.context = context;
   if (command.resume) record.earlier = other_contexts(folder, context);
   std::vector<std::string> changed;
@@ -295,11 +295,11 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
 
   RunOutcome outcome = run_plan(experiment, plan, registry, journal,
                                 {.fail_fast = command.fail_fast, .geometry = record.geometry}, std::move(loaded));
-  context["scenes"].update(outcome.scenes);
   outcome.warnings = changed;
-  std::ranges::move(dropped_warnings(context["scenes"]), std::back_inserter(outcome.warnings));
   std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
                     std::back_inserter(outcome.warnings));
+  context["scenes"].update(outcome.scenes);
+  std::ranges::move(dropped_warnings(context["scenes"]), std::back_inserter(outcome.warnings));
   try {
     write_results(folder, outcome, plan, context, command.benchmark);
   } catch (const UserError&) {

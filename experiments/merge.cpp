@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "experiments/results_writer.h"
+#include "experiments/scene_data.h"
 #include "experiments/shell_words.h"
 #include "experiments/summary.h"
 

@@ -73,6 +73,16 @@ Json SceneData::load_report() const {
   return json;
 }
 
+std::vector<std::string> dropped_warnings(const Json& scenes) {
+  std::vector<std::string> warnings;
+  for (const auto& [name, report] : scenes.items()) {
+    const Json dropped = report.value("dropped", Json::object());
+    if (dropped.value("non_finite", 0) + dropped.value("out_of_range", 0) > 0)
+      warnings.push_back(fmt::format("{}: {}", name, report.value("dropped_in_words", "")));
+  }
+  return warnings;
+}
+
 void SceneData::note_to(NoteFunction note) {
   note_ = std::move(note);
   for (const std::string& line : waiting_) note_(line);

@@ -89,6 +89,10 @@ class SceneData {
   std::map<std::string, std::vector<ExactHit>> start_truth_;  ///< the same for all ways of leaving the surface
 };
 
+/// Of the `scenes` of a context, a line each: those that lost triangles which could have been hit, not merely ones
+/// without area.
+[[nodiscard]] std::vector<std::string> dropped_warnings(const Json& scenes);
+
 /// A scene that was loaded before its turn.
 struct LoadedScene {
   std::size_t index = 0;                 ///< of the experiment's scenes

@@ -158,16 +158,6 @@ std::string skipped_lines(const Plan& plan, const RunOutcome& outcome) {
   return text;
 }
 
-std::vector<std::string> dropped_warnings(const Json& scenes) {
-  std::vector<std::string> warnings;
-  for (const auto& [name, report] : scenes.items()) {
-    const Json dropped = report.value("dropped", Json::object());
-    if (dropped.value("non_finite", 0) + dropped.value("out_of_range", 0) > 0)
-      warnings.push_back(fmt::format("{}: {}", name, report.value("dropped_in_words", "")));
-  }
-  return warnings;
-}
-
 std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan& plan, unsigned cores) {
   constexpr double kWide = 0.05;
   std::vector<std::string> warnings;

@@ -14,9 +14,6 @@ namespace arboretum {
 [[nodiscard]] std::string result_tables(const RunOutcome& outcome);
 /// "12 cells skipped:" with one line a reason; empty when there is none.
 [[nodiscard]] std::string skipped_lines(const Plan& plan, const RunOutcome& outcome);
-/// Of the `scenes` of a context, a line each: those that lost triangles which could have been hit, not merely ones
-/// without area.
-[[nodiscard]] std::vector<std::string> dropped_warnings(const Json& scenes);
 /// One line each: cells whose repetitions spread widely, more threads than the machine's cores, ISAs that are not
 /// there.
 [[nodiscard]] std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan& plan, unsigned cores);

@@ -31,7 +31,7 @@ def write(results, drawn):
     parts.append('<h2 id="skipped">Skipped cells</h2>' + tables.skipped_list(results.skipped, results.complete))
     if results.context.get("scenes"):
         parts.append('<h2 id="scenes">Scenes</h2>' + tables.facts_table(scene_facts(results.context["scenes"])))
-    parts.append('<h2 id="machine">Machine and build</h2>' + tables.facts_table(facts(results.context)))
+    parts.append('<h2 id="machine">Machine and build</h2>' + tables.facts_table(facts({k: v for k, v in results.context.items() if k != "scenes"})))
     parts.append('<h2 id="again">How to reproduce</h2>' + reproduce(results))
     template = Template((Path(__file__).parent / "report_template.html").read_text(encoding="utf-8"))
     page = template.substitute(title=escape(f"{results.name}: Arboretum report"), body="\n".join(parts))
@@ -91,7 +91,7 @@ def facts(context):
     """The context, flattened to lines that a person reads; long texts come with the reproduction."""
     found = []
     for key, value in context.items():
-        if key in ("experiment", "scenes", "warnings", "warning", "plots", "executable", "library_build_type", "command", "load_avg"):
+        if key in ("experiment", "warnings", "warning", "plots", "executable", "library_build_type", "command", "load_avg"):
             continue
         if key == "memory_bytes" and isinstance(value, int):
             key, value = "memory", f"{value / 2**30:.1f} GiB"
