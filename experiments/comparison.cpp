@@ -174,9 +174,9 @@ class Comparer {
     ComparedCell& cell = out_.cells[i];
     const std::vector<double> a = rates(cell.a);
     std::vector<double> b = rates(cell.b);
-    cell.rate_a = bootstrap_median(a), cell.rate_b = bootstrap_median(b);
+    cell.rate_a = median(a), cell.rate_b = median(b);
     cell.ratio = ratio_interval(centres_[i], std::move(logs));
-    const double machine = cell.ratio.median / (cell.rate_b.median / cell.rate_a.median);  // 1 without a control
+    const double machine = cell.ratio.median / (cell.rate_b / cell.rate_a);  // 1 without a control
     if (!out_.options.control.empty())
       for (double& rate : b) rate *= machine;
     cell.p = p_value(cell.test, a, b);

@@ -31,9 +31,9 @@ enum class Verdict { faster, slower, indistinguishable, undecided };
 
 struct ComparedCell {
   CellResult a, b;
-  /// rays (trace) or triangles (build) a second: thread CPU time with one thread, else wall time
-  Interval rate_a, rate_b;
-  Interval ratio;  ///< rate of B over rate of A, with the 95 % bootstrap interval of the ratio of the medians
+  /// medians of rays (trace) or triangles (build) a second: thread CPU time with one thread, else wall time
+  double rate_a = 0.0, rate_b = 0.0;
+  Interval ratio;  ///< rate of B over rate of A, with the bootstrap interval of the ratio of the medians
   SignificanceTest test = SignificanceTest::none;
   double p = 1.0, adjusted_p = 1.0;
   Verdict verdict = Verdict::undecided;

@@ -17,8 +17,10 @@ Json cell_json(const ComparedCell& c) {
   add_axes(json, c.a.cell);
   json["rate"] = c.is_trace() ? (c.a.cell.threads == 1 ? "rays_per_cpu_second" : "rays_per_second")
                               : (c.a.cell.threads == 1 ? "triangles_per_cpu_second" : "triangles_per_second");
-  json["rate_a"] = c.rate_a.median, json["rate_b"] = c.rate_b.median;
-  json["ratio"] = c.ratio.median, json["ratio_low"] = c.ratio.low, json["ratio_high"] = c.ratio.high;
+  json["rate_a"] = c.rate_a, json["rate_b"] = c.rate_b;
+  json["ratio"] = c.ratio.median;
+  json["ratio_low"] = c.is_tested() ? Json(c.ratio.low) : Json();
+  json["ratio_high"] = c.is_tested() ? Json(c.ratio.high) : Json();
   json["test"] = to_string(c.test), json["p"] = c.is_tested() ? Json(c.p) : Json(),
   json["adjusted_p"] = c.is_tested() ? Json(c.adjusted_p) : Json();
   json["verdict"] = to_string(c.verdict), json["equal"] = c.equal, json["beyond"] = c.beyond;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <set>
 
@@ -57,6 +58,40 @@ std::string p_text(double p) { return p < 0.0001 ? "<0.0001" : fmt::format("{:.4
 
 std::string interval_text(const Interval& i) { return fmt::format("[{:.3f}, {:.3f}]", i.low, i.high); }
 
+/// Of fewer repetitions than these the bootstrap covers the ratio less often than it says: of 2, 3 and 4 so many times
+/// in 100 where nothing has changed (2 and 3: 1 - 2 / C(2n, n), as the interval is all that the two samples allow; 4 by
+/// simulation).
+constexpr std::size_t kFewestOfRatio = 5;
+constexpr int kCoverage[] = {67, 90, 93};
+
+/// The fewest repetitions of a cell that has several; 1 where none has.
+std::size_t fewest_repetitions(const std::vector<const ComparedCell*>& cells) {
+  std::size_t fewest = SIZE_MAX;
+  for (const ComparedCell* c : cells)
+    if (c->is_tested()) fewest = std::min({fewest, c->a.repetitions.size(), c->b.repetitions.size()});
+  return fewest == SIZE_MAX ? 1 : fewest;
+}
+
+/// The head of the intervals of ratios.
+std::string interval_head(std::size_t fewest) {
+  return fewest < 2 ? "-" : fewest < kFewestOfRatio ? "interval" : "95 %";
+}
+
+std::vector<const ComparedCell*> pointers(const Comparison& comparison) {
+  std::vector<const ComparedCell*> cells;
+  for (const ComparedCell& c : comparison.cells) cells.push_back(&c);
+  return cells;
+}
+
+/// What the legend says of the intervals of ratios.
+std::string interval_words(std::size_t fewest) {
+  if (fewest < 2) return "without an interval, which one repetition has not";
+  if (fewest >= kFewestOfRatio) return "with the 95 % bootstrap interval of their ratio";
+  return fmt::format(
+      "with the bootstrap interval of their ratio, which of {} repetitions covers it {} times in 100 (95 take {})",
+      fewest, kCoverage[fewest - 2], kFewestOfRatio);
+}
+
 /// Cells of one kind: what they have in common, then a row each.
 std::string cell_table(const Comparison& comparison, bool trace, bool all) {
   std::vector<const ComparedCell*> cells;
@@ -69,9 +104,9 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
   const bool some = !all && cells.size() > kMostRows;
   TableRow titles = axes.varying;
   if (titles.empty()) titles = {trace ? "cell" : "structure"};
-  for (const char* title :
-       {trace ? "A Mray/s" : "A ms", trace ? "B Mray/s" : "B ms", trace ? "B/A" : "speed B/A", "95 %", "p", "verdict"})
+  for (const char* title : {trace ? "A Mray/s" : "A ms", trace ? "B Mray/s" : "B ms", trace ? "B/A" : "speed B/A"})
     titles.emplace_back(title);
+  titles.insert(titles.end(), {interval_head(fewest_repetitions(cells)), "p", "verdict"});
   std::vector<TableRow> rows{titles};
   std::size_t left_out = 0;
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -87,8 +122,8 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
     const auto speed = [&](double rate) {
       return trace ? fmt::format("{:.2f}", rate * 1e-6) : fmt::format("{:.2f}", 1e3 * triangles / rate);
     };
-    row.insert(row.end(), {speed(c->rate_a.median), speed(c->rate_b.median), fmt::format("{:.3f}", c->ratio.median),
-                           interval_text(c->ratio), c->is_tested() ? p_text(c->adjusted_p) : "-",
+    row.insert(row.end(), {speed(c->rate_a), speed(c->rate_b), fmt::format("{:.3f}", c->ratio.median),
+                           c->is_tested() ? interval_text(c->ratio) : "-", c->is_tested() ? p_text(c->adjusted_p) : "-",
                            std::string(to_string(c->verdict))});
     rows.push_back(std::move(row));
   }
@@ -101,13 +136,13 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
 }
 
 std::string mean_table(const Comparison& comparison) {
-  std::vector<TableRow> rows{
-      {"geometric mean", "", "B/A", "95 %", "cells", "faster", "slower", "indistinguishable", "undecided"}};
+  std::vector<TableRow> rows{{"geometric mean", "", "B/A", interval_head(fewest_repetitions(pointers(comparison))),
+                              "cells", "faster", "slower", "indistinguishable", "undecided"}};
   for (const MeanRatio& m : comparison.means) {
     rows.push_back({m.axis.empty() ? "all " + m.value : m.axis, m.axis.empty() ? "" : m.value,
-                    fmt::format("{:.3f}", m.ratio.median), interval_text(m.ratio), std::to_string(m.cells),
-                    std::to_string(m.faster), std::to_string(m.slower), std::to_string(m.indistinguishable),
-                    std::to_string(m.undecided)});
+                    fmt::format("{:.3f}", m.ratio.median), m.undecided == m.cells ? "-" : interval_text(m.ratio),
+                    std::to_string(m.cells), std::to_string(m.faster), std::to_string(m.slower),
+                    std::to_string(m.indistinguishable), std::to_string(m.undecided)});
   }
   return rows.size() == 1 ? "" : "\n" + format_table(rows, 2);
 }
@@ -134,11 +169,11 @@ std::string legend(const Comparison& comparison) {
   const CompareOptions& o = comparison.options;
   std::string text = fmt::format(
       "\nB/A: speed of B over that of A, so 1.10 is a tenth faster; medians of thread CPU time with one thread, else "
-      "of wall time, with the 95 % bootstrap interval\n"
-      "of their ratio. p: {}, adjusted for the number of cells (Benjamini-Hochberg). faster, slower: the whole "
+      "of wall time,\n{}. p: {}, adjusted for the number of cells (Benjamini-Hochberg). faster, slower: the whole "
       "interval is beyond {:g} %, and p at\n"
       "most {:g}.\n",
-      tests_text(comparison), o.min_difference, o.significance);
+      interval_words(fewest_repetitions(pointers(comparison))), tests_text(comparison), o.min_difference,
+      o.significance);
   if (!comparison.control)
     text +=
         "Drift of the machine between the two runs is in neither the interval nor p; --control REGEX (cells whose code "

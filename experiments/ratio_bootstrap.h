@@ -17,7 +17,8 @@ using Replicates = std::vector<double>;  ///< logarithms of ratios, kResamples o
 [[nodiscard]] Replicates log_ratios(const std::string& name, const std::vector<double>& a,
                                     const std::vector<double>& b);
 
-/// The ratio, and the 2.5 and 97.5 percentiles of its replicates.
+/// The ratio, and the 2.5 and 97.5 percentiles of its replicates: of two samples of 5 repetitions or more they hold the
+/// ratio at least 95 times in 100, of fewer less often (docs/command-line.md).
 [[nodiscard]] Interval ratio_interval(double log_centre, Replicates logs);
 
 }  // namespace arboretum

@@ -218,14 +218,13 @@ std::vector<Json> aggregate_entries(const CellResult& result) {
     if (name == "mean") add_measured(entry, result, mean(wall), mean(cpu), mean(refit));
     if (name == "median") {
       add_measured(entry, result, median(wall), median(cpu), median(refit));
-      const Interval rate = bootstrap_median(result.rates(false)), cpu_rate = bootstrap_median(result.rates(true));
-      const char* key = result.is_trace() ? "rays_per_second" : "triangles_per_second";
-      entry[key] = rate.median;
-      entry[std::string(key) + "_low"] = rate.low, entry[std::string(key) + "_high"] = rate.high;
-      if (result.is_trace()) {
-        entry["rays_per_cpu_second"] = cpu_rate.median;
-        entry["rays_per_cpu_second_low"] = cpu_rate.low, entry["rays_per_cpu_second_high"] = cpu_rate.high;
-      }
+      const auto add_rate = [&](const std::string& key, const std::vector<double>& rates) {
+        const Interval rate = median_interval(rates);
+        entry[key] = rate.median;
+        if (rates.size() > 1) entry[key + "_low"] = rate.low, entry[key + "_high"] = rate.high;
+      };
+      add_rate(result.is_trace() ? "rays_per_second" : "triangles_per_second", result.rates(false));
+      if (result.is_trace()) add_rate("rays_per_cpu_second", result.rates(true));
       entry.update(result.facts);
       entry.erase(kLeakPoints);
     }

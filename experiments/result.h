@@ -62,8 +62,8 @@ void add_axes(Json& json, const Cell& cell);
 /// One repetition as an entry of results.json, Google Benchmark's fields first. Times are of one iteration,
 /// in ms.
 [[nodiscard]] Json repetition_entry(const CellResult& result, const Repetition& repetition);
-/// mean, median, stddev and cv, as Google Benchmark writes them; the median holds the 95 % interval of the
-/// rate too.
+/// mean, median, stddev and cv, as Google Benchmark writes them; the median holds the interval of the rate too
+/// (median_interval()), which one repetition has not.
 [[nodiscard]] std::vector<Json> aggregate_entries(const CellResult& result);
 /// The cell as a line of cells.jsonl.
 [[nodiscard]] Json cell_line(const CellResult& result, const std::string& configuration_hash);

@@ -57,9 +57,39 @@ std::string optional_figure(const CellResult& r, const char* fact, const char* f
   return r.has_fact(fact) ? fmt::format(fmt::runtime(format), r.fact(fact)) : "-";
 }
 
+/// "-" of one repetition.
+std::string interval_text(const Interval& i, std::size_t repetitions) {
+  return repetitions < 2 ? "-" : fmt::format("[{:.2f}, {:.2f}]", i.low, i.high);
+}
+
+/// The fewest and the most repetitions of a cell.
+std::pair<std::size_t, std::size_t> repetitions_of(const std::vector<const CellResult*>& results) {
+  const auto [least, most] =
+      std::ranges::minmax(results, {}, [](const CellResult* r) { return r->repetitions.size(); });
+  return {least->repetitions.size(), most->repetitions.size()};
+}
+
+std::string interval_head(const std::vector<const CellResult*>& results) {
+  const auto [least, most] = repetitions_of(results);
+  return interval_name(least, most);
+}
+
+/// What stands beside the medians, in the words of a sentence.
+std::string interval_words(const std::vector<const CellResult*>& results) {
+  const auto [least, most] = repetitions_of(results);
+  if (most < 2) return "of one repetition, which has no interval";
+  if (least >= kFewestOfInterval) return "median with its 95 % interval (order statistics)";
+  if (most >= kFewestOfInterval)
+    return fmt::format("median with its 95 % interval, of fewer than {} repetitions with their range",
+                       kFewestOfInterval);
+  return fmt::format("median with the range of {} repetitions, which covers it {:.0f} times in 100 (95 take {})",
+                     least == most ? std::to_string(most) : fmt::format("{} to {}", least, most),
+                     100.0 * range_coverage(std::max<std::size_t>(least, 2)), kFewestOfInterval);
+}
+
 Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
   const Cell& c = r.cell;
-  const Interval rate = bootstrap_median(r.rates(c.threads == 1));
+  const Interval rate = median_interval(r.rates(c.threads == 1));
   const CellResult* embree = embree_beside(r, all);
   const std::optional<double> build = build_milliseconds(r, all);
   return {c.structure,
@@ -71,7 +101,7 @@ Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
           std::string(to_string(c.isa)),
           std::to_string(c.threads),
           fmt::format("{:.2f}", rate.median * 1e-6),
-          fmt::format("[{:.2f}, {:.2f}]", rate.low * 1e-6, rate.high * 1e-6),
+          interval_text({rate.median * 1e-6, rate.low * 1e-6, rate.high * 1e-6}, r.repetitions.size()),
           embree ? fmt::format("{:.2f}", ratio_rate(r) / std::max(ratio_rate(*embree), 1e-9)) : "-",
           r.has_fact("wrong_answers")
               ? fmt::format("{:.1f}", 1e6 * r.fact("wrong_answers") / std::max(r.fact("rays"), 1.0))
@@ -92,19 +122,22 @@ void add_starts(std::vector<Row>& rows, const std::vector<const CellResult*>& re
 }
 
 std::string build_table(const std::vector<CellResult>& all) {
-  std::vector<Row> rows{
-      {"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", "95 %", "Mtri/s", "bytes/tri", "SAH"}};
-  for (const CellResult& r : all) {
-    if (r.is_trace()) continue;
-    const Interval time = bootstrap_median(milliseconds(r));
+  std::vector<const CellResult*> builds;
+  for (const CellResult& r : all)
+    if (!r.is_trace()) builds.push_back(&r);
+  if (builds.empty()) return {};
+  std::vector<Row> rows{{"scene", "structure", "builder", "leaf", "isa", "threads", "build ms", interval_head(builds),
+                         "Mtri/s", "bytes/tri", "SAH"}};
+  for (const CellResult* build : builds) {
+    const CellResult& r = *build;
+    const Interval time = median_interval(milliseconds(r));
     const Cell& c = r.cell;
     rows.push_back({c.scene, c.structure, c.builder_name(), c.leaf, std::string(to_string(c.isa)),
                     std::to_string(c.threads), fmt::format("{:.2f}", time.median),
-                    fmt::format("[{:.2f}, {:.2f}]", time.low, time.high),
-                    fmt::format("{:.2f}", median(r.rates(false)) * 1e-6),
+                    interval_text(time, r.repetitions.size()), fmt::format("{:.2f}", median(r.rates(false)) * 1e-6),
                     optional_figure(r, "bytes_per_triangle", "{:.0f}"), optional_figure(r, "sah_cost", "{:.1f}")});
   }
-  return rows.size() == 1 ? "" : "\nbuilds\n" + format_table(rows, 6);
+  return "\nbuilds\n" + format_table(rows, 6) + fmt::format("\nbuild ms: {}.\n", interval_words(builds));
 }
 
 double relative_spread(const CellResult& r) {
@@ -128,9 +161,11 @@ std::string result_tables(const RunOutcome& outcome) {
     group->second.push_back(&r);
   }
   std::string text;
+  std::vector<const CellResult*> traces;
   for (const auto& [title, results] : groups) {
+    traces.insert(traces.end(), results.begin(), results.end());
     std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads",
-                           "Mray/s", "95 %", "x embree", "wrong/1e6", "SAH", "build ms"}};
+                           "Mray/s", interval_head(results), "x embree", "wrong/1e6", "SAH", "build ms"}};
     for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results));
     if (!results.front()->cell.start_label.empty()) add_starts(rows, results);
     const CellResult& first = *results.front();
@@ -138,9 +173,11 @@ std::string result_tables(const RunOutcome& outcome) {
                         format_table(rows, 8));
   }
   if (!groups.empty()) {
-    text +=
-        "\nMray/s: median with its 95 % bootstrap interval, by thread CPU time with one thread, else by wall time. "
-        "x embree: against the fastest embree cell of the same ISA and threads.\n";
+    text += fmt::format(
+        "\nMray/s: {}, by thread CPU time with one thread, else by wall time. x embree: against the fastest embree "
+        "cell "
+        "of the same ISA and threads.\n",
+        interval_words(traces));
   }
   if (groups.empty()) text = build_table(outcome.results);
   if (std::ranges::any_of(outcome.results, [](const CellResult& r) { return r.cell.structure == "embree"; })) {

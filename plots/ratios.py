@@ -43,7 +43,9 @@ def rows_of(comparison, metric):
         half = MOST_CELLS // 2
         shown = decided if len(decided) <= MOST_CELLS else decided[:half] + decided[-half:]
         shared = f"{len(shown)} of {len(cells)} cells, those that differ most" + (f"; {shared}" if shared else "")
-    rows += [(name, cell["ratio"], cell["ratio_low"], cell["ratio_high"], cell["verdict"]) for name, cell in shown]
+    for name, cell in shown:
+        ratio = cell["ratio"]  # of one repetition, which has no interval
+        rows.append((name, ratio, ratio if cell["ratio_low"] is None else cell["ratio_low"], ratio if cell["ratio_high"] is None else cell["ratio_high"], cell["verdict"]))
     return rows, shared
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from string import Template
 
 import tables
+from results import interval_words
 
 LARGEST_SVG = 1_500_000  # bytes; a drawing of more goes into the page as PNG
 
@@ -25,7 +26,7 @@ def write(results, drawn):
     parts.append(f"<p>{measured(results)} {answers(results)}</p>")
     beside = tables.embree_note(results, results.traces)
     parts.append('<h2 id="fastest-structures">Fastest structure</h2>' + beside + tables.best_table(results))
-    parts.append('<h2 id="figures">Figures</h2>' + tables.embree_note(results, results.traces + results.structures) + "\n".join(figure(results.folder, *each) for each in drawn))
+    parts.append('<h2 id="figures">Figures</h2>' + tables.embree_note(results, results.traces + results.structures) + "\n".join(figure(results, *each) for each in drawn))
     parts.append('<h2 id="all-cells">All cells</h2>' + beside + tables.throughput_table(results))
     parts.append('<h2 id="built">Structures as built</h2>' + tables.embree_note(results, results.structures) + tables.structure_table(results))
     parts.append('<h2 id="skipped">Skipped cells</h2>' + tables.skipped_list(results.skipped, results.complete))
@@ -75,16 +76,21 @@ def warnings(context):
     return [str(w) for w in (found if isinstance(found, list) else [found])]
 
 
-def figure(folder, name, module, reason):
+def figure(results, name, module, reason):
     head = f'<h3 id="{escape(name)}">{escape(module.TITLE)}</h3>'
     if reason:
         return f'{head}<p class="soft">Not drawn: {escape(reason)}.</p>'
-    picture, kind = folder / f"{name}.svg", "svg+xml"
+    picture, kind = results.folder / f"{name}.svg", "svg+xml"
     if picture.stat().st_size > LARGEST_SVG:
-        picture, kind = folder / f"{name}.png", "png"
+        picture, kind = results.folder / f"{name}.png", "png"
     data = base64.b64encode(picture.read_bytes()).decode("ascii")
     return (f'{head}<figure><img alt="{escape(module.TITLE)}" src="data:image/{kind};base64,{data}">'
-            f"<figcaption>{escape(module.CAPTION)}</figcaption></figure>")
+            f"<figcaption>{escape(caption(results, module))}</figcaption></figure>")
+
+
+def caption(results, module):
+    """What a figure says of itself, with what the intervals of these results are."""
+    return module.CAPTION.replace("{interval}", interval_words(results.repetitions()))
 
 
 def facts(context):

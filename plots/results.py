@@ -1,13 +1,14 @@
 """Reads a result folder: results.json, else cells.jsonl (a run that was cut off). Knows no figure and no style.
 
 A *row* is one repetition as it stands in the file. A *cell* gathers the rows of one combination of the axes. Throughput
-is summed up by the median and a bootstrap confidence interval, so that one disturbed repetition does not count.
+is summed up by the median and the interval that it lies in, so that one disturbed repetition does not count.
 """
 
 import json
 import math
 import re
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ ISA_ORDER = ("scalar", "sse", "avx2", "avx512")
 HARD_PREFIX = "hard"  # workloads of hard rays: hard, hard_edge, ...
 WORKLOAD_ORDER = ("primary", "shadow", "ambient_occlusion", "reflection", "diffuse", "random", "whitted", "path")
 METRICS = ("trace", "build", "quality", "accuracy")
+FEWEST_OF_INTERVAL = 6  # repetitions: fewer have no interval that covers their median in 95 of 100 cases
+CONFIDENCE = 0.95
 SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
@@ -35,7 +38,7 @@ class TooMuch(NoData):
 
 @dataclass(frozen=True)
 class Estimate:
-    """Median with a 95 % confidence interval; `low` and `high` equal the median below three samples."""
+    """Median with its 95 % interval; below FEWEST_OF_INTERVAL samples `low` and `high` are the least and the greatest, of one the median itself."""
 
     median: float
     low: float
@@ -66,7 +69,7 @@ class Cell:
         return next((row[name] for row in self.rows if isinstance(row.get(name), list)), [])
 
     def estimate(self, name):
-        """The median with its confidence interval; None where no row has `name`."""
+        """The median with its interval; None where no row has `name`."""
         if name not in self._estimates:
             values = self.values(name)
             self._estimates[name] = estimate(values) if values else None
@@ -105,6 +108,11 @@ class Results:
             return "rays_per_cpu_second", "Mray/s, thread CPU time"
         return "rays_per_second", "Mray/s, wall time"
 
+    def repetitions(self):
+        """How many repetitions each timed cell has."""
+        metric, _ = self.throughput()
+        return [n for cells, name in ((self.traces, metric), (self.structures, "build_seconds")) for cell in cells if (n := len(cell.values(name)))]
+
     def checked(self):
         """The cells whose answers were compared with exact arithmetic."""
         return [cell for cell in self.traces if cell.values("wrong_answers")]
@@ -129,15 +137,45 @@ def is_number(value):
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def estimate(values, resamples=2000):
-    """Median and percentile-bootstrap interval. The generator's seed is fixed: the same file gives the same figure."""
-    samples = np.asarray(values, dtype=float)
-    median = float(np.median(samples))
-    if samples.size < 3:
-        return Estimate(median, median, median, samples.size)
-    picks = np.random.default_rng(1).integers(0, samples.size, (resamples, samples.size))
-    low, high = np.percentile(np.median(samples[picks], axis=1), (2.5, 97.5))
-    return Estimate(median, float(low), float(high), samples.size)
+def estimate(values):
+    """The median and its interval, as experiments/sampling.h has them: of Hettmansperger and Sheather (1986), below FEWEST_OF_INTERVAL values the range."""
+    samples = sorted(map(float, values))
+    median, n = float(np.median(samples)), len(samples)
+    if n < FEWEST_OF_INTERVAL:
+        return Estimate(median, samples[0], samples[-1], n)
+    depth = 1
+    while coverage(n, depth + 1) >= CONFIDENCE:
+        depth += 1
+    part = (coverage(n, depth) - CONFIDENCE) / (coverage(n, depth) - coverage(n, depth + 1))
+    inner, outer = (n - depth) * part, depth * (1 - part)
+    weight = inner / (inner + outer)
+    return Estimate(median, *(a + weight * (b - a) for a, b in ((samples[depth - 1], samples[depth]), (samples[n - depth], samples[n - depth - 1]))), n)
+
+
+@cache
+def coverage(n, depth):
+    """How often the interval from the `depth`-th of n samples to the `depth`-th from above covers their median."""
+    return 1 - 2 * sum(math.comb(n, k) for k in range(depth)) / 2**n
+
+
+def interval_name(counts):
+    """What intervals of samples of so many values are, in a word or two; "-" where each is of one."""
+    counts = set(counts)
+    if max(counts, default=1) < 2:
+        return "-"
+    if min(counts) >= FEWEST_OF_INTERVAL:
+        return "95 % interval"
+    return "range" if max(counts) < FEWEST_OF_INTERVAL else "95 % interval or range"
+
+
+def interval_words(counts):
+    """The same in the words of a caption."""
+    counts = {n for n in counts if n > 1}
+    fewest = min(counts, default=0)
+    return {"-": "no interval, which a single repetition has not",
+            "95 % interval": "the 95 % interval of the median",
+            "range": f"the range of the {fewest} repetitions, which covers the median {100 * coverage(fewest, 1):.0f} times in 100 (95 take {FEWEST_OF_INTERVAL} repetitions)" if fewest else "",
+            "95 % interval or range": f"the 95 % interval of the median, of fewer than {FEWEST_OF_INTERVAL} repetitions their range"}[interval_name(counts)]
 
 
 def axis_sort_key(axis):

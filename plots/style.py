@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
-from results import TooMuch, ordered  # noqa: E402
+from results import TooMuch, interval_name, ordered  # noqa: E402
 
 COLOURS = {  # structures
     "kdtree": "#CC6677", "bvh2": "#88CCEE", "bvh4": "#44AA99", "bvh8": "#332288", "bvh16": "#882255",
@@ -200,6 +200,12 @@ def wrong_legend(cells, handle=None):
 
 def wrong_marker(label):
     return Line2D([], [], linestyle="", marker="o", color=WRONG, markerfacecolor="white", markersize=5, label=label)
+
+
+def interval_legend(estimates):
+    """[(title, handles)]: what the lines at the medians are; empty where none has any."""
+    name = interval_name(e.samples for e in estimates)
+    return [] if name == "-" else [("", [Line2D([], [], color="#222222", linewidth=0.9, label=name)])]
 
 
 def marker_map(keys):

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from results import STRUCTURE_AXES, axis_sort_key, ordered
+from results import STRUCTURE_AXES, axis_sort_key, interval_name, interval_words, ordered
 
 PER_MILLION = (("wrong_answers", "wrong"), ("missed_hits", "missed"), ("false_hits", "false"),
                ("wrong_surface", "wrong surface"), ("wrong_primitive", "wrong primitive"), ("cracks", "cracks"))
@@ -112,7 +112,7 @@ def throughput_table(results):
     for cell in cells:
         best[beside(cell)] = max(best.get(beside(cell), 0.0), cell.value(metric))
 
-    heads = [(a, False) for a in axes] + [("Mray/s", True), ("95 % interval", False), ("wrong per million", True)]
+    heads = [(a, False) for a in axes] + [("Mray/s", True), (interval_name(c.estimate(metric).samples for c in cells), False), ("wrong per million", True)]
     heads += [("× embree", True)] if reference else []
     heads += [("ns/ray", True)] + [(f"{label} per million", True) for name, label in counts if name != "wrong_answers"]
     heads += [(label, True) for _, label in extra] + ([("children hit: 0, 1, 2, 3, 4+, %", False)] if children else [])
@@ -120,7 +120,7 @@ def throughput_table(results):
     for cell in cells:
         rate = cell.estimate(metric)
         out = [text(cell[a], key=a == "structure") for a in axes]
-        out += [number(rate.median / 1e6, "{:.2f}"), text(f"{rate.low / 1e6:.2f} – {rate.high / 1e6:.2f}")]
+        out += [number(rate.median / 1e6, "{:.2f}"), text(f"{rate.low / 1e6:.2f} – {rate.high / 1e6:.2f}" if rate.samples > 1 else "-")]
         out.append(number(cell.per_million("wrong_answers"), "{:.4g}")
                    if cell.per_million("wrong_answers") is not None else text("not checked"))
         if reference:
@@ -133,7 +133,7 @@ def throughput_table(results):
             out.append(text(" ".join(f"{100 * share:.0f}" for share in cell.series("children_hit"))))
         rows.append((out, "best" if rate.median == best[beside(cell)] else ""))
     note = constant_axes(cells, [a for a in THROUGHPUT_AXES if a not in axes])
-    return (f'<p class="soft">Throughput: {escape(unit)}, the median of the repetitions. Wrong answers are missed hits, false '
+    return (f'<p class="soft">Throughput: {escape(unit)}, the median of the repetitions, with {escape(interval_words(c.estimate(metric).samples for c in cells))}. Wrong answers are missed hits, false '
             f"hits and wrong surfaces against exact arithmetic; “wrong primitive” counts apart. The fastest "
             f"structure of a scene, workload and ISA is green. {escape('Same for all: ' + note + '.' if note else '')}</p>"
             + table("throughput", heads, rows))

@@ -1,5 +1,7 @@
 // The rank test against known values; two runs compared: nothing where nothing changed, a regression where there is
 // one.
+#include <tuple>
+
 #include "experiments/comparison.h"
 #include "experiments/comparison_files.h"
 #include "experiments/comparison_text.h"
@@ -224,6 +226,34 @@ TEST_CASE("few repetitions tell a difference that is large against the noise") {
   CHECK(many.count(Verdict::slower) == 1);
 }
 
+TEST_CASE("the interval of a ratio covers it 95 times in 100 from five repetitions on; of fewer it is not called so") {
+  const auto text = [](unsigned repetitions) {
+    return comparison_text(compare_results(run(1, 0.02, repetitions), run(900, 0.02, repetitions), {}), false);
+  };
+  for (const auto& [repetitions, words] : {std::pair{2u, "of 2 repetitions covers it 67 times in 100"},
+                                           {3u, "of 3 repetitions covers it 90 times in 100"},
+                                           {4u, "of 4 repetitions covers it 93 times in 100"}}) {
+    CHECK(text(repetitions).find(words) != std::string::npos);
+    CHECK(text(repetitions).find("95 %") == std::string::npos);
+  }
+  CHECK(text(5).find("95 % bootstrap interval") != std::string::npos);
+
+  constexpr std::uint64_t kTrials = 600;
+  const CellResult cell = measured(cell_named("bvh2"), 1.0, 0.0, 1);
+  for (const auto& [repetitions, least, most] :
+       {std::tuple{2u, 0.62, 0.72}, {3u, 0.87, 0.93}, {5u, 0.945, 0.99}, {7u, 0.945, 0.99}}) {
+    std::size_t covered = 0;
+    for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+      const Comparison c = compare_results({measured(cell.cell, 1.0, 0.1, 2 * trial + 1, repetitions)},
+                                           {measured(cell.cell, 1.0, 0.1, 2 * trial + 2, repetitions)}, {});
+      covered += c.cells[0].ratio.low <= 1.0 && c.cells[0].ratio.high >= 1.0;
+    }
+    INFO(repetitions << " repetitions: " << covered << " of " << kTrials);
+    CHECK(covered >= least * kTrials);
+    CHECK(covered <= most * kTrials);
+  }
+}
+
 TEST_CASE("noise of few repetitions is hardly ever a regression either") {
   for (std::size_t repetitions : {2u, 3u, 5u}) {
     int regressions = 0;
@@ -243,6 +273,8 @@ TEST_CASE("a single repetition is undecided, never a verdict") {
   CHECK(one.count(Verdict::undecided) == one.cells.size());
   CHECK(verdict(one).first == ExitStatus::kDone);
   CHECK(comparison_text(one, false).find("one repetition tells nothing") != std::string::npos);
+  CHECK(comparison_text(one, false).find('[') == std::string::npos);
+  CHECK(Json::parse(comparison_json(one, {}, {}))["cells"][0]["ratio_low"].is_null());
   // It looks halved: the last line says so, and --strict takes it for slower; what looks faster it leaves alone.
   CHECK(find(one, "bvh8").is_suspect());
   const std::string last = verdict(one).second;

@@ -3,7 +3,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
+#include <tuple>
 
+#include "core/random.h"
 #include "experiments/append_file.h"
 #include "experiments/benchmark_flags.h"
 #include "experiments/config.h"
@@ -20,14 +23,50 @@
 using namespace arboretum;
 using namespace arboretum::test;
 
-TEST_CASE("median and bootstrap interval") {
+TEST_CASE("median and its interval") {
   CHECK(median(std::vector{3.0, 1.0, 2.0}) == 2.0);
   CHECK(median(std::vector{4.0, 1.0, 2.0, 3.0}) == 2.5);
-  const Interval two = bootstrap_median(std::vector{1.0, 3.0});
+  const Interval one = median_interval(std::vector{2.0}), two = median_interval(std::vector{3.0, 1.0});
+  CHECK((one.low == 2.0 && one.median == 2.0 && one.high == 2.0));
   CHECK((two.low == 1.0 && two.median == 2.0 && two.high == 3.0));
-  const Interval many = bootstrap_median(std::vector{9.8, 10.1, 10.0, 9.9, 10.2, 10.0, 50.0});
-  CHECK(many.median == 10.0);
-  CHECK((many.low >= 9.8 && many.low <= 10.0 && many.high >= 10.0 && many.high <= 50.0));
+  // Below six the range is all there is; tests/plots/test_numbers.py has the same numbers.
+  const Interval five = median_interval(std::vector{5.0, 1.0, 4.0, 2.0, 3.0});
+  CHECK((five.low == 1.0 && five.high == 5.0));
+  const Interval six = median_interval(std::vector{5.0, 1.0, 4.0, 2.0, 3.0, 26.0});
+  CHECK(six.low == Approx(1.0 + 5.0 / 14.0));  // by hand: 62/64 and 50/64 cover, a tenth of the way, lambda 0.5 / 1.4
+  CHECK(six.high == Approx(26.0 - 21.0 * 5.0 / 14.0));
+  const Interval seven = median_interval(std::vector{9.8, 10.1, 10.0, 9.9, 10.2, 10.0, 50.0});
+  CHECK(seven.median == 10.0);
+  CHECK(seven.low == Approx(9.8733333333333331));
+  CHECK(seven.high == Approx(20.813333333333318));
+  CHECK(range_coverage(2) == 0.5);
+  CHECK(range_coverage(5) == 0.9375);
+  CHECK(interval_name(6, 9) == "95 %");
+  CHECK(interval_name(2, 5) == "range");
+  CHECK(interval_name(5, 6) == "95 % or range");
+  CHECK(interval_name(1, 1) == "-");
+}
+
+TEST_CASE("the interval of a median covers it about 95 times in 100, whatever the noise") {
+  constexpr std::uint64_t kTrials = 4000;
+  const double ln2 = std::log(2.0);
+  for (std::size_t n : {6u, 7u, 9u, 15u}) {
+    std::size_t uniform = 0, exponential = 0;
+    std::vector<double> flat(n), skewed(n);
+    for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+      for (std::size_t i = 0; i < n; ++i) {
+        flat[i] = random_double(n, i, trial);
+        skewed[i] = -std::log(1.0 - random_double(n + 100, i, trial));
+      }
+      const Interval a = median_interval(flat), b = median_interval(skewed);
+      uniform += a.low <= 0.5 && a.high >= 0.5, exponential += b.low <= ln2 && b.high >= ln2;
+    }
+    for (std::size_t covered : {uniform, exponential}) {
+      INFO(n << " values: " << covered << " of " << kTrials);
+      CHECK(covered >= 0.93 * kTrials);
+      CHECK(covered <= 0.97 * kTrials);
+    }
+  }
 }
 
 namespace {
@@ -174,6 +213,35 @@ TEST_CASE("results.json has what Google Benchmark's compare.py reads; the verdic
   outcome.results[1].facts["wrong_answers"] = 2;
   CHECK(verdict(outcome).first == ExitStatus::kWrongAnswers);
   CHECK(verdict({}).first == ExitStatus::kNothingMeasured);
+}
+
+TEST_CASE("tables and results say what stands beside a median: an interval, a range, nothing") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  for (const auto& [repetitions, name, words] : {std::tuple{1u, " -  ", "of one repetition, which has no interval"},
+                                                 {2u, "range", "range of 2 repetitions, which covers it 50 times"},
+                                                 {5u, "range", "range of 5 repetitions, which covers it 94 times"},
+                                                 {7u, "95 %", "median with its 95 % interval"}}) {
+    RunOutcome outcome;
+    for (const Cell& cell : plan.cells) {
+      CellResult& result = outcome.results.emplace_back(result_of(cell));
+      result.repetitions.clear();
+      for (unsigned i = 0; i < repetitions; ++i) result.repetitions.push_back(repetition(i, 0.5 + 0.25 * i));
+    }
+    INFO(repetitions << " repetitions");
+    for (bool trace : {true, false}) {
+      if (!trace) std::erase_if(outcome.results, [](const CellResult& r) { return r.is_trace(); });
+      const std::string text = result_tables(outcome);
+      INFO(text);
+      CHECK(text.find(words) != std::string::npos);
+      CHECK(text.find(name) != std::string::npos);
+      CHECK((text.find('[') != std::string::npos) == (repetitions > 1));
+      const Json entry = aggregate_entries(outcome.results.front())[1];
+      CHECK(entry["aggregate_name"] == "median");
+      CHECK(entry.contains("triangles_per_second_low") == (repetitions > 1));
+    }
+  }
 }
 
 TEST_CASE("Google Benchmark's flags: ours are taken, wrong ones are named") {

@@ -3,7 +3,7 @@
 from figures import squares
 from figures.names import bar_label
 from results import Cell, NoData, axis_sort_key, ordered, telling_axes
-from style import REST_COLOUR, colour, hatch, legends_right, panels, part_colour, part_legend, short, structure_legend
+from style import REST_COLOUR, colour, hatch, interval_legend, legends_right, panels, part_colour, part_legend, short, structure_legend
 
 
 # Inches: of a panel at least; of its bars; of a character beside them.
@@ -11,9 +11,10 @@ LEAST_WIDTH, BAR_WIDTH, CHARACTER = 5.6, 2.6, 0.068
 LEAST_REST = 0.002  # of a bar's length, that is seen
 
 
-def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None):
+def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None, estimate_of=None):
     """`value_of(cell)` gives (median, low, high) or None; `note_of(cell)` the text at a bar's end; `parts_of(cell)`, where
-    given, (name, value) of what the bar consists of: it is then stacked, and what the parts leave is drawn as the rest. Lower is better.
+    given, (name, value) of what the bar consists of: it is then stacked, and what the parts leave is drawn as the rest; `estimate_of(cell)`, where
+    given, the estimate that `value_of` is of, which has an interval. Lower is better.
 
     `label_axes` are the axes that may tell bars of a scene apart; those that the ones before settle are not written.
     """
@@ -38,8 +39,8 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
         draw_panel(axis, bars[scenes[index]], value_of, note_of, varied, parts_of)
         axis.set_title(short(scenes[index]))
         axis.set_xlabel(axis_label)
-    if parts_of:
-        legends_right(figure, parts_legend("part", [(parts_of(cell), value_of(cell)[0], cell) for cell in cells]))
+    legends = parts_legend("part", [(parts_of(cell), value_of(cell)[0], cell) for cell in cells]) if parts_of else []
+    legends_right(figure, legends + (interval_legend(map(estimate_of, cells)) if estimate_of else []))
     return figure
 
 

@@ -5,8 +5,8 @@ from figures.bars import bar_panels, digits
 from results import is_number
 
 TITLE = "Build time"
-CAPTION = ("Wall time from mesh to a structure ready for rays, with the 95 % confidence interval of the median where a build "
-           "was repeated; beside it, triangles a second. The parts are the build's own phases, each with its share of the repetitions' time "
+CAPTION = ("Wall time from mesh to a structure ready for rays, with {interval}; "
+           "beside it, triangles a second. The parts are the build's own phases, each with its share of the repetitions' time "
            "together, drawn to the length of the median; grey is what none of them covers. "
            "Lower is better."
            + squares.CAPTION)
@@ -21,7 +21,7 @@ def draw(results):
         milliseconds, triangles = value(cell)[0], cell.value("triangles")
         return f"{digits(milliseconds)} ms" + (f", {1e-3 * triangles / milliseconds:.2f} Mtri/s" if triangles and milliseconds > 0 else "")
 
-    return bar_panels(results, value, "build time, ms", note, ("builder", "threads", "isa", "leaf"), phases)
+    return bar_panels(results, value, "build time, ms", note, ("builder", "threads", "isa", "leaf"), phases, lambda cell: cell.estimate("build_seconds"))
 
 
 def phases(cell):

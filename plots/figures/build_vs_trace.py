@@ -7,8 +7,8 @@ from results import STRUCTURE_AXES
 TITLE = "Build time against trace time"
 CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. The grey steps join the points that no other beats in "
            "both. Numbered are those that take the least time for build and rays together, each with the number of rays from which on it does: what its build takes more "
-           "than that of the number before, by what each ray takes less. Any other is best at no number of rays, or, where there are more than ten of them, over the shortest ranges. Of two points whose 95 % intervals "
-           "overlap in build time or in the time of a ray, neither is taken to be better in that. Builds are measured in wall time, with as many threads as the rays beside them; "
+           "than that of the number before, by what each ray takes less. Any other is best at no number of rays, or, where there are more than ten of them, over the shortest ranges. Of two points whose intervals "
+           "overlap in build time or in the time of a ray, neither is taken to be better in that; intervals are {interval}. Builds are measured in wall time, with as many threads as the rays beside them; "
            "with more threads both are faster, builds as a rule by less, and then slow ones pay later.")
 POWERS = ((1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k"), (1, ""))
 

@@ -4,10 +4,10 @@ from figures import squares
 from figures.bars import digits, draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import MARKERS, WRONG, edge, is_wrong, legends_right, marker_legend, marker_map, panels, short, wrong_legend, wrong_marker, wrong_text
+from style import MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short, wrong_legend, wrong_marker, wrong_text
 
 TITLE = "Rays per second by structure and builder"
-CAPTION = ("A bar reaches the fastest mode of a structure as built, with the 95 % confidence interval of the median; markers "
+CAPTION = ("A bar reaches the fastest mode of a structure as built, with {interval}; markers "
            "show its other modes. Higher is better. A red marker is a mode with wrong answers; the red number behind a bar's own counts those of the mode "
            "that the bar reaches, per million rays; a square of such a mode is framed red. Those of each cell stand in the table."
            + squares.CAPTION)
@@ -65,5 +65,6 @@ def draw(results):
         axis.set_title(titles[keys[index]])
         axis.set_xlabel(unit)
     legends = [("mode", marker_legend(markers))] if markers else []
+    legends += interval_legend([bar.estimate(metric) for bar in best])
     legends_right(figure, legends + wrong_legend(cells, wrong_marker("some wrong; the number:\nof the bar's, per million")))
     return figure

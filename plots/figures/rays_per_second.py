@@ -4,12 +4,12 @@ from matplotlib.lines import Line2D
 
 from figures.modes import Modes
 from results import NoData, ordered
-from style import (MARKERS, WRONG, colour, edge, hatch, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend, wrong_legend,
+from style import (MARKERS, WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend, wrong_legend,
                    wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
-CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with its 95 % confidence interval of the "
-           "median, dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
+CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}, "
+           "dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
            "reaches, per million rays. Those of each cell stand in the table.")
 DIGIT = 0.032  # of a panel's height, that a character of a number above a bar takes
 
@@ -33,6 +33,7 @@ def draw(results):
     legends = [("structure", structure_legend(structures))]
     dot = Line2D([], [], linestyle="", marker=".", color="#222222", markersize=2.5, label=f"each of {len(modes.labels)}")
     legends += [("mode", marker_legend(markers) or [dot])] if len(modes.labels) > 1 else []
+    legends += interval_legend([c.estimate(metric) for c in cells]) if markers else []
     legends_right(figure, legends + wrong_legend(cells, wrong_marker("some wrong; the number:\nof the bar's, per million")))
     return figure
 

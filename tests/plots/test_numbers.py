@@ -1,6 +1,7 @@
 """Tests of plots/: what is reckoned and read, from results as they are, thin or cut off."""
 
 import json
+import random
 import sys
 import unittest
 from pathlib import Path
@@ -9,22 +10,45 @@ sys.dont_write_bytecode = True
 
 from made_results import Drawn, Folder, build, other, results_of, trace  # noqa: E402
 
+import report  # noqa: E402
 import style  # noqa: E402
+import tables  # noqa: E402
 from figures import build_time, rays_by_builder, rays_per_second, sah_cost, sah_vs_time, squares, traversal_ratios  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import fits_text, linear_fit, plane_fit  # noqa: E402
-from results import Cell, Results, TooMuch, axes_of, estimate, load, ordered, swept_axes, undetermined_axes  # noqa: E402
+from results import Cell, Results, TooMuch, axes_of, estimate, interval_name, interval_words, load, ordered, swept_axes, undetermined_axes  # noqa: E402
 
 
 class Numbers(Drawn):
     def test_estimate(self):
-        for values, median in (([5.0], 5.0), ([1.0, 3.0], 2.0), ([1.0, 2.0, 900.0], 2.0)):
+        for values, low, median, high in (([5.0], 5.0, 5.0, 5.0), ([3.0, 1.0], 1.0, 2.0, 3.0), ([5.0, 1.0, 4.0, 2.0, 3.0], 1.0, 3.0, 5.0),
+                                          ([5.0, 1.0, 4.0, 2.0, 3.0, 26.0], 1 + 5 / 14, 3.5, 26 - 21 * 5 / 14),  # the same numbers as in tests/test_results.cpp
+                                          ([9.8, 10.1, 10.0, 9.9, 10.2, 10.0, 50.0], 9.8733333333333331, 10.0, 20.813333333333318)):
             found = estimate(values)
-            self.assertEqual(found.median, median)
-            self.assertLessEqual(found.low, median)
-            self.assertGreaterEqual(found.high, median)
-        self.assertEqual(estimate([5.0]).low, 5.0)
-        self.assertEqual(estimate([3.0, 1.0, 2.0, 7.0]), estimate([3.0, 1.0, 2.0, 7.0]))
+            self.assertEqual((found.median, found.samples), (median, len(values)))
+            self.assertAlmostEqual(found.low, low, places=12)
+            self.assertAlmostEqual(found.high, high, places=12)
+
+    def test_the_interval_covers_the_median(self):
+        chance = random.Random(1)
+        for n in (6, 7, 9, 15):
+            covered = sum(e.low <= 0 <= e.high for e in (estimate([chance.gauss(0, 1) for _ in range(n)]) for _ in range(4000)))
+            self.assertTrue(0.93 * 4000 <= covered <= 0.97 * 4000, f"{n}: {covered}")
+
+    def test_what_intervals_are_called(self):
+        self.assertEqual([interval_name(n) for n in ([1, 1], [2, 5], [6], [5, 6], [])], ["-", "range", "95 % interval", "95 % interval or range", "-"])
+        self.assertEqual(interval_words([3, 3]), "the range of the 3 repetitions, which covers the median 75 times in 100 (95 take 6 repetitions)")
+        self.assertIn("no interval", interval_words([1]))
+        for repetitions, name, interval in ((1, "-", None), (3, "range", "10.00 – 12.00"), (7, "95 % interval", "10.73 – 15.27")):
+            folder = Folder([trace(rate=(10 + r) * 1e6, repetition=r) for r in range(repetitions)])
+            self.assertEqual(folder.plot("--only", "rays_per_second").returncode, 0)
+            self.assertEqual(f"<!-- {name} -->" in (folder.path / "rays_per_second.svg").read_text(), repetitions > 1)
+            results = load(folder.path)
+            table = tables.throughput_table(results)
+            self.assertIn(f">{name}</button>", table)
+            self.assertIn(f"<td>{interval or '-'}</td>", table)
+            self.assertIn(interval_words([repetitions]), table)
+            self.assertIn(interval_words([repetitions]), report.caption(results, rays_per_second))
 
     def test_plane_fit(self):
         x1, x2 = [1, 2, 3, 4, 5, 6], [2, 0, 5, 1, 1, 7]
