@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <set>
 
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
@@ -27,6 +28,26 @@ void refuse_different_machines(const ResultFolder& a, const ResultFolder& b) {
                   a.path.string(), b.path.string(), fmt::join(differences, "; ")));
 }
 
+/// A folder that was begun on another machine is of two, and what its medians say is of neither.
+void refuse_begun_elsewhere(const ResultFolder& folder) {
+  const std::vector<std::string> differences = begun_elsewhere(folder.begun);
+  if (differences.empty()) return;
+  throw UserError(
+      fmt::format("{} was begun on another machine or build than it was gone on with ({}): its times do not compare; "
+                  "measure it anew, or compare all the same with --allow-different-machines",
+                  folder.path.string(), fmt::join(differences, "; ")));
+}
+
+/// Scenes that hold something else in B than in A, by the hashes of both.
+std::set<std::string> different_scenes(const ResultFolder& a, const ResultFolder& b) {
+  std::set<std::string> different;
+  if (!a.plan || !b.plan) return different;
+  for (const auto& [scene, hash] : a.plan->geometry)
+    if (const auto other = b.plan->geometry.find(scene); other != b.plan->geometry.end() && other->second != hash)
+      different.insert(scene);
+  return different;
+}
+
 void refuse_unknown_format(const std::filesystem::path& plot) {
   const std::string ending = plot.extension().string();
   if (!plot.empty() && ending != ".png" && ending != ".svg" && ending != ".pdf")
@@ -51,9 +72,14 @@ ExitStatus command_compare(const CompareCommand& command) {
        {std::filesystem::path(command.json), std::filesystem::path(command.csv), command.plot})
     if (!file.empty() && file != "-") require_writable(file);
   ResultFolder a = read_result_folder(command.a), b = read_result_folder(command.b);
-  if (!command.allow_different_machines) refuse_different_machines(a, b);
+  if (!command.allow_different_machines) {
+    refuse_begun_elsewhere(a), refuse_begun_elsewhere(b);
+    refuse_different_machines(a, b);
+  }
   filter_cells(a, command.filter, command.skip), filter_cells(b, command.filter, command.skip);
-  const Comparison comparison = compare_results(a.cells, b.cells, command.options);
+  CompareOptions options = command.options;
+  options.other_scenes = different_scenes(a, b);
+  const Comparison comparison = compare_results(a.cells, b.cells, options);
   const auto [status, why] = verdict(comparison);
   if (command.json != "-" && command.csv != "-") {
     fmt::print("{}{}", origins_text(a, b), comparison_text(comparison, command.all));

@@ -147,18 +147,6 @@ void refuse_other_geometry(const std::filesystem::path& folder, const Experiment
   geometry.insert(before->geometry.begin(), before->geometry.end());
 }
 
-/// How two runs differ that should be one; empty where their results compare with each other.
-std::vector<std::string> differing_conditions(const Json& before, const Json& now) {
-  std::vector<std::string> differences;
-  for (const std::string& difference : machine_differences(before, now))
-    differences.push_back("begun under other conditions: " + difference);
-  const std::string then = before.value("git_revision", ""), at = now.value("git_revision", "");
-  if (then != at)
-    differences.push_back(
-        fmt::format("begun at revision {}, gone on with at {}", then.substr(0, 12), at.substr(0, 12)));
-  return differences;
-}
-
 /// The contexts of a run that is gone on with, one for each of its conditions that are not those of now.
 std::vector<Json> other_contexts(const std::filesystem::path& folder, const Json& now) {
   const std::optional<PlanRecord> before = read_plan_record(folder);
@@ -170,6 +158,26 @@ std::vector<Json> other_contexts(const std::filesystem::path& folder, const Json
     if (!same(now) && std::ranges::none_of(others, same)) others.push_back(context);
   }
   return others;
+}
+
+/// What those who measured before said of themselves and no longer can: the parts that were merged, and, in results of
+/// older revisions, whose repetitions do not say it, the one machine and revision.
+struct Before {
+  Json merged_from;
+  Origin origin;
+};
+
+Before what_was_before(const std::filesystem::path& folder) {
+  const std::optional<PlanRecord> record = read_plan_record(folder);
+  if (!record) return {};
+  return {.merged_from = record->context.value("merged_from", Json()),
+          .origin = record->earlier.empty() ? origin_of(record->context) : Origin{}};
+}
+
+void name_origins(RunOutcome& outcome, const Origin& before) {
+  for (CellResult& result : outcome.results)
+    for (Repetition& repetition : result.repetitions)
+      if (repetition.origin.empty()) repetition.origin = before;
 }
 
 std::filesystem::path default_folder(const Experiment& experiment, const Shard& shard) {
@@ -281,6 +289,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
               fmt::format("# configuration hash: {}\n{}{}", hash,
                           shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
   if (!shard.is_whole()) context["shard"] = shard.text();
+  const Before before = command.resume ? what_was_before(folder) : Before{};
+  if (!before.merged_from.is_null()) context["merged_from"] = before.merged_from;
   record.context = context;
   if (command.resume) record.earlier = other_contexts(folder, context);
   std::vector<std::string> changed;
@@ -293,8 +303,10 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
              shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
              format_duration(seconds));
 
-  RunOutcome outcome = run_plan(experiment, plan, registry, journal,
-                                {.fail_fast = command.fail_fast, .geometry = record.geometry}, std::move(loaded));
+  RunOutcome outcome = run_plan(
+      experiment, plan, registry, journal,
+      {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)}, std::move(loaded));
+  name_origins(outcome, before.origin);
   outcome.warnings = changed;
   std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
                     std::back_inserter(outcome.warnings));

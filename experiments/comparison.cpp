@@ -63,7 +63,7 @@ class Comparer {
       const auto found = of_b.find(name);
       if (found == of_b.end()) {
         out_.only_a.push_back(name);
-      } else if (std::string why = other_work(r, *found->second); !why.empty()) {
+      } else if (std::string why = other_work(r, *found->second, out_.options.other_scenes); !why.empty()) {
         out_.incomparable.emplace_back(name, std::move(why));
       } else {
         ComparedCell& cell = out_.cells.emplace_back();
@@ -75,7 +75,10 @@ class Comparer {
   }
 
   /// Why the two do not compare although their names are equal; empty where they do.
-  static std::string other_work(const CellResult& a, const CellResult& b) {
+  static std::string other_work(const CellResult& a, const CellResult& b, const std::set<std::string>& other_scenes) {
+    if (other_scenes.contains(a.cell.scene))
+      return fmt::format("measured with different scenes called {} (geometry, camera, lights or materials)",
+                         a.cell.scene);
     for (const char* fact : {"triangles", "rays"}) {
       if (a.fact(fact) != b.fact(fact))
         return fmt::format("{:.0f} {} in A, {:.0f} in B", a.fact(fact), fact, b.fact(fact));

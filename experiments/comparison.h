@@ -8,6 +8,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,7 @@ struct CompareOptions {
   double significance = 0.05;   ///< of the adjusted p-values
   /// regular expression: cells whose geometric mean all speeds are taken relative to; empty: none
   std::string control = {};
+  std::set<std::string> other_scenes = {};  ///< names of scenes that hold something else in B than in A
   bool strict = false;  ///< an undecided cell whose whole interval is beyond the limit on the slow side is a regression
 };
 

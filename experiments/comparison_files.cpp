@@ -47,6 +47,7 @@ Json folder_json(const ResultFolder& folder) {
   return {{"folder", folder.path.string()},
           {"complete", folder.complete},
           {"cells", folder.cells.size()},
+          {"begun", folder.begun},
           {"context", folder.context}};
 }
 

@@ -31,8 +31,8 @@ std::string origin(const char* letter, const ResultFolder& f) {
   const std::string date = f.context_text("date");
   const bool dirty = f.context.contains("git_dirty") && f.context_text("git_dirty") != "false";
   return fmt::format("{}  {}: {}, revision {}{}, {}{}\n", letter, f.path.string(), repetitions(f.cells),
-                     f.context_text("git_revision").substr(0, 12), dirty ? " with changes" : "",
-                     date.substr(0, date.find('T')), f.complete ? "" : ", cut off");
+                     short_revision(f.context), dirty ? " with changes" : "", date.substr(0, date.find('T')),
+                     f.complete ? "" : ", cut off");
 }
 
 /// The axes by which some of the cells differ, and what is the same for all.
@@ -295,6 +295,8 @@ std::string busy_text(const ResultFolder& a, const ResultFolder& b) {
 
 std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
   std::string text = origin("A", a) + origin("B", b);
+  for (const auto& [letter, folder] : {std::pair{"A", &a}, std::pair{"B", &b}})
+    for (const std::string& difference : folder->begun) text += fmt::format("{} was {}\n", letter, difference);
   const std::vector<std::string> machine = machine_differences(a.context, b.context);
   for (const std::string& difference : machine) text += fmt::format("differs: {}\n", difference);
   if (machine.empty()) text += fmt::format("both: {}, {}\n", a.context_text("cpu"), a.context_text("compiler"));

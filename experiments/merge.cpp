@@ -62,8 +62,7 @@ void refuse_different_configurations(const ResultFolder& first, const ResultFold
 }
 
 std::string revision(const ResultFolder& part) {
-  return part.context_text("git_revision").substr(0, 12) +
-         (part.context.value("git_dirty", false) ? " with changes" : "");
+  return short_revision(part.context) + (part.context.value("git_dirty", false) ? " with changes" : "");
 }
 
 /// What machine and build of the part differ by from the first part's, told and refused or allowed.
@@ -77,13 +76,25 @@ void check_machine(const ResultFolder& first, const ResultFolder& part, const Me
       throw UserError(what + "; their times do not compare; --allow-different-machines merges them all the same");
     warnings.push_back(what + "; compare times only within the same `part`");
   }
-  if (revision(first) != revision(part)) {
+  if (revision(first) != revision(part) || first.context_text("git_revision") != part.context_text("git_revision")) {
     const std::string what = fmt::format("{} is of revision {} and {} of {}", first.path.string(), revision(first),
                                          part.path.string(), revision(part));
     if (!options.allow_different_revisions)
       throw UserError(what + "; --allow-different-revisions merges them all the same");
     warnings.push_back(what);
   }
+}
+
+/// A part that was gone on with on another machine or at another revision is two parts in one.
+void check_begun(const ResultFolder& part, const MergeOptions& options, std::vector<std::string>& warnings) {
+  if (part.begun.empty()) return;
+  const std::string what = fmt::format("{} was {}", part.path.string(), fmt::join(part.begun, "; "));
+  const bool elsewhere = !begun_elsewhere(part.begun).empty();
+  if (elsewhere && !options.allow_different_machines)
+    throw UserError(what + "; its times do not compare; --allow-different-machines merges them all the same");
+  if (!elsewhere && !options.allow_different_revisions)
+    throw UserError(what + "; --allow-different-revisions merges them all the same");
+  warnings.push_back(what);
 }
 
 /// One name, one geometry: a file may have been edited between two parts.
@@ -144,7 +155,7 @@ Json merged_context(const std::vector<ResultFolder>& parts, const std::string& c
     commands.insert(whole_command(part.context_text("command")));
     Json& entry = from.emplace_back(
         Json{{"part", from.size() + 1}, {"folder", part.path.string()}, {"cells", part.cells.size()}});
-    for (const char* key : {"shard", "date", "host_name", "cpu", "git_revision", "command"})
+    for (const char* key : {"shard", "date", "host_name", "cpu", "git_revision", "command", "merged_from"})
       if (part.context.contains(key)) entry[key] = part.context[key];
   }
   context["command"] = commands.size() == 1 ? *commands.begin() : command;
@@ -163,6 +174,16 @@ Json merged_context(const std::vector<ResultFolder>& parts, const std::string& c
   return context;
 }
 
+/// The line of a cell; its repetitions say where they are from.
+Json with_origins(Json line, const CellResult& cell) {
+  for (std::size_t i = 0; i < cell.repetitions.size(); ++i) {
+    const Origin& origin = cell.repetitions[i].origin;
+    if (!origin.empty())
+      line["repetitions"][i]["cpu"] = origin.cpu, line["repetitions"][i]["git_revision"] = origin.git_revision;
+  }
+  return line;
+}
+
 /// The plan of the whole in the making: the union of the parts' plans, and what the parts say of its cells.
 class WholePlan {
  public:
@@ -177,7 +198,8 @@ class WholePlan {
     for (const PlanRecord::Entry& entry : merged_.record.cells) {
       if (const auto found = measured_.find(entry.name); found != measured_.end()) {
         const auto& [part, place] = found->second;
-        merged_.outcome.results.push_back(part->cells[place]), merged_.lines.push_back(part->lines[place]);
+        merged_.outcome.results.push_back(part->cells[place]);
+        merged_.lines.push_back(with_origins(part->lines[place], part->cells[place]));
       } else if (!reasons_.contains(entry.name)) {
         merged_.missing.push_back(entry), merged_.outcome.missing.push_back(entry.name);
       }
@@ -209,6 +231,8 @@ class WholePlan {
     record.geometry.insert(plan.geometry.begin(), plan.geometry.end());
     if (record.cells.empty()) record.filter = plan.filter, record.skip = plan.skip;
     merged_.shards = std::max(merged_.shards, plan.shard.of);
+    for (const Json& earlier : plan.earlier)
+      if (std::ranges::find(record.earlier, earlier) == record.earlier.end()) record.earlier.push_back(earlier);
     for (const PlanRecord::Entry& entry : plan.cells)
       if (planned_.insert(entry.name).second) record.cells.push_back(entry);
     for (const PlanRecord::Entry& entry : plan.skipped)
@@ -241,17 +265,18 @@ class WholePlan {
 
 Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions& options, const std::string& command) {
   Merged merged;
-  bool one_machine = true;
   for (const ResultFolder& part : parts) {
     if (part.lines.size() != part.cells.size())
       throw UserError(
           fmt::format("{}: has no cells.jsonl, which holds what merge joins; give the folder that `run` wrote",
                       part.path.string()));
-    if (&part == &parts.front()) continue;
-    refuse_different_configurations(parts.front(), part);
-    check_machine(parts.front(), part, options, merged.outcome.warnings);
-    one_machine = one_machine && merged.outcome.warnings.empty();
+    if (&part != &parts.front()) {
+      refuse_different_configurations(parts.front(), part);
+      check_machine(parts.front(), part, options, merged.outcome.warnings);
+    }
+    check_begun(part, options, merged.outcome.warnings);
   }
+  const bool one_machine = merged.outcome.warnings.empty();
   refuse_different_geometry(parts);
   refuse_doubled_cells(parts);
   WholePlan whole(parts, merged);

@@ -16,7 +16,7 @@ struct MergeOptions {
 
 struct Merged {
   RunOutcome outcome;       ///< cells in the plan's order; warnings
-  std::vector<Json> lines;  ///< of cells.jsonl, as the parts have them
+  std::vector<Json> lines;  ///< of cells.jsonl, as the parts have them, each repetition with its origin
   Plan plan;                ///< `skipped` and the counts; no cells
   PlanRecord record;        ///< of the whole plan
   Json context;

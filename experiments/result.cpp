@@ -46,6 +46,8 @@ Json measured_fields(const Repetition& repetition) {
   json["wall_seconds"] = repetition.wall_seconds;
   json["cpu_seconds"] = repetition.cpu_seconds;
   if (repetition.refit_seconds > 0.0) json["refit_wall_seconds"] = repetition.refit_seconds;
+  if (!repetition.origin.empty())
+    json["cpu"] = repetition.origin.cpu, json["git_revision"] = repetition.origin.git_revision;
   if (!repetition.phases.empty()) {
     Json& phases = json["phase_seconds"] = Json::object();
     for (const auto& [name, seconds] : repetition.phases) phases[name] = seconds;
@@ -60,6 +62,7 @@ Repetition parse_measured_fields(const Json& json) {
   repetition.wall_seconds = json.at("wall_seconds").get<double>();
   repetition.cpu_seconds = json.at("cpu_seconds").get<double>();
   repetition.refit_seconds = json.value("refit_wall_seconds", 0.0);
+  repetition.origin = {json.value("cpu", ""), json.value("git_revision", "")};
   if (const auto phases = json.find("phase_seconds"); phases != json.end()) {
     for (const auto& [name, seconds] : phases->items()) repetition.phases.emplace_back(name, seconds.get<double>());
   }

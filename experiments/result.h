@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,6 +20,13 @@ namespace arboretum {
 
 using Json = nlohmann::ordered_json;
 
+/// The machine and the revision that measured something; empty where a run of an older revision did not say.
+struct Origin {
+  std::string cpu, git_revision;
+  [[nodiscard]] bool empty() const noexcept { return cpu.empty() && git_revision.empty(); }
+  friend auto operator<=>(const Origin&, const Origin&) = default;
+};
+
 /// One timed repetition: `iterations` passes over all rays, or that many builds.
 struct Repetition {
   unsigned index = 0;
@@ -27,6 +35,7 @@ struct Repetition {
   double cpu_seconds = 0.0;   ///< of the thread; of the process where the cell has several threads
   std::vector<std::pair<std::string, double>> phases;  ///< of builds: wall seconds of all iterations
   double refit_seconds = 0.0;  ///< of builds: wall seconds of all iterations; 0 where the structure has no refit
+  Origin origin = {};
 };
 
 struct CellResult {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <system_error>
 
@@ -72,6 +73,7 @@ Repetition repetition_of(const Json& entry) {
   const double scale = 1e-3 * static_cast<double>(r.iterations);
   r.wall_seconds = entry.at("real_time").get<double>() * scale;
   r.cpu_seconds = entry.at("cpu_time").get<double>() * scale;
+  r.origin = {entry.value("cpu", ""), entry.value("git_revision", "")};
   return r;
 }
 
@@ -164,6 +166,30 @@ void part(const std::string& text, std::string& key, std::string& label) {
   label = colon == std::string::npos ? "" : text.substr(colon);
 }
 
+/// From plan.json, which has all of the other contexts, else from the warnings that the results have of them.
+std::vector<std::string> begun_under(const ResultFolder& folder) {
+  std::vector<std::string> begun;
+  if (folder.plan) {
+    for (const Json& earlier : folder.plan->earlier)
+      std::ranges::move(differing_conditions(earlier, folder.context), std::back_inserter(begun));
+    return begun;
+  }
+  for (const Json& warning : folder.context.value("warnings", Json::array()))
+    if (warning.is_string() && warning.get<std::string>().starts_with("begun ")) begun.push_back(warning);
+  return begun;
+}
+
+/// What runs of older revisions did not say of each repetition, where the folder is of one of them alone.
+void name_origins(ResultFolder& folder) {
+  if (!folder.begun.empty()) return;
+  const Origin origin = origin_of(folder.context);
+  for (CellResult& cell : folder.cells)
+    for (Repetition& repetition : cell.repetitions)
+      if (repetition.origin.empty()) repetition.origin = origin;
+}
+
+constexpr std::string_view kBetween = " | ";  // values of a merged context that differ
+
 }  // namespace
 
 std::string ResultFolder::context_text(const char* key) const { return text_of(context, key); }
@@ -209,6 +235,8 @@ ResultFolder read_result_folder(const fs::path& path) {
     throw UserError(fmt::format("{}: not the results that `run` writes; copy the folder anew, or measure again",
                                 (path / "results.json").string()));
   }
+  folder.begun = begun_under(folder);
+  name_origins(folder);
   if (!folder.complete && folder.plan) {
     for (const PlanRecord::Entry& cell : folder.plan->skipped)
       if (cell.shard == folder.plan->shard.index) folder.skipped.push_back({cell.name, cell.reason});
@@ -230,6 +258,40 @@ std::vector<std::string> machine_differences(const Json& a, const Json& b) {
     if (of_a != of_b) differences.push_back(fmt::format("{}: {} against {}", title, of_a, of_b));
   }
   return differences;
+}
+
+std::vector<std::string> differing_conditions(const Json& before, const Json& now) {
+  std::vector<std::string> differences;
+  for (const std::string& difference : machine_differences(before, now))
+    differences.push_back(kBegunElsewhere + difference);
+  if (before.value("git_revision", "") != now.value("git_revision", ""))
+    differences.push_back(
+        fmt::format("begun at revision {}, gone on with at {}", short_revision(before), short_revision(now)));
+  return differences;
+}
+
+std::vector<std::string> begun_elsewhere(const std::vector<std::string>& begun) {
+  std::vector<std::string> differences;
+  for (const std::string& difference : begun)
+    if (difference.starts_with(kBegunElsewhere))
+      differences.push_back(difference.substr(std::string_view(kBegunElsewhere).size()));
+  return differences;
+}
+
+std::string short_revision(const Json& context) {
+  const std::string all = text_of(context, "git_revision");
+  std::vector<std::string> each;
+  for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + kBetween.size()) {
+    end = all.find(kBetween, begin);
+    each.push_back(all.substr(begin, std::min<std::size_t>(12, end - begin)));
+  }
+  return fmt::format("{}", fmt::join(each, kBetween));
+}
+
+Origin origin_of(const Json& context) {
+  const Origin origin{context.value("cpu", ""), context.value("git_revision", "")};
+  const auto several = [](const std::string& text) { return text.find(kBetween) != std::string::npos; };
+  return several(origin.cpu) || several(origin.git_revision) ? Origin{} : origin;
 }
 
 }  // namespace arboretum

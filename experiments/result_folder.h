@@ -21,6 +21,9 @@ struct ResultFolder {
   std::vector<SkippedCell> skipped;  ///< with reasons, also those that turned out impossible while running
   std::optional<PlanRecord> plan;    ///< std::nullopt: of an older revision
   bool complete = false;             ///< the run went through: results.json is there
+  /// Of a run that was begun under other conditions than those of `context`, and gone on with: how they differ, as
+  /// differing_conditions() has it.
+  std::vector<std::string> begun;
 
   [[nodiscard]] std::string context_text(const char* key) const;
 };
@@ -35,5 +38,19 @@ struct ResultFolder {
 /// "CPU: AMD EPYC against Intel Xeon" for each thing of machine and build by which two contexts differ, and which makes
 /// their times incomparable: CPU, cores, governor, instruction sets, compiler and its flags.
 [[nodiscard]] std::vector<std::string> machine_differences(const Json& a, const Json& b);
+
+/// How two runs differ that should be one: kBegunElsewhere and a difference of machine or build, "begun at revision …,
+/// gone on with at …"; empty where their results compare with each other.
+[[nodiscard]] std::vector<std::string> differing_conditions(const Json& before, const Json& now);
+inline constexpr const char* kBegunElsewhere = "begun under other conditions: ";
+
+/// Those of `begun` that are of another machine or build, without kBegunElsewhere.
+[[nodiscard]] std::vector<std::string> begun_elsewhere(const std::vector<std::string>& begun);
+
+/// The first digits of a context's revision; of a merge, of each of them.
+[[nodiscard]] std::string short_revision(const Json& context);
+
+/// The machine and revision of a context; empty where it is of several.
+[[nodiscard]] Origin origin_of(const Json& context);
 
 }  // namespace arboretum

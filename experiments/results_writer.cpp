@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <set>
 #include <vector>
 
 namespace arboretum {
@@ -28,10 +29,25 @@ void express_in(Json& entry, const std::string& unit) {
   entry["time_unit"] = unit;
 }
 
-std::vector<Json> entries_of(const CellResult& result, const ResultForm& form, bool repetitions, bool aggregates) {
+/// Whether some repetitions are of another machine or revision than others.
+bool has_several_origins(const RunOutcome& outcome) {
+  std::set<Origin> origins;
+  for (const CellResult& result : outcome.results)
+    for (const Repetition& repetition : result.repetitions) origins.insert(repetition.origin);
+  return origins.size() > 1;
+}
+
+/// `origins`: repetitions say where they are from.
+std::vector<Json> entries_of(const CellResult& result, const ResultForm& form, bool repetitions, bool aggregates,
+                             bool origins) {
   std::vector<Json> entries;
-  if (repetitions)
-    for (const Repetition& repetition : result.repetitions) entries.push_back(repetition_entry(result, repetition));
+  if (repetitions) {
+    for (const Repetition& repetition : result.repetitions) {
+      Json& entry = entries.emplace_back(repetition_entry(result, repetition));
+      if (origins && !repetition.origin.empty())
+        entry["cpu"] = repetition.origin.cpu, entry["git_revision"] = repetition.origin.git_revision;
+    }
+  }
   if (aggregates) std::ranges::move(aggregate_entries(result), std::back_inserter(entries));
   for (Json& entry : entries) express_in(entry, form.time_unit);
   return entries;
@@ -59,8 +75,9 @@ std::string results_json(const RunOutcome& outcome, const Plan& plan, Json conte
   Json document = Json::object();
   document["context"] = std::move(context);
   Json& benchmarks = document["benchmarks"] = Json::array();
+  const bool origins = has_several_origins(outcome);
   for (std::size_t i = 0; i < outcome.results.size(); ++i) {
-    for (Json& entry : entries_of(outcome.results[i], form, !form.aggregates_only, true)) {
+    for (Json& entry : entries_of(outcome.results[i], form, !form.aggregates_only, true, origins)) {
       entry["family_index"] = i, entry["per_family_instance_index"] = 0;
       benchmarks.push_back(std::move(entry));
     }
@@ -75,8 +92,9 @@ std::string results_json(const RunOutcome& outcome, const Plan& plan, Json conte
 std::string results_csv(const RunOutcome& outcome, const ResultForm& form) {
   std::vector<Json> rows;
   std::vector<std::string> columns;
+  const bool origins = has_several_origins(outcome);
   for (const CellResult& result : outcome.results) {
-    for (const Json& entry : entries_of(result, form, !form.aggregates_only, form.aggregates_only)) {
+    for (const Json& entry : entries_of(result, form, !form.aggregates_only, form.aggregates_only, origins)) {
       rows.push_back(flattened(entry));
       for (const auto& [key, value] : rows.back().items())
         if (std::ranges::find(columns, key) == columns.end()) columns.push_back(key);

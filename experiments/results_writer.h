@@ -15,11 +15,13 @@ struct ResultForm {
 };
 
 /// What the context is given after the machine's: the shard, and by results_json() what the run came to.
-inline constexpr const char* kLaterContextKeys[] = {
-    "shard", "scenes", "cells", "excluded_cells", "filtered_cells", "skipped_cells", "missing_cells", "warnings"};
+inline constexpr const char* kLaterContextKeys[] = {"shard",          "scenes",         "cells",
+                                                    "excluded_cells", "filtered_cells", "skipped_cells",
+                                                    "missing_cells",  "warnings",       "merged_from"};
 
 /// `context`, `benchmarks` (every cell's repetitions, then its aggregates) `skipped` (name and reason)
-/// and, of a merge that lacks some, `missing`.
+/// and, of a merge that lacks some, `missing`. Where repetitions are of several machines or revisions, each says which:
+/// `cpu`, `git_revision`.
 [[nodiscard]] std::string results_json(const RunOutcome& outcome, const Plan& plan, Json context,
                                        const ResultForm& form = {});
 /// One row a repetition (or aggregate, where `form` says so); empty where a figure does not apply.

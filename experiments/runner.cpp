@@ -226,7 +226,8 @@ class Runner {
     for (unsigned i = 0; i < running.wanted; ++i)
       if (std::ranges::find(running.result.repetitions, i, &Repetition::index) == running.result.repetitions.end())
         job.indices.push_back(i);
-    job.ended = [this, &running, name = job.name](const Repetition& repetition) {
+    job.ended = [this, &running, name = job.name](Repetition repetition) {
+      repetition.origin = options_.origin;
       journal_.add(name, repetition);
       running.result.repetitions.push_back(repetition);
       progress_.step(name, 1);

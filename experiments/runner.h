@@ -16,6 +16,7 @@ namespace arboretum {
 struct RunOptions {
   bool fail_fast = false;                            ///< stop after the first cell with a wrong answer
   std::map<std::string, std::string> geometry = {};  ///< of scenes as the run began: PlanRecord::geometry
+  Origin origin = {};                                ///< of what is measured now
 };
 
 struct RunOutcome {

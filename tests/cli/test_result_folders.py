@@ -58,6 +58,86 @@ class ResultFolders(CommandLineCase):
             self.assertIn("begun at revision aaaaaaaaaaaa", again.stderr)
             self.assertIn("begun at revision aaaaaaaaaaaa", " ".join(self.context(folder)["warnings"]))
             self.assertEqual([c["git_revision"] for c in json.loads(plan.read_text())["earlier_contexts"]], ["a" * 40])
+        self.assertIn("A was begun at revision aaaaaaaaaaaa", self.call("compare", folder, folder).stdout)
+
+    def as_if_elsewhere(self, folder, cpu="another processor", revision="b" * 40):
+        """Makes a folder one that was measured on another machine at another revision."""
+        for name in ("cells.jsonl", "repetitions.jsonl"):
+            file = self.folder / folder / name
+            here = self.context(folder)
+            file.write_text(file.read_text().replace(json.dumps(here["cpu"]), json.dumps(cpu)).replace(here["git_revision"], revision))
+        for name in ("plan.json", "results.json"):
+            file = self.folder / folder / name
+            document = json.loads(file.read_text())
+            document["context"].update(cpu=cpu, git_revision=revision)
+            file.write_text(json.dumps(document))
+
+    def rows(self, folder):
+        return [row for row in json.loads((self.folder / folder / "results.json").read_text())["benchmarks"] if row["run_type"] == "iteration"]
+
+    def test_a_run_gone_on_with_elsewhere_says_of_each_row_where_it_is_from_and_does_not_compare(self):
+        out = "results/small"
+        self.run_small(*FEW, "--filter", "bvh4")
+        self.assertFalse(any("cpu" in row for row in self.rows(out)))  # all of one machine: the context says it
+        here = self.context(out)
+        self.as_if_elsewhere(out)
+        self.assertIn(self.run_small(*FEW, "--resume").returncode, (0, 1))
+        self.assertEqual({(row["structure"], row["cpu"], row["git_revision"]) for row in self.rows(out)},
+                         {("bvh4", "another processor", "b" * 40), ("bvh2", here["cpu"], here["git_revision"])})
+        table = list(csv.DictReader((self.folder / out / "results.csv").read_text().splitlines()))
+        self.assertEqual({row["cpu"] for row in table if row["structure"] == "bvh4"}, {"another processor"})
+        self.run_small(*FEW, "--out", "here")
+        for pair in (("here", out), (out, "here")):
+            self.assert_error(self.call("compare", *pair), f"{out} was begun on another machine or build", "another processor")
+            allowed = self.call("compare", *pair, "--allow-different-machines", "--json", "c.json")
+            self.assertIn(allowed.returncode, (0, 3), allowed.stderr)
+            self.assertIn(f"{'B' if pair[1] == out else 'A'} was begun at revision {'b' * 12}", allowed.stdout)
+            self.assertTrue(json.loads((self.folder / "c.json").read_text())["b" if pair[1] == out else "a"]["begun"])
+        (self.folder / out / "plan.json").unlink()  # results.json alone says it too
+        (self.folder / out / "cells.jsonl").unlink()
+        self.assert_error(self.call("compare", "here", out), f"{out} was begun on another machine or build")
+        self.assertEqual(self.call("compare", "here", "here").returncode, 0)
+
+    def test_merged_parts_are_remembered_by_a_run_that_goes_on_with_them(self):
+        first, second = self.shard(1, 3), self.shard(2, 3)
+        here = self.context(first)
+        self.as_if_elsewhere(second)
+        self.assert_error(self.call("merge", "out", first, second), "another processor")
+        both = ("--allow-different-machines", "--allow-different-revisions", "--no-plots")
+        self.assertIn(self.call("merge", "out", first, second, *both).returncode, (0, 1))
+        parts = self.context("out")["merged_from"]
+        self.assertEqual({row["cpu"] for row in self.rows("out")}, {here["cpu"], "another processor"})
+        self.assertIn(self.run_small(*FEW, "--resume", "--out", "out").returncode, (0, 1))
+        self.assertEqual(self.context("out")["merged_from"], parts)
+        self.assertEqual(self.context("out")["cpu"], here["cpu"])
+        of_second = {cell["name"] for cell in read_jsonl(self.folder / second / "cells.jsonl")}
+        for row in self.rows("out"):
+            self.assertEqual(row["cpu"], "another processor" if row["run_name"] in of_second else here["cpu"])
+        self.run_small(*FEW, "--out", "here")
+        self.assert_error(self.call("compare", "here", "out"), "out was begun on another machine or build")
+        third = self.shard(3, 3)
+        self.run_small(*FEW, "--shard", "3/3", "--resume", "--out", third)
+        self.assert_error(self.call("merge", "again", "out", "results/none"), "results/none")
+        last = self.edit_cells(third, lambda cell: cell.update(name=cell["name"].replace("sphere_flake", "other"), scene="other"))
+        (self.folder / last / "effective.yaml").write_text((self.folder / third / "effective.yaml").read_text())
+        self.assert_error(self.call("merge", "again", "out", last), "out was begun under other conditions", "--allow-different-machines")
+        self.assertIn(self.call("merge", "again", "out", last, *both).returncode, (0, 1))
+        self.assertEqual(self.context("again")["merged_from"][0]["merged_from"], parts)
+
+    def test_scenes_that_changed_between_two_runs_are_other_work(self):
+        self.shard(1, 1, "--out", "before")
+        scene = read_jsonl(self.folder / "before/cells.jsonl")[0]["scene"]
+        for name, hash_ in (("before", "1" * 16), ("same", "1" * 16), ("moved", "2" * 16)):
+            if name != "before":
+                self.edit_cells("before", lambda cell: None, name)
+            plan = self.folder / name / "plan.json"
+            plan.write_text(json.dumps({**json.loads(plan.read_text()), "geometry": {scene: hash_}}))
+        self.assertIn("no regression", self.call("compare", "before", "same").stdout)
+        result = self.call("compare", "before", "moved", "--json", "c.json")
+        self.assert_error(result, "nothing to compare", status=4)
+        self.assertIn(f"measured with different scenes called {scene}", result.stdout)
+        incomparable = json.loads((self.folder / "c.json").read_text())["incomparable"]
+        self.assertEqual(len(incomparable), len(self.cells(*FEW)))
 
     def test_a_filter_says_what_is_measured_now_and_takes_nothing_from_what_was(self):
         out = self.folder / "results/small"
