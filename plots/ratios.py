@@ -5,6 +5,7 @@ Reads what `compare --json` writes. Exit status: 0 done, 2 a file cannot be read
 """
 
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from plot import fail, need_matplotlib  # noqa: E402
 AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
 COLOURS = {"faster": "#117733", "slower": "#CC3355", "indistinguishable": "#777777", "undecided": "#BBBBBB", "mean": "#332288"}
 MOST_CELLS = 80
+SAME = 1e-6  # of the logarithm of a ratio: no difference
 LETTER = 0.075  # inches that a letter of a label takes
 
 
@@ -38,11 +40,13 @@ def rows_of(comparison, metric):
             rows.append((f"geometric mean of {mean['cells']}", ratio["median"], ratio["low"], ratio["high"], "mean"))
     names, shared = labels(cells)
     shown = list(zip(names, cells))
-    if len(cells) > MOST_CELLS:
-        decided = sorted((pair for pair in shown if pair[1]["verdict"] in ("faster", "slower")), key=lambda pair: pair[1]["ratio"])
-        half = MOST_CELLS // 2
-        shown = decided if len(decided) <= MOST_CELLS else decided[:half] + decided[-half:]
-        shared = f"{len(shown)} of {len(cells)} cells, those that differ most" + (f"; {shared}" if shared else "")
+    differing = sorted((pair for pair in shown if abs(math.log(pair[1]["ratio"])) > SAME), key=lambda pair: -abs(math.log(pair[1]["ratio"])))
+    if not differing:
+        what = f"none of {len(cells)} cells differs" if len(cells) > 1 else "its cell does not differ"
+        shown, shared = [], what + (f"; {shared}" if shared else "")
+    elif len(cells) > MOST_CELLS:
+        shown = differing[:MOST_CELLS]
+        shared = f"{len(shown)} of {len(cells)} cells, those that differ most, called so or not" + (f"; {shared}" if shared else "")
     for name, cell in shown:
         ratio = cell["ratio"]  # of one repetition, which has no interval
         rows.append((name, ratio, ratio if cell["ratio_low"] is None else cell["ratio_low"], ratio if cell["ratio_high"] is None else cell["ratio_high"], cell["verdict"]))
@@ -61,17 +65,18 @@ def draw(comparison):
     figure, axes = style.plt.subplots(len(parts), 1, figsize=(6.5 + LETTER * widest, 0.19 * sum(heights) + 0.8), squeeze=False, layout="constrained",
                                       gridspec_kw={"height_ratios": heights})
     limit = 1 + comparison["options"]["min_difference_percent"] / 100
+    drawn = [row for _, rows, _ in parts for row in rows]  # one scale for all panels
+    low, high = min(1 / limit, *(row[2] for row in drawn)) / 1.02, max(limit, *(row[3] for row in drawn)) * 1.02
     for axis, (title, rows, shared) in zip(axes[:, 0], parts):
         axis.axvspan(1 / limit, limit, color="#EEEEEE", zorder=0)
         axis.axvline(1, color="#333333", linewidth=0.8, zorder=1)
-        for place, (_, ratio, low, high, kind) in enumerate(rows):
-            axis.errorbar(ratio, place, xerr=[[max(ratio - low, 0)], [max(high - ratio, 0)]], fmt="D" if kind == "mean" else "o", color=COLOURS[kind],
+        for place, (_, ratio, least, most, kind) in enumerate(rows):
+            axis.errorbar(ratio, place, xerr=[[max(ratio - least, 0)], [max(most - ratio, 0)]], fmt="D" if kind == "mean" else "o", color=COLOURS[kind],
                           markersize=6 if kind == "mean" else 4.5, linewidth=1.3, zorder=2)
         axis.set_yticks(range(len(rows)), [row[0] for row in rows])
         axis.set_ylim(len(rows) - 0.4, -0.6)
         axis.grid(axis="y", visible=False)
-        low, high = min(row[2] for row in rows), max(row[3] for row in rows)
-        axis.set_xlim(min(low, 1 / limit) / 1.02, max(high, limit) * 1.02)
+        axis.set_xlim(low, high)
         if high / low > 4:
             axis.set_xscale("log")
             axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -1,6 +1,7 @@
 """Tests of plots/: what is reckoned and read, from results as they are, thin or cut off."""
 
 import json
+import math
 import random
 import sys
 import unittest
@@ -10,6 +11,7 @@ sys.dont_write_bytecode = True
 
 from made_results import Drawn, Folder, build, other, results_of, trace  # noqa: E402
 
+import ratios  # noqa: E402
 import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
@@ -230,6 +232,44 @@ class Numbers(Drawn):
         self.assertEqual(swept_axes(cells), {"isa"})
         self.assertEqual(undetermined_axes(cells, ("structure", "builder", "isa")), ["structure", "isa"])
         self.assertEqual(Modes(cells).labels, ["one mode"])
+
+
+def comparison(ratios, metric="trace", low=0.99, high=1.01):
+    """What `compare --json` writes, as far as the figure reads it."""
+    axes = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
+    cells = [{**dict.fromkeys(axes, "-"), "metric": metric, "structure": f"s{k}", "ratio": r, "ratio_low": low and r * low, "ratio_high": high and r * high,
+              "verdict": "slower" if r == 0.9 else "indistinguishable"} for k, r in enumerate(ratios)]
+    total = {"trace": "rays", "build": "builds"}[metric]
+    return {"options": {"min_difference_percent": 3}, "cells": cells,
+            "geometric_means": [{"axis": "all", "value": total, "cells": len(cells), "ratio": {"median": 1.0, "low": 0.99, "high": 1.01}}]}
+
+
+class Ratios(Drawn):
+    def test_of_many_cells_those_that_differ_most_are_shown_called_or_not(self):
+        rows, shared = ratios.rows_of(comparison([0.9, *(1 + 0.001 * k for k in range(150))]), "trace")
+        self.assertEqual(len(rows), 1 + ratios.MOST_CELLS)
+        self.assertTrue(shared.startswith(f"{ratios.MOST_CELLS} of 151 cells, those that differ most"))
+        self.assertEqual([row[1] for row in rows[1:4]], [1.149, 1.148, 1.147])
+        self.assertIn(0.9, [row[1] for row in rows])
+        self.assertEqual(sorted((abs(math.log(row[1])) for row in rows[1:]), reverse=True), [abs(math.log(row[1])) for row in rows[1:]])
+
+    def test_where_nothing_differs_that_is_what_is_said(self):
+        for count, said in ((150, "none of 150 cells differs"), (3, "none of 3 cells differs"), (1, "its cell does not differ")):
+            rows, shared = ratios.rows_of(comparison([1.0] * count), "trace")
+            self.assertEqual([row[4] for row in rows], ["mean"])
+            self.assertIn(said, shared)
+
+    def test_panels_have_one_scale_and_one_repetition_has_no_interval(self):
+        both = comparison([0.5, 1.2], low=None, high=None)
+        builds = comparison([1.01, 1.02], "build")
+        both["cells"] += builds["cells"]
+        both["geometric_means"] += builds["geometric_means"]
+        figure = ratios.draw(both)
+        self.addCleanup(style.plt.close, figure)
+        first, second = figure.axes
+        self.assertEqual(first.get_xlim(), second.get_xlim())
+        self.assertLess(first.get_xlim()[0], 0.5)
+        self.assertEqual(ratios.rows_of(both, "trace")[0][1][1:4], (0.5, 0.5, 0.5))
 
 
 class Loading(unittest.TestCase):
