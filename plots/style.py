@@ -17,6 +17,7 @@ from matplotlib.patches import Patch  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
 from results import TooMuch, interval_name, ordered  # noqa: E402
+from tables import per_million_text  # noqa: E402
 
 COLOURS = {  # structures
     "kdtree": "#CC6677", "bvh2": "#88CCEE", "bvh4": "#44AA99", "bvh8": "#332288", "bvh16": "#882255",
@@ -180,8 +181,7 @@ def edge(cell):
 
 def wrong_text(cell):
     """The cell's wrong answers per million, to three digits."""
-    rate = cell.per_million("wrong_answers") or 0.0
-    return f"{float(f'{rate:.3g}'):,.0f}" if rate >= 10 else f"{rate:.2g}"
+    return per_million_text(cell.per_million("wrong_answers") or 0.0)
 
 
 def most_wrong(cells):

@@ -18,6 +18,16 @@ def number(value, form="{:.3g}"):
     return f'<td class="number" data-v="{value!r}">{escape(form.format(value))}</td>'
 
 
+def per_million_text(rate):
+    """A number of answers per million rays, to three digits, as figures and tables write it: 172,000, 12, 0.5."""
+    return "0" if rate == 0 else f"{float(f'{rate:.3g}'):,.0f}" if rate >= 10 else f"{rate:.2g}"
+
+
+def per_million(rate):
+    """A table cell of it; empty where there is none."""
+    return number(None) if rate is None else f'<td class="number" data-v="{rate!r}">{per_million_text(rate)}</td>'
+
+
 def figure(value):
     """Four digits for what is measured, all of them for what is counted."""
     whole = value is not None and (abs(value) >= 1000 or value == int(value))
@@ -65,7 +75,9 @@ def embree_note(results, shown):
     if not cells:
         return ""
     version = results.context.get("embree")
-    words = [f"embree: {version}, as it is installed." if version else "embree: as it is installed.", ASSERTIONS]
+    words = [f"embree: {version}, as it is installed." if version else "embree: as it is installed."]
+    if any(cell["traversal"].startswith("stream") for cell in cells):
+        words.append(ASSERTIONS)
     if any(cell["traversal"].startswith(("packet", "stream")) for cell in cells):
         words.append(BOTH_FLAGS)
     return f'<p class="soft">{escape(" ".join(words))}</p>'
@@ -104,6 +116,8 @@ def throughput_table(results):
                                                ("switches_per_packet", "switches/packet"), ("rays_per_switch", "rays/switch"), ("node_queue_length", "nodes queued"),
                                                ("leaf_queue_length", "leaves queued"))
              if any(c.value(name) is not None for c in cells)]
+    if any(cell.value("hits") == 0 for cell in cells):
+        extra.insert(0, ("hits", "rays that hit, %"))
     children = any(cell.series("children_hit") for cell in cells)
     if any(":self_intersection=" in c["workload"] for c in cells):  # every secondary ray has these figures: shown where they are the subject
         extra += [("self_hits_per_million", "own surface met per million"), ("near_hits_per_million", "neighbour met per million"),
@@ -121,14 +135,14 @@ def throughput_table(results):
         rate = cell.estimate(metric)
         out = [text(cell[a], key=a == "structure") for a in axes]
         out += [number(rate.median / 1e6, "{:.2f}"), text(f"{rate.low / 1e6:.2f} – {rate.high / 1e6:.2f}" if rate.samples > 1 else "-")]
-        out.append(number(cell.per_million("wrong_answers"), "{:.4g}")
+        out.append(per_million(cell.per_million("wrong_answers"))
                    if cell.per_million("wrong_answers") is not None else text("not checked"))
         if reference:
             base = reference.get(beside(cell))
             out.append(number(rate.median / base if base else None, "{:.2f}"))
         out.append(number(1e9 / rate.median, "{:.1f}"))
-        out += [number(cell.per_million(name), "{:.4g}") for name, _ in counts if name != "wrong_answers"]
-        out += [number(cell.value(name)) for name, _ in extra]
+        out += [per_million(cell.per_million(name)) for name, _ in counts if name != "wrong_answers"]
+        out += [number(hit_share(cell) if name == "hits" else cell.value(name)) for name, _ in extra]
         if children:
             out.append(text(" ".join(f"{100 * share:.0f}" for share in cell.series("children_hit"))))
         rows.append((out, "best" if rate.median == best[beside(cell)] else ""))
@@ -137,6 +151,12 @@ def throughput_table(results):
             f"hits and wrong surfaces against exact arithmetic; “wrong primitive” counts apart. The fastest "
             f"structure of a scene, workload and ISA is green. {escape('Same for all: ' + note + '.' if note else '')}</p>"
             + table("throughput", heads, rows))
+
+
+def hit_share(cell):
+    """Per cent of the rays; None where they were not counted."""
+    hits, rays = cell.value("hits"), cell.value("rays")
+    return None if hits is None or not rays else 100 * hits / rays
 
 
 STRUCTURE_COLUMNS = (("build_seconds", "build, ms", 1e3), ("triangles_per_second", "Mtri/s", 1e-6), ("refit_seconds", "refit, ms", 1e3), ("sah_cost", "SAH cost", 1),
@@ -182,7 +202,7 @@ def best_table(results):
         wrong = cell.per_million("wrong_answers")
         out = [text(v) for v in key] + [text(cell["structure"])]
         out.append(number(cell.value(metric) / 1e6, "{:.2f}"))
-        out.append(number(wrong, "{:.4g}") if wrong is not None else text("not checked"))
+        out.append(per_million(wrong) if wrong is not None else text("not checked"))
         if reference:
             out.append(number(cell.value(metric) / reference[key] if reference.get(key) else None, "{:.2f}"))
         out.append(text(" / ".join(cell[a] for a in ("builder", "leaf", "intersector", "box", "traversal") if cell[a])))

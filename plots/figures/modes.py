@@ -1,5 +1,6 @@
 """How a cell is traced, in a few words: those axes of builder to threads that tell cells of these results apart."""
 
+from figures.names import label
 from results import axis_sort_key, swept_axes
 
 
@@ -17,5 +18,5 @@ class Modes:
         self.labels = sorted(found, key=found.get)
 
     def label(self, cell):
-        parts = [cell[a] + (" threads" if a == "threads" else "") for a in self.axes]
-        return ", ".join(p for p in parts if p) or "one mode"
+        parts = [label(a, cell[a]) for a in self.axes if cell[a]]
+        return ", ".join(parts) or "one mode"

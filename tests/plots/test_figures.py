@@ -18,6 +18,7 @@ from figures import ALL, accuracy_vs_time, leaks_vs_aspect, leaks_vs_distance, p
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
 from figures.leak_lines import slots, wider, without  # noqa: E402
 from figures.leak_picture import by_test  # noqa: E402
+from figures.modes import Modes  # noqa: E402
 from results import load  # noqa: E402
 
 
@@ -357,19 +358,38 @@ class Drawing(unittest.TestCase):
         self.assertNotIn("rong answer", report.answers(load(Folder([unchecked, build()]).path)))
         self.assertNotIn("not checked", report.answers(load(Folder([right]).path)))
 
+    def test_report_writes_wrong_answers_as_figures_do(self):
+        results = load(Folder([trace(rays=1000000, wrong_answers=171819, missed_hits=12), trace("bvh4", rays=1000000, wrong_answers=0, missed_hits=0)]).path)
+        for table in (tables.throughput_table(results), tables.best_table(results)):
+            self.assertIn(">172,000</td>", table)
+            self.assertNotIn("e+05", table)
+        self.assertEqual(style.wrong_text(results.traces[0]), "172,000")
+        self.assertEqual([tables.per_million_text(v) for v in (0, 0.123, 12.3, 999.6)], ["0", "0.12", "12", "1,000"])
+
+    def test_report_shows_the_share_of_hits_where_rays_hit_nothing(self):
+        some = tables.throughput_table(load(Folder([trace(hits=250)]).path))
+        self.assertNotIn("rays that hit", some)
+        none = tables.throughput_table(load(Folder([trace(hits=250), trace("bvh4", hits=0)]).path))
+        self.assertIn("rays that hit, %", none)
+        self.assertIn('data-v="25.0"', none)
+
+    def test_one_thread_is_one(self):
+        cells = load(Folder([trace(), trace(threads=2, run_name="trace/two")]).path).traces
+        self.assertEqual(Modes(cells).labels, ["1 thread", "2 threads"])
+
     def test_report_says_how_embree_was_built(self):
         stream = trace("embree", traversal="stream_coherent")
         stream["run_name"] = stream["name"] = stream["name"].replace("/single/", "/stream_coherent/")
         for rows, context, notes, said, unsaid in (
                 ([trace(), build()], {"embree": "Intel Embree 3.13.5"}, 0, (), ("assertions", "3.13.5, as it is installed")),
-                ([trace(), trace("embree")], {"embree": "Intel Embree 3.13.5"}, 3, ("embree: Intel Embree 3.13.5, as it is installed.", "12 % on streams"), ("_incoherent both",)),
-                ([trace(), build("embree")], {}, 2, ("embree: as it is installed.",), ("_incoherent both",)),
-                ([trace(), stream, build("embree")], {}, 4, ("_incoherent both",), ())):
-            with self.subTest(notes=notes):
+                ([trace(), trace("embree")], {"embree": "Intel Embree 3.13.5"}, 0, ("embree: Intel Embree 3.13.5, as it is installed.",), ("12 % on streams", "_incoherent both")),
+                ([trace(), build("embree")], {}, 0, ("embree: as it is installed.",), ("_incoherent both",)),
+                ([trace(), stream, build("embree")], {}, 3, ("_incoherent both", "12 % on streams"), ())):
+            with self.subTest(said=said):
                 folder = Folder(rows, context)
                 self.assertEqual(folder.plot().returncode, 0)
                 page = (folder.path / "report.html").read_text(encoding="utf-8")
-                self.assertEqual(page.count("keeps its assertions on"), notes)  # fastest, figures, all cells; structures
+                self.assertEqual(page.count("keeps its assertions on"), notes)  # of streams: fastest, figures, all cells
                 for words in said:
                     self.assertIn(words, page)
                 for words in unsaid:
