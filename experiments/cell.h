@@ -36,6 +36,13 @@ struct Cell {
   [[nodiscard]] std::string workload_name() const { return workload + start_label; }
 };
 
+/// Ratios on a shared machine are of thread CPU time, as long as each cell of a run that traces has one thread; else
+/// rays a second of all of them are by wall time, which alone compares threads. Builds are by wall time.
+[[nodiscard]] inline bool allows_cpu_time(const Cell& cell) noexcept {
+  return cell.metric == Cell::Metric::build || cell.threads == 1;
+}
+[[nodiscard]] inline const char* rate_unit(bool cpu) noexcept { return cpu ? "Mray/s CPU" : "Mray/s wall"; }
+
 struct SkippedCell {
   std::string name, reason;
 };

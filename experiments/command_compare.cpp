@@ -10,6 +10,7 @@
 #include "experiments/name_filter.h"
 #include "experiments/plotting.h"
 #include "experiments/result_folder.h"
+#include "experiments/table_text.h"
 
 namespace arboretum {
 namespace {
@@ -17,6 +18,14 @@ namespace {
 void filter_cells(ResultFolder& folder, const std::string& filter, const std::string& skip) {
   const NameFilter wanted(filter, skip);
   std::erase_if(folder.cells, [&](const CellResult& r) { return !wanted(r.cell.name()); });
+}
+
+/// "--filter 'zzz' leaves"
+std::string filters_leave(const std::string& filter, const std::string& skip) {
+  std::vector<std::string> options;
+  if (!filter.empty()) options.push_back(fmt::format("--filter '{}'", filter));
+  if (!skip.empty()) options.push_back(fmt::format("--skip '{}'", skip));
+  return fmt::format("{} {}", fmt::join(options, " and "), options.size() == 1 ? "leaves" : "leave");
 }
 
 void refuse_different_machines(const ResultFolder& a, const ResultFolder& b) {
@@ -76,10 +85,15 @@ ExitStatus command_compare(const CompareCommand& command) {
     refuse_begun_elsewhere(a), refuse_begun_elsewhere(b);
     refuse_different_machines(a, b);
   }
+  const std::size_t of_a = a.cells.size(), of_b = b.cells.size();
   filter_cells(a, command.filter, command.skip), filter_cells(b, command.filter, command.skip);
   CompareOptions options = command.options;
   options.other_scenes = different_scenes(a, b);
-  const Comparison comparison = compare_results(a.cells, b.cells, options);
+  Comparison comparison = compare_results(a.cells, b.cells, options);
+  if (a.cells.empty() && b.cells.empty() && of_a + of_b > 0)
+    comparison.left_nothing =
+        fmt::format("{} none of A's {} nor of B's {}", filters_leave(command.filter, command.skip),
+                    counted(of_a, "cell"), counted(of_b, "cell"));
   const auto [status, why] = verdict(comparison);
   if (command.json != "-" && command.csv != "-") {
     fmt::print("{}{}", origins_text(a, b), comparison_text(comparison, command.all));

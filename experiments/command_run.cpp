@@ -28,6 +28,7 @@
 #include "experiments/scene_data.h"
 #include "experiments/shard.h"
 #include "experiments/summary.h"
+#include "experiments/table_text.h"
 
 namespace arboretum {
 namespace {
@@ -36,6 +37,16 @@ constexpr std::size_t kMostNamed = 10;
 
 double total_seconds(const Experiment& experiment, const Plan& plan) {
   const std::vector<double> seconds = estimate_seconds(experiment, plan.cells);
+  return std::accumulate(seconds.begin(), seconds.end(), 0.0);
+}
+
+/// Of what the journal does not hold.
+double seconds_left(const Experiment& experiment, const Plan& plan, const Journal& journal) {
+  std::vector<Cell> left;
+  std::ranges::copy_if(plan.cells, std::back_inserter(left),
+                       [&](const Cell& cell) { return !journal.done().contains(cell.name()); });
+  const std::vector<double> seconds =
+      estimate_seconds(experiment, left, [&](const Cell& cell) { return journal.started(cell.name()).size(); });
   return std::accumulate(seconds.begin(), seconds.end(), 0.0);
 }
 
@@ -51,11 +62,11 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
   for (std::size_t i = 0; i < std::min(plan.excluded_includes.size(), kMostNamed); ++i)
     fmt::print("{}\n", plan.excluded_includes[i]);
   if (plan.excluded_includes.size() > kMostNamed)
-    fmt::print("and {} more cells of `include` that `exclude` takes away\n",
-               plan.excluded_includes.size() - kMostNamed);
+    fmt::print("and {} of `include` that `exclude` takes away\n",
+               counted(plan.excluded_includes.size() - kMostNamed, "more cell"));
   for (const std::string& line : experiment.left_out) fmt::print("{}\n", line);
   const std::string others = plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "";
-  fmt::print("\n{} cells, {} skipped,{} {} excluded, {} filtered out; about {}\n", plan.cells.size(),
+  fmt::print("\n{}, {} skipped,{} {} excluded, {} filtered out; about {}\n", counted(plan.cells.size(), "cell"),
              plan.skipped.size(), others, plan.excluded, plan.filtered,
              format_duration(total_seconds(experiment, plan)));
   fmt::print("{}", skipped_lines(plan, {}));
@@ -282,8 +293,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   if (!command.benchmark.out.empty()) require_writable(command.benchmark.out);
   if (!command.resume) set_aside(folder);
   Journal journal(folder, hash, whole, command.resume);
-  const double seconds = total_seconds(experiment, plan);
   keep_measured(plan, record, whole, journal.done());
+  const double seconds = seconds_left(experiment, plan, journal);
   remove_files(folder, present(folder, concluding_files()));
   write_whole(folder / "effective.yaml",
               fmt::format("# configuration hash: {}\n{}{}", hash,
@@ -298,8 +309,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
     std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
   write_whole(folder / kPlanFile, to_text(record));
   for (const std::string& line : experiment.left_out) fmt::print(stderr, "{}\n", line);
-  fmt::print(stderr, "{}: {} cells ({} done before), {} skipped{}; about {}\n", experiment.name, plan.cells.size(),
-             journal.done().size(), plan.skipped.size(),
+  fmt::print(stderr, "{}: {} ({} done before), {} skipped{}; about {}\n", experiment.name,
+             counted(plan.cells.size(), "cell"), journal.done().size(), plan.skipped.size(),
              shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
              format_duration(seconds));
 
@@ -308,7 +319,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
       {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)}, std::move(loaded));
   name_origins(outcome, before.origin);
   outcome.warnings = changed;
-  std::ranges::move(machine_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
+  std::ranges::move(run_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
                     std::back_inserter(outcome.warnings));
   context["scenes"].update(outcome.scenes);
   std::ranges::move(dropped_warnings(context["scenes"]), std::back_inserter(outcome.warnings));
@@ -365,8 +376,8 @@ ExitStatus command_run(RunCommand command) {
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
     flush_output();
-    fmt::print(stderr, "arboretum: nothing to measure: {} combinations skipped,{} {} excluded, {} filtered out\n",
-               plan.skipped.size(),
+    fmt::print(stderr, "arboretum: nothing to measure: {} skipped,{} {} excluded, {} filtered out\n",
+               counted(plan.skipped.size(), "combination"),
                plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded,
                plan.filtered);
     return ExitStatus::kNothingMeasured;

@@ -71,6 +71,8 @@ struct Comparison {
   std::vector<std::pair<std::string, std::string>> incomparable;  ///< in both, but not the same work: name and reason
   std::vector<MeanRatio> means;
   std::vector<StructureChange> structures;
+  /// What left nothing to compare: "--filter 'zzz' leaves none of A's 12 cells nor of B's 12 cells".
+  std::string left_nothing = {};
   std::optional<MeanRatio> control, embree;  ///< trace cells: those of `control`; embree's where there is no control
 
   [[nodiscard]] std::size_t count(Verdict verdict) const;

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <filesystem>
 #include <set>
+#include <system_error>
 
 #include "experiments/results_writer.h"
 #include "experiments/table_text.h"
@@ -23,8 +25,8 @@ std::string repetitions(const std::vector<CellResult>& cells) {
   if (cells.empty()) return "no cells";
   const auto [least, most] = std::ranges::minmax(cells, {}, [](const CellResult& r) { return r.repetitions.size(); });
   const std::size_t a = least.repetitions.size(), b = most.repetitions.size();
-  return fmt::format("{} cells, {} repetitions", cells.size(),
-                     a == b ? std::to_string(a) : fmt::format("{} to {}", a, b));
+  return fmt::format("{}, {}", counted(cells.size(), "cell"),
+                     a == b ? counted(a, "repetition") : fmt::format("{} to {} repetitions", a, b));
 }
 
 std::string origin(const char* letter, const ResultFolder& f) {
@@ -131,7 +133,7 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
   if (!axes.constant.empty()) text += fmt::format(", all of {}", fmt::join(axes.constant, ", "));
   text += "\n";
   if (rows.size() > 1) text += format_table(rows, titles.size() - 6);
-  if (left_out > 0) text += fmt::format("{} indistinguishable cells are left out; --all lists them\n", left_out);
+  if (left_out > 0) text += fmt::format("{} left out; --all lists them\n", counted(left_out, "indistinguishable cell"));
   return text;
 }
 
@@ -200,16 +202,16 @@ std::string machine_text(const Comparison& comparison) {
   if (comparison.control) {
     const MeanRatio& c = *comparison.control;
     return fmt::format(
-        "\nAll speeds are relative to the {} cells of --control '{}', whose geometric mean B/A is {:.3f} {}.\n",
-        c.cells, c.value, c.ratio.median, interval_text(c.ratio));
+        "\nAll speeds are relative to the {} of --control '{}', whose geometric mean B/A is {:.3f} {}.\n",
+        counted(c.cells, "cell"), c.value, c.ratio.median, interval_text(c.ratio));
   }
   if (!comparison.embree) return {};
   const Interval& r = comparison.embree->ratio;
   if ((r.low <= 1.0 && r.high >= 1.0) || std::abs(r.median - 1.0) < 0.01) return {};
   return fmt::format(
-      "\nnote: embree's {} cells ran at {:.3f} {} of A's speed: if nothing of Embree changed, the machine did. "
+      "\nnote: embree's {} ran at {:.3f} {} of A's speed: if nothing of Embree changed, the machine did. "
       "--control /embree/ takes that out of all ratios.\n",
-      comparison.embree->cells, r.median, interval_text(r));
+      counted(comparison.embree->cells, "cell"), r.median, interval_text(r));
 }
 
 std::string wrong_table(const Comparison& comparison) {
@@ -223,9 +225,8 @@ std::string wrong_table(const Comparison& comparison) {
   }
   std::string text = rows.size() == 1 ? "" : "\n" + format_table(rows, 1);
   if (unchecked > 0)
-    text += fmt::format(
-        "\n{} cells had their answers checked in only one of A and B: whether they are right does not compare\n",
-        unchecked);
+    text += fmt::format("\n{} had answers checked in only one of A and B: whether they are right does not compare\n",
+                        counted(unchecked, "cell"));
   return text;
 }
 
@@ -246,7 +247,7 @@ std::string structure_table(const Comparison& comparison) {
 
 std::string name_list(const std::vector<std::string>& names, const std::string& title) {
   if (names.empty()) return {};
-  std::string text = fmt::format("\n{} {}\n", names.size(), title);
+  std::string text = fmt::format("\n{} {}\n", counted(names.size(), "cell"), title);
   for (std::size_t i = 0; i < std::min(names.size(), kMostNames); ++i) text += "  " + names[i] + "\n";
   if (names.size() > kMostNames)
     text += fmt::format("  and {} more (--json FILE has them)\n", names.size() - kMostNames);
@@ -295,6 +296,8 @@ std::string busy_text(const ResultFolder& a, const ResultFolder& b) {
 
 std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
   std::string text = origin("A", a) + origin("B", b);
+  std::error_code ignored;
+  if (std::filesystem::equivalent(a.path, b.path, ignored)) text += "A and B are one folder: nothing can differ\n";
   for (const auto& [letter, folder] : {std::pair{"A", &a}, std::pair{"B", &b}})
     for (const std::string& difference : folder->begun) text += fmt::format("{} was {}\n", letter, difference);
   const std::vector<std::string> machine = machine_differences(a.context, b.context);
@@ -318,22 +321,25 @@ std::string comparison_text(const Comparison& comparison, bool all) {
   }
   std::vector<std::string> other;
   for (const auto& [name, why] : comparison.incomparable) other.push_back(fmt::format("{}: {}", name, why));
-  return text + name_list(other, "cells are in both but did other work, and are not compared:") +
-         name_list(comparison.only_a, "cells only in A:") + name_list(comparison.only_b, "cells only in B:");
+  return text + name_list(other, "in both that did other work, not compared:") +
+         name_list(comparison.only_a, "only in A:") + name_list(comparison.only_b, "only in B:");
 }
 
 std::pair<ExitStatus, std::string> verdict(const Comparison& comparison) {
+  if (comparison.cells.empty() && !comparison.left_nothing.empty())
+    return {ExitStatus::kNothingMeasured, "nothing to compare: " + comparison.left_nothing};
   if (comparison.cells.empty()) {
     return {ExitStatus::kNothingMeasured,
-            fmt::format("nothing to compare: {} cells only in A, {} only in B, {} in both but not the same work",
-                        comparison.only_a.size(), comparison.only_b.size(), comparison.incomparable.size())};
+            fmt::format("nothing to compare: {} only in A, {} only in B, {} in both but not the same work",
+                        counted(comparison.only_a.size(), "cell"), comparison.only_b.size(),
+                        comparison.incomparable.size())};
   }
   std::vector<std::string> counts;
   for (Verdict v : {Verdict::faster, Verdict::slower, Verdict::indistinguishable, Verdict::undecided})
     if (const std::size_t n = comparison.count(v); n > 0) counts.push_back(fmt::format("{} {}", n, to_string(v)));
   if (const std::size_t n = comparison.more_wrong(); n > 0)
     counts.push_back(fmt::format("{} with more wrong answers", n));
-  const std::string of = fmt::format("of {} cells {}", comparison.cells.size(), fmt::join(counts, ", "));
+  const std::string of = fmt::format("of {} {}", counted(comparison.cells.size(), "cell"), fmt::join(counts, ", "));
   const std::string beyond = beyond_text(comparison);
   if (comparison.is_regression())
     return {ExitStatus::kRegression, fmt::format("regression: {}{}; exit status 3", of, beyond)};

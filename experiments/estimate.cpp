@@ -34,18 +34,21 @@ constexpr double kReinsertedPerSecond = 7e5;
 }  // namespace
 
 /// Repetitions last min_time; making a cell ready takes a few passes at ten million rays a second.
-std::vector<double> estimate_seconds(const Experiment& experiment, const std::vector<Cell>& cells) {
+std::vector<double> estimate_seconds(const Experiment& experiment, const std::vector<Cell>& cells,
+                                     const std::function<std::size_t(const Cell&)>& measured) {
   const MeasureSettings& m = experiment.measure;
   const double pass = double(m.width) * double(m.height) / 1e7;
   std::vector<double> triangles, seconds;
   for (const SceneChoice& scene : experiment.scenes) triangles.push_back(double(expected_triangles(scene.spec)));
   for (const Cell& cell : cells) {
+    const double repetitions =
+        m.repetitions - double(measured ? std::min<std::size_t>(measured(cell), m.repetitions) : 0);
     if (cell.metric == Cell::Metric::build) {
       const double a_triangle = 1.0 / triangles_per_second(cell.builder) +
                                 (cell.builder.ends_with("_reinsertion") ? 1.0 / kReinsertedPerSecond : 0.0);
-      seconds.push_back((1.0 + m.repetitions) * triangles[cell.scene_index] * a_triangle + m.min_warmup_time);
+      seconds.push_back((1.0 + repetitions) * triangles[cell.scene_index] * a_triangle + m.min_warmup_time);
     } else {
-      seconds.push_back(m.repetitions * std::max(m.min_time, pass) + 3.0 * pass +
+      seconds.push_back(repetitions * std::max(m.min_time, pass) + 3.0 * pass +
                         std::max(m.warmup * pass, m.min_warmup_time));
     }
   }

@@ -2,6 +2,8 @@
 // Rough, and the same on every machine: it knows the configuration and the catalogue, and looks at no file.
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "experiments/cell.h"
@@ -9,7 +11,8 @@
 
 namespace arboretum {
 
-/// Seconds that each of the cells takes.
-[[nodiscard]] std::vector<double> estimate_seconds(const Experiment& experiment, const std::vector<Cell>& cells);
+/// Seconds that each of the cells takes. `measured`: how many repetitions a cell has already.
+[[nodiscard]] std::vector<double> estimate_seconds(const Experiment& experiment, const std::vector<Cell>& cells,
+                                                   const std::function<std::size_t(const Cell&)>& measured = {});
 
 }  // namespace arboretum

@@ -12,6 +12,7 @@
 #include "experiments/scene_data.h"
 #include "experiments/shell_words.h"
 #include "experiments/summary.h"
+#include "experiments/table_text.h"
 
 namespace arboretum {
 namespace {
@@ -174,14 +175,13 @@ Json merged_context(const std::vector<ResultFolder>& parts, const std::string& c
   return context;
 }
 
-/// The line of a cell; its repetitions say where they are from.
-Json with_origins(Json line, const CellResult& cell) {
+/// In a cell's line too each repetition says where it is from.
+void name_origins(Json& line, const CellResult& cell) {
   for (std::size_t i = 0; i < cell.repetitions.size(); ++i) {
     const Origin& origin = cell.repetitions[i].origin;
     if (!origin.empty())
       line["repetitions"][i]["cpu"] = origin.cpu, line["repetitions"][i]["git_revision"] = origin.git_revision;
   }
-  return line;
 }
 
 /// The plan of the whole in the making: the union of the parts' plans, and what the parts say of its cells.
@@ -199,7 +199,7 @@ class WholePlan {
       if (const auto found = measured_.find(entry.name); found != measured_.end()) {
         const auto& [part, place] = found->second;
         merged_.outcome.results.push_back(part->cells[place]);
-        merged_.lines.push_back(with_origins(part->lines[place], part->cells[place]));
+        merged_.lines.push_back(part->lines[place]);
       } else if (!reasons_.contains(entry.name)) {
         merged_.missing.push_back(entry), merged_.outcome.missing.push_back(entry.name);
       }
@@ -290,6 +290,7 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
     for (std::size_t i = 0; i < merged.lines.size(); ++i) {
       const std::size_t part = owners.at(merged.outcome.results[i].cell.name());
       merged.outcome.results[i].facts["part"] = part, merged.lines[i]["part"] = part;
+      name_origins(merged.lines[i], merged.outcome.results[i]);
     }
   }
   Plan measured{
@@ -297,7 +298,7 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
   for (const CellResult& result : merged.outcome.results) measured.cells.push_back(result.cell);
   const Json cores = parts.front().context.value("cores", Json());
   const std::vector<std::string> usual =
-      machine_warnings(merged.outcome, measured, cores.is_number() ? cores.get<unsigned>() : ~0u);
+      run_warnings(merged.outcome, measured, cores.is_number() ? cores.get<unsigned>() : ~0u);
   merged.outcome.warnings.insert(merged.outcome.warnings.end(), usual.begin(), usual.end());
   const std::vector<std::string> dropped = dropped_warnings(merged.context.value("scenes", Json::object()));
   merged.outcome.warnings.insert(merged.outcome.warnings.end(), dropped.begin(), dropped.end());
@@ -312,8 +313,8 @@ std::string missing_line(const Merged& merged) {
   for (const auto& [index, count] : counts)
     shards.push_back(fmt::format("{} of shard {}/{}", count, index, merged.shards));
   const std::string where = merged.shards > 1 ? fmt::format(": {}", fmt::join(shards, ", ")) : "";
-  return fmt::format("{} of {} cells of the plan are in none of the parts{}", merged.missing.size(),
-                     merged.record.cells.size(), where);
+  return fmt::format("{} of {} of the plan {} in none of the parts{}", merged.missing.size(),
+                     counted(merged.record.cells.size(), "cell"), merged.missing.size() == 1 ? "is" : "are", where);
 }
 
 }  // namespace arboretum

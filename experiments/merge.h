@@ -16,7 +16,8 @@ struct MergeOptions {
 
 struct Merged {
   RunOutcome outcome;       ///< cells in the plan's order; warnings
-  std::vector<Json> lines;  ///< of cells.jsonl, as the parts have them, each repetition with its origin
+  std::vector<Json> lines;  ///< of cells.jsonl, as the parts have them, with `part` and origins where they are of
+                            ///< several machines or revisions
   Plan plan;                ///< `skipped` and the counts; no cells
   PlanRecord record;        ///< of the whole plan
   Json context;

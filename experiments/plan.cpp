@@ -184,9 +184,12 @@ class Planner {
     for (std::size_t i = 0; i < experiment_.exclude.size(); ++i) {
       if (!matches(experiment_.exclude[i], cell)) continue;
       used_excludes_.insert(i);
-      ++plan_.excluded;
-      if (include_)
-        plan_.excluded_includes.push_back(fmt::format("{}  excluded: {} takes away what {} adds", cell.name(),
+      ++taken_away_;
+      // Once, however many values of what it does not read there are
+      const std::string name = cell.name();
+      if (excluded_.insert(name).second) ++plan_.excluded;
+      if (include_ && excluded_of_include_.emplace(include_, name).second)
+        plan_.excluded_includes.push_back(fmt::format("{}  excluded: {} takes away what {} adds", name,
                                                       experiment_.exclude[i].where, include_->where));
       return;
     }
@@ -252,11 +255,11 @@ class Planner {
         if (static_cast<Axis>(i) == Axis::leaf) keep(entry->info.leaves);
       }
       const std::size_t before = added_;
-      const std::size_t excluded_before = plan_.excluded;
+      const std::size_t taken_away_before = taken_away_;
       include_ = &choice;
       product(scene, lists, out);
       include_ = nullptr;
-      if (added_ > before || plan_.excluded > excluded_before) used_includes_.insert(index);
+      if (added_ > before || taken_away_ > taken_away_before) used_includes_.insert(index);
     }
   }
 
@@ -322,7 +325,9 @@ class Planner {
   std::set<std::string> names_, traversals_, builds_, parameters_read_;
   std::map<std::array<std::string, 4>, bool> reads_;  ///< of parameter, structure, builder, below
   std::set<std::size_t> used_includes_, used_excludes_;
-  std::size_t added_ = 0;
+  std::size_t added_ = 0, taken_away_ = 0;  ///< the latter: by excludes, a cell as often as it came up
+  std::set<std::string> excluded_;          ///< names
+  std::set<std::pair<const CellChoice*, std::string>> excluded_of_include_;
   const CellChoice* include_ = nullptr;  ///< the one whose cells are being added
 };
 
@@ -335,6 +340,7 @@ void apply_filter(Plan& plan, const std::string& filter, const std::string& skip
   const NameFilter wanted(filter, skip);
   for (std::vector<Cell>* cells : {&plan.cells, &plan.elsewhere})
     std::erase_if(*cells, [&](const Cell& cell) { return !wanted(cell.name()); });
+  std::erase_if(plan.skipped, [&](const SkippedCell& cell) { return !wanted(cell.name); });
   plan.filtered += before - plan.cells.size();
 }
 

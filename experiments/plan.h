@@ -28,7 +28,8 @@ struct Plan {
 /// away, and a parameter that no cell reads.
 [[nodiscard]] Plan make_plan(const Experiment& experiment, const Registry& registry);
 
-/// Keeps the cells (and those of `elsewhere`) that a NameFilter takes. Throws UserError for a broken expression.
+/// Keeps the cells (those of `elsewhere` and the skipped ones too) whose names a NameFilter takes. Throws UserError for
+/// a broken expression.
 void apply_filter(Plan& plan, const std::string& filter, const std::string& skip);
 
 /// Skipped cells by reason, most first.

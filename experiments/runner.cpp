@@ -32,7 +32,8 @@ class Runner {
   Runner(const Experiment& experiment, const Plan& plan, const Registry& registry, Journal& journal,
          const RunOptions& options, LoadedScene loaded)
       : experiment_(experiment), plan_(plan), registry_(registry), journal_(journal), options_(options),
-        loaded_(std::move(loaded)), progress_(pending_cells(), pending_units()),
+        loaded_(std::move(loaded)), cpu_(std::ranges::all_of(plan.cells, allows_cpu_time)),
+        progress_(pending_cells(), pending_units()),
         cache_(experiment.measure.structure_cache, [this](const std::string& line) { progress_.note(line); }) {}
 
   RunOutcome run() {
@@ -242,8 +243,8 @@ class Runner {
     std::ranges::sort(result.repetitions, {}, &Repetition::index);
     journal_.finish(result);
     const std::string name = result.cell.name();
-    const double rate = median(result.rates(false));
-    std::string outcome = fmt::format("{:.1f} {}", rate * 1e-6, result.is_trace() ? "Mray/s" : "Mtriangle/s");
+    const double rate = median(result.rates(result.is_trace() && cpu_));
+    std::string outcome = fmt::format("{:.1f} {}", rate * 1e-6, result.is_trace() ? rate_unit(cpu_) : "Mtriangle/s");
     if (result.has_fact("wrong_answers"))
       outcome += fmt::format(", {} wrong", result.facts["wrong_answers"].get<std::uint64_t>());
     progress_.cell_done(name, outcome);
@@ -276,6 +277,7 @@ class Runner {
   Journal& journal_;
   const RunOptions& options_;
   LoadedScene loaded_;
+  const bool cpu_;  ///< whether rays a second are by thread CPU time, as in the table
   Progress progress_;
   StructureCache cache_;
   RunOutcome outcome_;

@@ -16,11 +16,10 @@ namespace {
 
 using Row = TableRow;
 
-/// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
-double ratio_rate(const CellResult& r) { return median(r.rates(r.cell.threads == 1)); }
+double rate_of(const CellResult& r, bool cpu) { return median(r.rates(cpu)); }
 
 /// The fastest embree cell of the same scene, workload, ISA and threads.
-const CellResult* embree_beside(const CellResult& r, const std::vector<CellResult>& all) {
+const CellResult* embree_beside(const CellResult& r, const std::vector<CellResult>& all, bool cpu) {
   const CellResult* best = nullptr;
   for (const CellResult& other : all) {
     const Cell &a = r.cell, &b = other.cell;
@@ -28,7 +27,7 @@ const CellResult* embree_beside(const CellResult& r, const std::vector<CellResul
         a.isa != b.isa || a.threads != b.threads) {
       continue;
     }
-    if (!best || ratio_rate(other) > ratio_rate(*best)) best = &other;
+    if (!best || rate_of(other, cpu) > rate_of(*best, cpu)) best = &other;
   }
   return best;
 }
@@ -87,10 +86,10 @@ std::string interval_words(const std::vector<const CellResult*>& results) {
                      100.0 * range_coverage(std::max<std::size_t>(least, 2)), kFewestOfInterval);
 }
 
-Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
+Row trace_row(const CellResult& r, const std::vector<CellResult>& all, bool cpu) {
   const Cell& c = r.cell;
-  const Interval rate = median_interval(r.rates(c.threads == 1));
-  const CellResult* embree = embree_beside(r, all);
+  const Interval rate = median_interval(r.rates(cpu));
+  const CellResult* embree = embree_beside(r, all, cpu);
   const std::optional<double> build = build_milliseconds(r, all);
   return {c.structure,
           c.builder_name(),
@@ -102,7 +101,7 @@ Row trace_row(const CellResult& r, const std::vector<CellResult>& all) {
           std::to_string(c.threads),
           fmt::format("{:.2f}", rate.median * 1e-6),
           interval_text({rate.median * 1e-6, rate.low * 1e-6, rate.high * 1e-6}, r.repetitions.size()),
-          embree ? fmt::format("{:.2f}", ratio_rate(r) / std::max(ratio_rate(*embree), 1e-9)) : "-",
+          embree ? fmt::format("{:.2f}", rate_of(r, cpu) / std::max(rate_of(*embree, cpu), 1e-9)) : "-",
           r.has_fact("wrong_answers")
               ? fmt::format("{:.1f}", 1e6 * r.fact("wrong_answers") / std::max(r.fact("rays"), 1.0))
               : "unchecked",
@@ -140,13 +139,31 @@ std::string build_table(const std::vector<CellResult>& all) {
   return "\nbuilds\n" + format_table(rows, 6) + fmt::format("\nbuild ms: {}.\n", interval_words(builds));
 }
 
+/// Comparable to a standard deviation and blind to single outliers; of too few repetitions for that their range.
 double relative_spread(const CellResult& r) {
   const std::vector<double> rates = r.rates(r.cell.threads == 1);
   const double centre = median(rates);
-  if (rates.size() < 3 || centre <= 0.0) return 0.0;
+  if (rates.size() < 2 || centre <= 0.0) return 0.0;
+  if (rates.size() < kFewestOfInterval) {
+    const auto [least, most] = std::ranges::minmax(rates);
+    return (most - least) / centre;
+  }
   std::vector<double> deviations;
   for (double v : rates) deviations.push_back(std::abs(v - centre));
-  return 1.4826 * median(deviations) / centre;  // comparable to a standard deviation, blind to single outliers
+  return 1.4826 * median(deviations) / centre;
+}
+
+/// Scenes that no primary ray hits, and how many there are: one is enough, of any cell.
+std::map<std::string, std::size_t> views_of_nothing(const RunOutcome& outcome) {
+  std::map<std::string, std::size_t> rays;
+  std::set<std::string> hit;
+  for (const CellResult& r : outcome.results) {
+    if (!r.is_trace() || r.cell.workload != "primary" || !r.has_fact("hits")) continue;
+    rays[r.cell.scene] = static_cast<std::size_t>(r.fact("rays"));
+    if (r.fact("hits") > 0.0) hit.insert(r.cell.scene);
+  }
+  for (const std::string& scene : hit) rays.erase(scene);
+  return rays;
 }
 
 }  // namespace
@@ -162,25 +179,25 @@ std::string result_tables(const RunOutcome& outcome) {
   }
   std::string text;
   std::vector<const CellResult*> traces;
+  const bool cpu = std::ranges::all_of(outcome.results, allows_cpu_time, &CellResult::cell);
   for (const auto& [title, results] : groups) {
     traces.insert(traces.end(), results.begin(), results.end());
     std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads",
-                           "Mray/s", interval_head(results), "x embree", "wrong/1e6", "SAH", "build ms"}};
-    for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results));
+                           rate_unit(cpu), interval_head(results), "x embree", "wrong/1e6", "SAH", "build ms"}};
+    for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results, cpu));
     if (!results.front()->cell.start_label.empty()) add_starts(rows, results);
     const CellResult& first = *results.front();
     text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"), first.fact("triangles"),
                         format_table(rows, 8));
   }
   if (!groups.empty()) {
-    text += fmt::format(
-        "\nMray/s: {}, by thread CPU time with one thread, else by wall time. x embree: against the fastest embree "
-        "cell "
-        "of the same ISA and threads.\n",
-        interval_words(traces));
+    text += fmt::format("\n{}: {}, by {}. x embree: against the fastest embree cell of the same ISA and threads.\n",
+                        rate_unit(cpu), interval_words(traces),
+                        cpu ? "thread CPU time" : "wall time, as some cells have several threads");
   }
   if (groups.empty()) text = build_table(outcome.results);
-  if (std::ranges::any_of(outcome.results, [](const CellResult& r) { return r.cell.structure == "embree"; })) {
+  const auto is_stream = [](const Cell& c) { return c.structure == "embree" && c.traversal.starts_with("stream"); };
+  if (std::ranges::any_of(outcome.results, is_stream, &CellResult::cell)) {
     text += "embree: Debian's package keeps its assertions on, which costs it about 12 % on streams.\n";
   }
   return text;
@@ -190,12 +207,12 @@ std::string skipped_lines(const Plan& plan, const RunOutcome& outcome) {
   std::vector<SkippedCell> all = plan.skipped;
   all.insert(all.end(), outcome.failed.begin(), outcome.failed.end());
   if (all.empty()) return {};
-  std::string text = fmt::format("{} combinations skipped:\n", all.size());
+  std::string text = fmt::format("{} skipped:\n", counted(all.size(), "combination"));
   for (const auto& [reason, count] : group_reasons(all)) text += fmt::format("  {:5}  {}\n", count, reason);
   return text;
 }
 
-std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan& plan, unsigned cores) {
+std::vector<std::string> run_warnings(const RunOutcome& outcome, const Plan& plan, unsigned cores) {
   constexpr double kWide = 0.05;
   std::vector<std::string> warnings;
   std::size_t noisy = 0;
@@ -207,13 +224,19 @@ std::vector<std::string> machine_warnings(const RunOutcome& outcome, const Plan&
   }
   if (worst) {
     warnings.push_back(
-        fmt::format("noisy machine: the repetitions of {} of {} cells spread by more than {:.0f} % (most: {:.0f} % in "
+        fmt::format("noisy machine: the repetitions of {} of {} spread by more than {:.0f} % (most: {:.0f} % in "
                     "{}); raise min_time or repetitions, or free the machine",
-                    noisy, outcome.results.size(), kWide * 100, relative_spread(*worst) * 100, worst->cell.name()));
+                    noisy, counted(outcome.results.size(), "cell"), kWide * 100, relative_spread(*worst) * 100,
+                    worst->cell.name()));
   }
+  for (const auto& [scene, rays] : views_of_nothing(outcome))
+    warnings.push_back(
+        fmt::format("none of the {} primary rays hits {}: its camera looks past it, and the times are of "
+                    "rays that meet nothing",
+                    rays, scene));
   for (const Cell& cell : plan.cells) {
     if (cell.threads <= cores) continue;
-    warnings.push_back(fmt::format("some cells have more threads than the machine's {} cores", cores));
+    warnings.push_back(fmt::format("some cells have more threads than the machine's {}", counted(cores, "core")));
     break;
   }
   std::set<std::string> lacking;
@@ -240,16 +263,16 @@ std::pair<ExitStatus, std::string> verdict(const RunOutcome& outcome) {
       worst = &r;
   }
   if (wrong == 0) {
-    if (checked == 0)
-      return {ExitStatus::kDone, fmt::format("{} cells measured; answers were not checked", outcome.results.size())};
-    return {ExitStatus::kDone, fmt::format("{} cells measured, all answers right", outcome.results.size())};
+    const std::string measured = counted(outcome.results.size(), "cell");
+    if (checked == 0) return {ExitStatus::kDone, fmt::format("{} measured; answers were not checked", measured)};
+    return {ExitStatus::kDone, fmt::format("{} measured, all answers right", measured)};
   }
   std::vector<std::string> tests;
   for (const auto& [test, count] : by_test) tests.push_back(fmt::format("{} {}", count, test));
   return {ExitStatus::kWrongAnswers,
-          fmt::format("wrong answers in {} of {} checked cells ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1",
-                      wrong, checked, fmt::join(tests, ", "), worst->fact("wrong_answers"), worst->fact("rays"),
-                      worst->cell.name())};
+          fmt::format("wrong answers in {} of {} ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1", wrong,
+                      counted(checked, "checked cell"), fmt::join(tests, ", "), worst->fact("wrong_answers"),
+                      worst->fact("rays"), worst->cell.name())};
 }
 
 }  // namespace arboretum

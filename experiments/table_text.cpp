@@ -22,4 +22,8 @@ std::string format_table(const std::vector<TableRow>& rows, std::size_t figures)
   return text;
 }
 
+std::string counted(std::size_t number, std::string_view noun) {
+  return fmt::format("{} {}{}", number, noun, number == 1 ? "" : "s");
+}
+
 }  // namespace arboretum

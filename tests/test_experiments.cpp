@@ -2,6 +2,7 @@
 #include "experiments/axis_words.h"
 #include "experiments/config.h"
 #include "experiments/effective.h"
+#include "experiments/estimate.h"
 #include "experiments/parameters.h"
 #include "experiments/plan.h"
 #include "tests/catch.h"
@@ -467,6 +468,50 @@ TEST_CASE("filters keep and drop by name; a broken expression is named") {
   CHECK(error_of([&] { apply_filter(plan, std::string(2000, '('), ""); }).find("check brackets") != std::string::npos);
   CHECK(error_of([&] { apply_filter(plan, "(?=.*(?=.*(?!.*b)))", ""); }).find("looks ahead") != std::string::npos);
   apply_filter(plan, "", "(((((.*)*)*)*)*)*~");  // without backtracking: at once
+}
+
+TEST_CASE("what is skipped is filtered as well") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("small.yaml", kSmall);
+  Plan plan =
+      make_plan(read_experiment(file, registry, {.axes = {"isa=sse,avx2,avx512", "structure=tree,list"}}), registry);
+  REQUIRE(plan.skipped.size() == 2);  // this machine has no avx512
+  apply_filter(plan, "/tree/", "");
+  REQUIRE(plan.skipped.size() == 1);
+  CHECK(plan.skipped[0].name.find("/tree/") != std::string::npos);
+  apply_filter(plan, "", "avx512");
+  CHECK(plan.skipped.empty());
+}
+
+TEST_CASE("a cell is excluded once, however many values of what it does not read are swept") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", R"(
+scenes: [{generate: sphere, triangles: 500}]
+axes: {structure: [tree, list], isa: [sse], intersector: [moller_trumbore]}
+parameters: {bins: [8, 16, 32, 64]}
+exclude: [{structure: list}]
+metrics: [trace]
+)"),
+                                              registry),
+                              registry);
+  CHECK(plan.cells.size() == 4);
+  CHECK(plan.excluded == 1);
+}
+
+TEST_CASE("an estimate leaves out repetitions that were measured") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Experiment experiment = read_experiment(folder.write("small.yaml", kSmall), registry);
+  const Plan plan = make_plan(experiment, registry);
+  const std::vector<double> whole = estimate_seconds(experiment, plan.cells),
+                            none = estimate_seconds(experiment, plan.cells, [](const Cell&) { return 0; }),
+                            some = estimate_seconds(experiment, plan.cells, [](const Cell&) { return 5; });
+  REQUIRE(whole.size() == 2);
+  CHECK(whole == none);
+  CHECK(some[0] == Approx(whole[0] * 3.0 / 8.0));  // a build: 1 + 7 of which 5 are done
+  CHECK(whole[1] - some[1] == Approx(5 * experiment.measure.min_time));
 }
 
 TEST_CASE("the effective configuration can be run again and means the same") {

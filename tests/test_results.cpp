@@ -17,6 +17,7 @@
 #include "experiments/runner.h"
 #include "experiments/sampling.h"
 #include "experiments/summary.h"
+#include "experiments/table_text.h"
 #include "tests/catch.h"
 #include "tests/experiments_on_paper.h"
 
@@ -241,6 +242,81 @@ TEST_CASE("tables and results say what stands beside a median: an interval, a ra
       CHECK(entry["aggregate_name"] == "median");
       CHECK(entry.contains("triangles_per_second_low") == (repetitions > 1));
     }
+  }
+}
+
+TEST_CASE("one table has one clock, that of the report: wall time where a cell has several threads") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const std::string sweep = std::string(kSmall) + "metrics: [trace]\n";
+  const Experiment experiment = read_experiment(folder.write("small.yaml", sweep), registry);
+  RunOutcome outcome;
+  for (const Cell& cell : make_plan(experiment, registry).cells) outcome.results.push_back(result_of(cell));
+  REQUIRE(outcome.results.size() == 1);
+  const std::string one = result_tables(outcome);  // 1000 rays in 0.1875 s of CPU, 0.375 s of wall time
+  INFO(one);
+  CHECK(one.find("Mray/s CPU") != std::string::npos);
+  CHECK(one.find("by thread CPU time") != std::string::npos);
+  outcome.results[0].facts["rays"] = 375'000'000;
+  CHECK(result_tables(outcome).find(" 2000.00 ") != std::string::npos);
+  CellResult two = outcome.results[0];
+  two.cell.threads = 2;
+  outcome.results.push_back(two);
+  const std::string several = result_tables(outcome);
+  INFO(several);
+  CHECK(several.find("Mray/s wall") != std::string::npos);
+  CHECK(several.find("CPU") == std::string::npos);
+  CHECK(several.find(" 1000.00 ") != std::string::npos);
+  CHECK(several.find(" 2000.00 ") == std::string::npos);
+}
+
+TEST_CASE("warnings: repetitions that lie apart, however few; a camera that looks past the scene") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  const auto warned = [&](const std::vector<double>& seconds, std::size_t hits, const char* part) {
+    RunOutcome outcome;
+    CellResult& result = outcome.results.emplace_back(result_of(plan.cells[1]));
+    result.facts["hits"] = hits;
+    result.repetitions.clear();
+    for (unsigned i = 0; i < seconds.size(); ++i) result.repetitions.push_back(repetition(i, seconds[i]));
+    const std::vector<std::string> warnings = run_warnings(outcome, plan, 4);
+    return std::ranges::any_of(warnings, [&](const std::string& w) { return w.find(part) != std::string::npos; });
+  };
+  for (const std::vector<double>& apart :
+       {std::vector{1.0, 1.1}, {1.0, 1.0, 1.1}, {1.0, 1.0, 1.0, 1.0, 1.2}, {1.0, 0.9, 1.1, 0.8, 1.2, 1.05, 0.95}})
+    CHECK(warned(apart, 1, "noisy machine: the repetitions of 1 of 1 cell spread by more than 5 %"));
+  for (const std::vector<double>& near :
+       {std::vector{1.0}, {1.0, 1.02}, {1.0, 1.02, 0.99}, {1.0, 1.0, 1.01, 1.0, 1.0, 1.0, 1.9}})
+    CHECK(!warned(near, 1, "noisy"));
+  CHECK(warned({1.0}, 0, "none of the 1000 primary rays hits sphere-500: its camera looks past it"));
+  CHECK(!warned({1.0}, 1, "looks past it"));
+}
+
+TEST_CASE("one of a thing is one") {
+  CHECK(counted(1, "cell") == "1 cell");
+  CHECK(counted(0, "cell") == "0 cells");
+  CHECK(counted(12, "cell") == "12 cells");
+  const Folder folder;
+  const Registry registry = paper_registry();
+  Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  plan.skipped.push_back({"some/cell", "no avx512"});
+  CHECK(skipped_lines(plan, {}).starts_with("1 combination skipped:\n"));
+  RunOutcome outcome;
+  outcome.results.push_back(result_of(plan.cells[1]));
+  CHECK(verdict(outcome).second == "1 cell measured, all answers right");
+}
+
+TEST_CASE("what Embree's package costs its streams is said where there are some") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  for (const auto& [structure, traversal, said] :
+       {std::tuple{"embree", "stream_coherent", true}, {"embree", "single", false}, {"bvh8", "stream", false}}) {
+    RunOutcome outcome;
+    CellResult& result = outcome.results.emplace_back(result_of(plan.cells[1]));
+    result.cell.structure = structure, result.cell.traversal = traversal;
+    CHECK((result_tables(outcome).find("keeps its assertions on") != std::string::npos) == said);
   }
 }
 

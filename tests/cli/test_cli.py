@@ -167,12 +167,12 @@ class CommandLine(CommandLineCase):
     def test_embree_comes_with_its_version_and_what_its_package_costs_it(self):
         if "embree" not in self.call("list", "structures").stdout.split("not available")[0]:
             self.skipTest("no embree here")
-        for structures, said in (("bvh4", False), ("bvh4,embree", True)):
-            few = (f"structure={structures}", "isa=sse", "workload=primary", "intersector=moller_trumbore", "--out", "out")
+        for structures, ways, said in (("bvh4", "single", False), ("bvh4,embree", "single", False), ("bvh4,embree", "single,stream_coherent", True)):
+            few = (f"structure={structures}", f"traversal={ways}", "isa=sse", "workload=primary", "intersector=moller_trumbore", "--out", "out")
             for metric in ("^build", "^trace"):
                 result = self.run_small(*few, "--skip", metric)
                 self.assertIn(result.returncode, (0, 1), result.stderr)
-                self.assertEqual("keeps its assertions on" in result.stdout, said, (structures, metric))
+                self.assertEqual("keeps its assertions on" in result.stdout, said and metric == "^build", (structures, metric))
         context = json.loads((self.folder / "out/results.json").read_text())["context"]
         self.assertRegex(context["embree"], r"^Intel Embree \d+\.[\d.]+$")
 
@@ -298,6 +298,7 @@ class CommandLine(CommandLineCase):
         result = self.run_small(*slow, "--benchmark_min_time=0.02", "--resume")
         self.assertIn(result.returncode, (0, 1))
         self.assertIn(f"({len(whole)} done before)", result.stderr)
+        self.assertIn("about 0 s", result.stderr)  # nothing is left
 
     def test_output_that_cannot_be_written(self):
         self.write("file", "")

@@ -107,6 +107,13 @@ class ResultFolders(CommandLineCase):
         self.assertIn(self.call("merge", "out", first, second, *both).returncode, (0, 1))
         parts = self.context("out")["merged_from"]
         self.assertEqual({row["cpu"] for row in self.rows("out")}, {here["cpu"], "another processor"})
+        done = read_jsonl(self.folder / first / "cells.jsonl")[0]["name"]
+        self.assertIn(self.run_small("--repetitions", "7", "--filter", f"^{done}$", "--resume", "--out", "out").returncode, (0, 1))
+        self.assertEqual(self.context("out")["merged_from"], parts)
+        third = self.shard(3, 3)
+        self.assert_error(self.call("merge", "again", "out", third), "out was begun under other conditions", "--allow-different-machines")
+        self.assertIn(self.call("merge", "again", "out", third, *both).returncode, (0, 1))
+        self.assertEqual(self.context("again")["merged_from"][0]["merged_from"], parts)
         self.assertIn(self.run_small(*FEW, "--resume", "--out", "out").returncode, (0, 1))
         self.assertEqual(self.context("out")["merged_from"], parts)
         self.assertEqual(self.context("out")["cpu"], here["cpu"])
@@ -115,14 +122,6 @@ class ResultFolders(CommandLineCase):
             self.assertEqual(row["cpu"], "another processor" if row["run_name"] in of_second else here["cpu"])
         self.run_small(*FEW, "--out", "here")
         self.assert_error(self.call("compare", "here", "out"), "out was begun on another machine or build")
-        third = self.shard(3, 3)
-        self.run_small(*FEW, "--shard", "3/3", "--resume", "--out", third)
-        self.assert_error(self.call("merge", "again", "out", "results/none"), "results/none")
-        last = self.edit_cells(third, lambda cell: cell.update(name=cell["name"].replace("sphere_flake", "other"), scene="other"))
-        (self.folder / last / "effective.yaml").write_text((self.folder / third / "effective.yaml").read_text())
-        self.assert_error(self.call("merge", "again", "out", last), "out was begun under other conditions", "--allow-different-machines")
-        self.assertIn(self.call("merge", "again", "out", last, *both).returncode, (0, 1))
-        self.assertEqual(self.context("again")["merged_from"][0]["merged_from"], parts)
 
     def test_scenes_that_changed_between_two_runs_are_other_work(self):
         self.shard(1, 1, "--out", "before")
@@ -305,6 +304,12 @@ class ResultFolders(CommandLineCase):
     def test_compare_needs_two_result_folders_with_something_in_common(self):
         first, second = self.shard(1, 2), self.shard(2, 2)
         self.assert_error(self.call("compare", first, second), "nothing to compare", status=4)
+        nothing = self.call("compare", first, first, "--filter", "zzz", "--json", "nothing.json")
+        count = len(self.cells(*FEW, "--shard", "1/2"))
+        self.assert_error(nothing, f"nothing to compare: --filter 'zzz' leaves none of A's {count} cells nor of B's {count} cells", status=4)
+        self.assertIn("--filter 'zzz' leaves none", json.loads((self.folder / "nothing.json").read_text())["verdict"])
+        self.assertIn("A and B are one folder", self.call("compare", first, f"./{first}/").stdout)
+        self.assertNotIn("one folder", self.call("compare", first, second).stdout)
         self.assert_error(self.call("compare", first), "B is required")
         self.assert_error(self.call("compare", first, "results/small-shard-2-of-3"), f"did you mean '{second}'")
         self.assert_error(self.call("compare", first, "results"), "no result folder")
