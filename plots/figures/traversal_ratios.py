@@ -1,6 +1,7 @@
 """Every way of traversal against the best of Embree's, or against single rays: a panel an instruction set, a square for each scene and workload."""
 
 import math
+from textwrap import wrap
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
@@ -12,12 +13,16 @@ from style import panels, short
 
 TITLE = "Ways of traversal"
 CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set (where the sweep has no Embree: of the structure's "
-           "own single rays). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes. "
+           "own single rays: below a workload's name stands which). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes. "
            "Framed red: ways with wrong answers. Where an instruction set would have more than 60 rows, a row is a structure and way of traversal, on each scene by its fastest builder, leaf and tests.")
 MOST_ROWS = 60
 # Blue to orange by way of white: readers with any colour vision can tell the ends apart.
 COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FEE9CF", "#FFFFFF", "#D3E4F3", "#5C9BCF", "#1F5A96"])
 MEAN = "mean"
+LONGEST_SCENE = 30  # characters of a name below or above its column
+COLUMN, CHARACTER, ROW_CHARACTER = 0.52, 0.078, 0.062  # inches: of a column at least; of a character of a workload's name above its columns, of a row's name beside it
+SMALL = 0.8  # of that size: above a single column
+KEY = ((0.5, "half or less"), (0.7, "0.7"), (1.0, "1"), (1.4, "1.4"), (2.0, "twice or more"))
 ONLY_WHEN_NAMED = True
 
 
@@ -36,12 +41,19 @@ def draw(results):
     columns = columns_of(cells)
     rows = {isa: row_names(table, modes) for isa, table in tables.items()}
     longest = max(map(len, rows.values()))
-    figure, axes = panels(len(tables), 1, max(5.0, 1.9 + 0.52 * len(columns)), 1.6 + 0.26 * longest)
+    wide = max([COLUMN] + [SMALL * CHARACTER * len(word) for workload, count in spans_of(columns) if count == 1 for word in words_of(workload)])
+    beside = 1.4 + ROW_CHARACTER * max(len(row_label(row)) for of_isa in rows.values() for row in of_isa)  # names of rows, and the key
+    headings = {isa: headings_of(columns, [c for c in cells if c["isa"] == isa], wide) for isa in tables}
+    most = max(heading.count("\n") + 1 for of_isa in headings.values() for heading in of_isa)
+    figure, axes = panels(len(tables), 1, max(5.0, beside + wide * len(columns)), 1.9 + 0.15 * most + 0.26 * longest)
     for (isa, table), axis in zip(tables.items(), axes.flat):
-        panel(axis, table, rows[isa], columns)
+        image = panel(axis, table, rows[isa], columns, headings[isa], isa + (": fastest builder, leaf and tests of each" if fastest_alone else ""))
         fastest = fastest_cells([c for c in cells if c["isa"] == isa], modes, metric)
         mark_wrong(axis, {(x, y): fastest[row][place] for y, row in enumerate(rows[isa]) for x, place in enumerate(columns) if place in fastest[row]})
-        axis.set_title(isa + (": fastest builder, leaf and tests of each" if fastest_alone else ""), loc="left", pad=30)
+    key = figure.colorbar(image, ax=list(axes.flat), location="right", anchor=(0.0, 1.0), shrink=min(1.0, 2.4 / figure.get_size_inches()[1]), aspect=14, pad=0.01)
+    key.set_ticks([math.log2(value) for value, _ in KEY], labels=[text for _, text in KEY])
+    key.ax.set_title("rays a second,\na multiple of …", fontsize=9, loc="left", pad=10)
+    key.outline.set_visible(False)
     return figure
 
 
@@ -85,9 +97,34 @@ def columns_of(cells):
     return columns
 
 
+def spans_of(columns):
+    """[(workload, number of its columns)]."""
+    return [(workload, sum(w == workload for w, _ in columns)) for workload in dict.fromkeys(w for w, _ in columns)]
+
+
+def words_of(workload):
+    return workload.replace("_", " ").replace(":", ": ").replace("=", "= ").split()
+
+
+def headings_of(columns, cells, wide):
+    """What stands above a workload's columns, each `wide` inches: its name, and what its ratios are to, broken into lines that stay above them."""
+    found = []
+    for workload, count in spans_of(columns):
+        scenes = {c["scene"] for c in cells if c["workload"] == workload}
+        with_embree = {c["scene"] for c in cells if c["workload"] == workload and c["structure"] == "embree"}
+        to = "" if not scenes else "… Embree's fastest" if with_embree == scenes else "… Embree's fastest, or own single rays" if with_embree else "… own single rays"
+        most = max(4, int(count * wide / (CHARACTER * (SMALL if count == 1 else 1.0))))
+        found.append("\n".join(wrap(" ".join(words_of(workload)), most, break_long_words=False) + wrap(to, most, break_long_words=False)).replace("= ", "="))
+    return found
+
+
 def row_names(table, modes):
     structures = ordered((s for s, _ in table), "structure")
     return [(s, m) for s in structures for m in modes.labels if (s, m) in table]
+
+
+def row_label(row):
+    return "  ".join(row)
 
 
 def value_at(row, workload, scene):
@@ -97,29 +134,33 @@ def value_at(row, workload, scene):
     return math.exp(sum(map(math.log, found)) / len(found)) if found else None
 
 
-def panel(axis, table, rows, columns):
+def panel(axis, table, rows, columns, headings, title):
     values = np.array([[value_at(table[r], *c) or np.nan for c in columns] for r in rows])
-    axis.imshow(np.log2(values), cmap=COLOURS, vmin=-1.0, vmax=1.0, aspect="auto")
+    image = axis.imshow(np.log2(values), cmap=COLOURS, vmin=-1.0, vmax=1.0, aspect="auto")
     for y, line in enumerate(values):
         for x, v in enumerate(line):
             if not np.isnan(v):
                 dark = abs(math.log2(v)) > 0.75
                 axis.text(x, y, f"{v:.2f}", ha="center", va="center", fontsize=8, color="white" if dark else "#222222",
                           fontweight="bold" if columns[x][1] == MEAN else "normal")
-    axis.set_yticks(range(len(rows)), [f"{s}  {m}" for s, m in rows], fontsize=8.5)
-    axis.set_xticks(range(len(columns)), [short(s, 16) for _, s in columns], rotation=30, ha="right", rotation_mode="anchor", fontsize=8)
+    axis.set_yticks(range(len(rows)), map(row_label, rows), fontsize=8.5)
+    names = [short(s, LONGEST_SCENE) for _, s in columns]
+    axis.set_xticks(range(len(columns)), names, rotation=30, ha="right", rotation_mode="anchor", fontsize=8)
     axis.tick_params(length=0)
-    headed = headings_above(axis, len(rows))
+    above = 8 + 2.4 * max(map(len, names)) if headings_above(axis, len(rows)) else 4  # points that the names take
     axis.grid(visible=False)
     for spine in axis.spines.values():
         spine.set_visible(False)
-    starts = [k for k in range(len(columns)) if k == 0 or columns[k][0] != columns[k - 1][0]]
-    for first, after in zip(starts, [*starts[1:], len(columns)]):
-        alone = after - first == 1
-        axis.annotate(columns[first][0].replace("_", "\n" if alone else " "), ((first + after - 1) / 2, -0.5), (0, 50 if headed else 4), textcoords="offset points", ha="center",
-                      va="bottom", fontsize=7.5 if alone else 9.5)
+    first, tallest = 0, 0.0
+    for (workload, count), heading in zip(spans_of(columns), headings):
+        axis.annotate(heading, (first + (count - 1) / 2, -0.5), (0, above), textcoords="offset points", ha="center", va="bottom",
+                      fontsize=7.5 if count == 1 else 9.5)
+        tallest = max(tallest, (10.0 if count == 1 else 12.5) * (heading.count("\n") + 1))
         if first:
             axis.axvline(first - 0.5, color="white", linewidth=4)
+        first += count
+    axis.set_title(title, loc="left", pad=above + tallest + 6)
     for y in range(1, len(rows)):
         if rows[y][0] != rows[y - 1][0]:
             axis.axhline(y - 0.5, color="white", linewidth=4)
+    return image

@@ -142,12 +142,42 @@ class Numbers(Drawn):
         cells = [Cell({"scene": s, "workload": "primary", "isa": "avx2", "structure": "bvh8", "builder": f"b{b}", "leaf": "l", "intersector": f"i{i}", "box": "fast", "traversal": t,
                        "threads": "1"}, [{"rays_per_second": 1e6 * (1 + b + (t == "packet8"))}])
                  for s in ("bunny", "city") for b in range(8) for i in range(5) for t in ("single", "packet8")]
-        (axis,) = self.draw(traversal_ratios, results_of(cells)).axes
+        axis, key = self.draw(traversal_ratios, results_of(cells)).axes
         self.assertEqual([t.get_text() for t in axis.get_yticklabels()], ["bvh8  packet8", "bvh8  single"])
-        self.assertEqual([t.get_text() for t in axis.texts if t.get_text() != "primary"], ["1.12"] * 3 + ["1.00"] * 3)
+        self.assertEqual([t.get_text() for t in axis.texts if "primary" not in t.get_text()], ["1.12"] * 3 + ["1.00"] * 3)
+        self.assertEqual([t.get_text() for t in axis.texts if "primary" in t.get_text()], ["primary\n… own single rays"])
+        self.assertIn("a multiple of", key.get_title(loc="left"))
+        self.assertEqual([t.get_text() for t in key.get_yticklabels()], ["half or less", "0.7", "1", "1.4", "twice or more"])
         self.assertEqual(axis.get_title(loc="left"), "avx2: fastest builder, leaf and tests of each")
         few = self.draw(traversal_ratios, results_of([c for c in cells if c["intersector"] == "i0"]))
         self.assertEqual(len(few.axes[0].get_yticks()), 16)
+
+    def test_headings_of_ways_of_traversal_do_not_overlap_and_say_what_ratios_are_to(self):
+        scenes = [f"suzanne_of_a_long_name_indeed:stretch={x}" for x in ("1", "0.01")]
+        for count in (1, 2):
+            cells = [Cell({"scene": s, "workload": w, "isa": "avx2", "structure": structure, "builder": "b", "leaf": "l", "intersector": "i", "box": "fast", "traversal": t, "threads": "1"},
+                          [{"rays_per_second": 1e6}])
+                     for s in scenes[:count] for w in ("ambient_occlusion", "diffuse:self_intersection=error_bound", "diffuse:self_intersection=exclusion")
+                     for structure in (("bvh8",) if w.endswith("exclusion") else ("bvh8", "embree")) for t in ("single", "packet8")]
+            figure = self.draw(traversal_ratios, results_of(cells))
+            figure.draw_without_rendering()
+            axis = figure.axes[0]
+            headings = [t for t in axis.texts if "…" in t.get_text()]
+            self.assertEqual(len(headings), 3)
+            self.assertEqual(["Embree's" in t.get_text() for t in headings], [True, True, False])
+            self.assertIn("own", headings[2].get_text())
+            boxes = [t.get_window_extent() for t in headings] + [axis.title.get_window_extent(), axis._left_title.get_window_extent()]
+            for i, one in enumerate(boxes):
+                for two in boxes[i + 1:]:
+                    self.assertFalse(one.width and two.width and one.overlaps(two), count)
+            names = [t.get_text() for t in axis.get_xticklabels()]
+            self.assertEqual(len(set(names)), count + (count > 1))
+            self.assertTrue(names[0].endswith(":stretch=1"))
+
+    def test_names_of_places_stay_whole(self):
+        self.assertEqual(style.short("suzanne_of_a_long_name:stretch=0.01"), "suzanne_of…:stretch=0.01")
+        self.assertEqual(style.short("bunny:offset=1e4"), "bunny:offset=1e4")
+        self.assertEqual(style.short("a_scene_of_a_name_without_any_place"), "a_scene_of_…ut_any_place")
 
     def test_a_fit_is_that_of_one_scene(self):
         points = [(Cell({"scene": s, "structure": "bvh8", "workload": "primary", "isa": "avx2"}, []), x, y * (1 + x), None) for s, y in (("bunny", 1.0), ("city", -3.0)) for x in (1.0, 2.0, 3.0)]
