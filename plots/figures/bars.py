@@ -61,11 +61,28 @@ def distinct(results, shown_of, label_axes):
 
 
 def without_doubles(cells, shown_of):
-    """A SAH cost that is the same for several ISAs, thread counts and leaf layouts is one bar: the first's, but not called by its threads where others' are the same."""
-    seen = {}
+    """A SAH cost that is the same for several ISAs, thread counts and leaf layouts is one bar, called by all of them: "all ISAs" where none of them differs. Threads go unsaid where several have the same."""
+    seen, kin = {}, {}
     for cell in cells:
-        seen.setdefault((*(cell[a] for a in ("scene", "structure", "builder")), shown_of(cell)), []).append(cell)
-    return [alike[0] if len({c["threads"] for c in alike}) == 1 else Cell({**alike[0].axes, "threads": ""}, alike[0].rows) for alike in seen.values()]
+        built = tuple(cell[a] for a in ("scene", "structure", "builder"))
+        seen.setdefault((built, shown_of(cell)), []).append(cell)
+        kin.setdefault(built, []).append(cell)
+    return [shared(alike, kin[built]) for (built, _), alike in seen.items()]
+
+
+ALL = {"isa": "all ISAs", "leaf": "all leaves"}
+
+
+def shared(alike, kin):
+    """The cell that stands for those `alike`, among all of its structure and builder."""
+    axes = {}
+    for axis, every in ALL.items():
+        own = ordered((c[axis] for c in alike), axis)
+        if len(own) > 1:
+            axes[axis] = every if len(own) == len({c[axis] for c in kin}) else ", ".join(own[:2]) + (" …" if len(own) > 2 else "")
+    if len({c["threads"] for c in alike}) > 1:
+        axes["threads"] = ""
+    return Cell({**alike[0].axes, **axes}, alike[0].rows) if axes else alike[0]
 
 
 def in_order(sequences):

@@ -10,8 +10,9 @@ from matplotlib.text import Text  # noqa: E402
 
 from made_results import PLOTS, Drawn, results_of  # noqa: E402
 
-from figures import ALL, build_phases, build_time, bytes_per_triangle, leaf_histograms, squares  # noqa: E402
+from figures import ALL, bars, build_phases, build_time, bytes_per_triangle, leaf_histograms, squares  # noqa: E402
 from figures.bars import in_order  # noqa: E402
+from figures.names import bar_label  # noqa: E402
 from figures.rows import groups_of, places_of  # noqa: E402
 from results import Cell  # noqa: E402
 
@@ -96,6 +97,21 @@ class Rows(Drawn):
                  of("bvh4", "2", peak_build_bytes=1600)]
         (axis,) = self.draw(bytes_per_triangle, cells).axes
         self.assertEqual(labels(axis), ["bvh4 1 thread", "bvh4 2 threads", "bvh8", "embree 1 thread", "embree 2 threads"])
+
+    def test_bars_that_stand_for_several_isas_or_leaves_are_called_by_all_of_them(self):
+        def cell(builder, isa, cost, leaf="triangle4"):
+            return Cell({"scene": "bunny", "structure": "bvh8", "builder": builder, "leaf": leaf, "isa": isa, "threads": "1"}, [{"sah_cost": cost}])
+
+        def called(cells):
+            found, varied = bars.distinct(results_of([], cells), lambda c: c.value("sah_cost"), ("builder", "leaf", "isa"))
+            return [bar_label(c, varied) for c in found]
+
+        same = [cell("ploc", isa, 20.0) for isa in ("sse", "avx2", "avx512")]
+        self.assertEqual(called(same + [cell("morton", "sse", 30.0), cell("morton", "avx2", 31.0)]), ["bvh8 ploc all ISAs", "bvh8 morton sse", "bvh8 morton avx2"])
+        self.assertEqual(called([*same[:2], cell("ploc", "avx512", 21.0)]), ["bvh8 sse, avx2", "bvh8 avx512"])
+        self.assertEqual(called(same), ["bvh8"])
+        leaves = [cell("ploc", "sse", 20.0, f"triangle{n}") for n in (1, 2, 4)]
+        self.assertEqual(called([*leaves, cell("ploc", "sse", 15.0, "triangle8")]), ["bvh8 triangle1, triangle2 …", "bvh8 triangle8"])
 
     def test_histograms_of_leaves(self):
         self.assertEqual(leaf_histograms.runs([0, 0, 1, 6]), [(3, 2, 3), (5, 3, 4)])  # 14 %, 86 %
