@@ -4,6 +4,7 @@ instruction set. A panel that would show no point is left out."""
 
 from textwrap import fill
 
+from figures.names import label
 from figures.trade_offs import step_front
 from results import HARD_PREFIX, NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_legend, marker_map, panel_grid
@@ -13,34 +14,45 @@ CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hi
            "arithmetic; the error of t is that of right answers. Where the run has the workload `hard`, accuracy is that of its rays, which are aimed at "
            "what goes wrong, and time that of ordinary rays of the same cell. Where no cell of ordinary rays has a wrong answer, the figure says so and shows the "
            "error of t, which rays of any hit (shadow rays) have none of: there are no panels of them. The grey steps join the cells that no other beats in both. "
-           "Zero stands on the lowest line. Cells that differ in builder or way of traversal alone have the same sign.")
+           "Zero stands on the lowest line. Cells that differ in builder or way of traversal alone have the same sign; of several numbers of threads "
+           "the figure shows the fewest.")
 
 MEASURES = (("wrong_answers", "wrong answers per million"), ("t_error_ulp_p99", "error of t, 99th percentile, ulp"))
 COMBINATION = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads")
 
 
 def draw(results):
-    metric, _ = results.throughput()
-    paired = hard_points(results, metric)
+    metric, unit = results.throughput()
+    traces, threads = of_one_number_of_threads(results.traces)
+    timed = f"({unit.partition(', ')[2]}{', ' + threads if threads else ''})"
+    paired = hard_points(traces, metric)
     if paired:
-        return draw_hard(paired)
-    points = [(c, 1e9 / c.value(metric)) for c in results.traces if c.value(metric) and c.per_million("wrong_answers") is not None]
+        return draw_hard(paired, timed)
+    points = [(c, 1e9 / c.value(metric)) for c in traces if c.value(metric) and c.per_million("wrong_answers") is not None]
     if not points:
         raise NoData("no cell has both a throughput and checked answers")
-    return draw_workloads(points)
+    return draw_workloads(points, timed)
 
 
-def hard_points(results, metric):
+def of_one_number_of_threads(cells):
+    """Those cells that have the fewest threads, as the others' answers are the same; and, where there are others, how many these are and how many the others have."""
+    numbers = ordered((c["threads"] for c in cells), "threads")
+    if len(numbers) < 2:
+        return cells, ""
+    return [c for c in cells if c["threads"] == numbers[0]], f"{label('threads', numbers[0])}; not shown: {', '.join(numbers[1:])}"
+
+
+def hard_points(traces, metric):
     """(ordinary cell, ns a ray of it, the same combination's cell of `hard` rays)."""
-    hard = {tuple(c[a] for a in COMBINATION): c for c in results.traces if c["workload"] == HARD_PREFIX}
-    ordinary = [c for c in results.traces if not c["workload"].startswith(HARD_PREFIX) and c.value(metric)]
+    hard = {tuple(c[a] for a in COMBINATION): c for c in traces if c["workload"] == HARD_PREFIX}
+    ordinary = [c for c in traces if not c["workload"].startswith(HARD_PREFIX) and c.value(metric)]
     names = ordered({c["workload"] for c in ordinary if tuple(c[a] for a in COMBINATION) in hard}, "workload")
     wanted = "diffuse" if "diffuse" in names else next(iter(names), None)
     found = [(c, 1e9 / c.value(metric), hard.get(tuple(c[a] for a in COMBINATION))) for c in ordinary if c["workload"] == wanted]
     return [p for p in found if p[2] is not None and p[2].per_million("wrong_answers") is not None]
 
 
-def draw_hard(points):
+def draw_hard(points, timed):
     isas = ordered((c["isa"] for c, _, _ in points), "isa")
     markers = marker_map(ordered((c["structure"] for c, _, _ in points), "structure"))
     shown = {}  # (scene, (measure, isa)) -> [(cell, ns a ray, how wrong)]
@@ -49,11 +61,11 @@ def draw_hard(points):
             if (value := value_of(hard, measure[0])) is not None:
                 shown.setdefault((cell["scene"], (measure, cell["isa"])), []).append((cell, time, value))
     figure, axes = panel_grid(shown, {(measure, isa): isa for measure in MEASURES for isa in isas}, 4.2, 3.1, columns_of(isas))
-    for (scene, ((name, label), isa)), axis in axes.items():
+    for (scene, ((name, quantity), isa)), axis in axes.items():
         of_scene = [(t, value_of(h, name)) for c, t, h in points if c["scene"] == scene]
-        panel(axis, shown[scene, ((name, label), isa)], [v for _, v in of_scene], [t for t, _ in of_scene], markers)
-        axis.set_xlabel(f"time of {points[0][0]['workload'].replace('_', ' ')} rays, ns a ray")
-        axis.set_ylabel(label + ("\nhard rays" if name == "wrong_answers" else "\nhard rays answered right"))
+        panel(axis, shown[scene, ((name, quantity), isa)], [v for _, v in of_scene], [t for t, _ in of_scene], markers)
+        axis.set_xlabel(f"time of {points[0][0]['workload'].replace('_', ' ')} rays, ns a ray\n{timed}")
+        axis.set_ylabel(quantity + ("\nhard rays" if name == "wrong_answers" else "\nhard rays answered right"))
     add_legends(figure, [c for c, _, _ in points], markers)
     return figure
 
@@ -90,12 +102,12 @@ def value_of(cell, name):
     return cell.per_million(name) if name == "wrong_answers" else cell.value(name)
 
 
-def draw_workloads(points):
-    """`points`: (cell, ns a ray). What is drawn is the first measure that is not 0 everywhere."""
+def draw_workloads(points, timed):
+    """`points`: (cell, ns a ray); `timed`: by which clock, with how many threads. What is drawn is the first measure that is not 0 everywhere."""
     isas = ordered((c["isa"] for c, _ in points), "isa")
     places = {(w, i): f"{w}, {i}" for w in ordered((c["workload"] for c, _ in points), "workload") for i in isas}
     markers = marker_map(ordered((c["structure"] for c, _ in points), "structure"))
-    name, label, said = measure_of([c for c, _ in points])
+    name, quantity, said = measure_of([c for c, _ in points])
     shown = {}  # (scene, place) -> [(cell, ns a ray, how wrong)]
     for cell, time in points:
         if (value := value_of(cell, name)) is not None:
@@ -104,8 +116,8 @@ def draw_workloads(points):
     values = [v for here in shown.values() for *_, v in here]
     for place, axis in axes.items():
         panel(axis, shown[place], values, [t for _, t, _ in shown[place]], markers)
-        axis.set_xlabel("time, ns a ray")
-        axis.set_ylabel(label)
+        axis.set_xlabel(f"time, ns a ray\n{timed}")
+        axis.set_ylabel(quantity)
     if said:
         figure.suptitle(fill(said, int(9 * figure.get_size_inches()[0])), fontsize=11)
     add_legends(figure, [c for c, _ in points], markers)

@@ -48,7 +48,7 @@ class Strict(HTMLParser):
 class Hard(Drawn):
     def test_accuracy_is_of_hard_rays_and_time_of_ordinary_ones(self):
         results = load(Folder(whole() + hard()).path)
-        points = hard_points(results, "rays_per_cpu_second")
+        points = hard_points(results.traces, "rays_per_cpu_second")
         self.assertEqual({(c["workload"], h["workload"]) for c, _, h in points}, {("diffuse", "hard")})
         self.assertTrue(all(h["intersector"] == c["intersector"] and h["box"] == c["box"] for c, _, h in points))
         watertight = next(p for p in points if p[0]["intersector"] == "watertight")
@@ -67,11 +67,20 @@ class Hard(Drawn):
             with self.subTest(measure=measure, error=error):
                 name, label, told = measure_of([c for c, _ in points(wrong, error)])
                 self.assertEqual((name, told), (measure, said))
-                figure = draw_workloads(points(wrong, error))
+                figure = draw_workloads(points(wrong, error), "(a clock)")
                 self.assertEqual([a.get_title() for a in figure.axes], ["bunny, primary, sse", "bunny, primary, avx2"])
                 self.assertEqual("".join(t.get_text() for t in figure.texts), said)
                 self.assertEqual({a.get_ylabel() for a in figure.axes}, {label})
                 plt.close(figure)
+
+    def test_accuracy_is_of_one_number_of_threads_by_a_clock_that_is_named(self):
+        for threads, clock in (((1,), "(thread CPU time)"), ((2,), "(wall time)"), ((1, 2, 4), "(wall time, 1 thread; not shown: 2, 4)"), ((4, 2), "(wall time, 2 threads; not shown: 4)")):
+            for more, words in ((), "time, ns a ray"), ([other("hard", threads=min(threads), wrong_answers=3)], "time of primary rays, ns a ray"):
+                rows = [other("primary", threads=t, wrong_answers=3) for t in threads] + list(more)
+                figure = self.draw(accuracy_vs_time, load(Folder(rows).path))
+                axes = [a for a in figure.axes if a.get_visible()]
+                self.assertEqual({a.get_xlabel() for a in axes}, {f"{words}\n{clock}"})
+                self.assertEqual(sum(line.get_marker() != "None" for line in axes[0].lines), 1)
 
     def test_panels_that_would_be_empty_are_left_out(self):
         rows = [other(w, s, isa=i, wrong_answers=0, **({} if w == "shadow" else {"t_error_ulp_p99": 1.5})) for s in ("bunny", "city") for w in ("primary", "shadow", "diffuse")
