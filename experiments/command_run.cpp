@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <numeric>
+#include <set>
 #include <system_error>
 #include <thread>
 
@@ -35,18 +37,13 @@ namespace {
 
 constexpr std::size_t kMostNamed = 10;
 
-double total_seconds(const Experiment& experiment, const Plan& plan) {
-  const std::vector<double> seconds = estimate_seconds(experiment, plan.cells);
-  return std::accumulate(seconds.begin(), seconds.end(), 0.0);
-}
-
-/// Of what the journal does not hold.
-double seconds_left(const Experiment& experiment, const Plan& plan, const Journal& journal) {
+/// Of the cells that are not done. `started`: repetitions of the others that are.
+double seconds_left(const Experiment& experiment, const Plan& plan,
+                    const std::function<bool(const std::string&)>& is_done,
+                    const std::function<std::size_t(const Cell&)>& started = {}) {
   std::vector<Cell> left;
-  std::ranges::copy_if(plan.cells, std::back_inserter(left),
-                       [&](const Cell& cell) { return !journal.done().contains(cell.name()); });
-  const std::vector<double> seconds =
-      estimate_seconds(experiment, left, [&](const Cell& cell) { return journal.started(cell.name()).size(); });
+  std::ranges::copy_if(plan.cells, std::back_inserter(left), [&](const Cell& c) { return !is_done(c.name()); });
+  const std::vector<double> seconds = estimate_seconds(experiment, left, started);
   return std::accumulate(seconds.begin(), seconds.end(), 0.0);
 }
 
@@ -56,7 +53,8 @@ ExitStatus print_list(const Experiment& experiment, const Plan& plan) {
   return ExitStatus::kDone;
 }
 
-ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
+/// `done`: cells that the folder of a run that is to be gone on with holds.
+ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan, const std::set<std::string>& done) {
   for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.name());
   for (const SkippedCell& cell : plan.skipped) fmt::print("{}  skipped: {}\n", cell.name, cell.reason);
   for (std::size_t i = 0; i < std::min(plan.excluded_includes.size(), kMostNamed); ++i)
@@ -66,9 +64,11 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan) {
                counted(plan.excluded_includes.size() - kMostNamed, "more cell"));
   for (const std::string& line : experiment.left_out) fmt::print("{}\n", line);
   const std::string others = plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "";
-  fmt::print("\n{}, {} skipped,{} {} excluded, {} filtered out; about {}\n", counted(plan.cells.size(), "cell"),
-             plan.skipped.size(), others, plan.excluded, plan.filtered,
-             format_duration(total_seconds(experiment, plan)));
+  fmt::print(
+      "\n{}, {} skipped,{} {} excluded, {} filtered out; about {}\n", counted(plan.cells.size(), "cell"),
+      plan.skipped.size(), others, plan.excluded, plan.filtered,
+      format_duration(seconds_left(experiment, plan, [&](const std::string& name) { return done.contains(name); })));
+  if (!done.empty()) fmt::print("{} done before\n", counted(done.size(), "cell"));
   fmt::print("{}", skipped_lines(plan, {}));
   return ExitStatus::kDone;
 }
@@ -269,6 +269,17 @@ void add_custom_context(Json& context, const BenchmarkFlags& flags) {
   }
 }
 
+/// Names of the cells that the folder holds; none where there is none.
+std::set<std::string> done_before(const Experiment& experiment, const Shard& shard, const RunCommand& command) {
+  const std::filesystem::path folder = command.out.empty() ? default_folder(experiment, shard) : command.out;
+  std::error_code ignored;
+  if (!std::filesystem::exists(folder / "cells.jsonl", ignored)) return {};
+  refuse_other_configuration(folder, configuration_hash(experiment));
+  std::set<std::string> names;
+  for (const CellResult& cell : read_result_folder(folder).cells) names.insert(cell.cell.name());
+  return names;
+}
+
 /// `whole`: the plan before the filter. What the folder of a run that is gone on with holds of it stays in the results.
 ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, PlanRecord record,
                    const Registry& registry, const RunCommand& command) {
@@ -294,7 +305,9 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   if (!command.resume) set_aside(folder);
   Journal journal(folder, hash, whole, command.resume);
   keep_measured(plan, record, whole, journal.done());
-  const double seconds = seconds_left(experiment, plan, journal);
+  const double seconds = seconds_left(
+      experiment, plan, [&](const std::string& name) { return journal.done().contains(name); },
+      [&](const Cell& cell) { return journal.started(cell.name()).size(); });
   remove_files(folder, present(folder, concluding_files()));
   write_whole(folder / "effective.yaml",
               fmt::format("# configuration hash: {}\n{}{}", hash,
@@ -372,7 +385,9 @@ ExitStatus command_run(RunCommand command) {
   record.filter = filter, record.skip = skip;
   if (!shard.is_whole()) keep_shard(plan, shards, shard.index);
   if (command.list || command.benchmark.list) return print_list(experiment, plan);
-  if (command.dry_run) return print_dry_run(experiment, plan);
+  if (command.dry_run)
+    return print_dry_run(experiment, plan,
+                         command.resume ? done_before(experiment, shard, command) : std::set<std::string>());
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
     flush_output();

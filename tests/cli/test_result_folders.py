@@ -155,6 +155,11 @@ class ResultFolders(CommandLineCase):
         first = [name for name in every if "bvh4" in name]
         self.assertIn(self.run_small(*FEW, "--filter", "bvh4").returncode, (0, 1))
         self.assertEqual(held()[:2], (first, 7 * len(first)))
+        dry = self.run_small(*FEW, "--resume", "--dry-run", "--filter", "bvh4").stdout
+        self.assertIn("about 0 s", dry)  # what is left
+        self.assertIn(f"{len(first)} cells done before", dry)
+        self.assertNotIn("done before", self.run_small(*FEW, "--dry-run").stdout)
+        self.assert_error(self.run_small("--repetitions", "2", "--resume", "--dry-run"), "another configuration")
         again = self.run_small(*FEW, "--resume", "--filter", "bvh2/.*/sse/")
         self.assertIn(f"({len(first)} done before)", again.stderr)
         both = [name for name in every if "bvh4" in name or "bvh2" in name and "/sse/" in name]
