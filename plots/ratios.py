@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from plot import fail, need_matplotlib  # noqa: E402
 
-AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "workload", "threads")
+METRICS = (("trace", "rays a second"), ("build", "build speed"))
 COLOURS = {"faster": "#117733", "slower": "#CC3355", "indistinguishable": "#777777", "undecided": "#BBBBBB", "mean": "#332288"}
 MOST_CELLS = 80
 SAME = 1e-6  # of the logarithm of a ratio: no difference
@@ -22,6 +22,8 @@ LETTER = 0.075  # inches that a letter of a label takes
 
 def labels(cells):
     """What tells the cells apart, and the rest once for all."""
+    from results import AXES
+
     varying = [axis for axis in AXES if len({cell[axis] for cell in cells}) > 1]
     constant = [str(cells[0][axis]) for axis in AXES if axis not in varying and cells[0][axis] not in ("-", 1)]
     return ["  ".join(str(cell[axis]) for axis in varying if cell[axis] != "-") or cell["structure"] for cell in cells], ", ".join(constant)
@@ -58,7 +60,7 @@ def draw(comparison):
     from matplotlib.lines import Line2D
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-    parts = [(title, *rows_of(comparison, metric)) for metric, title in (("trace", "rays a second"), ("build", "build speed"))]
+    parts = [(title, *rows_of(comparison, metric)) for metric, title in METRICS]
     parts = [part for part in parts if part[1]]
     heights = [len(rows) + 2.5 for _, rows, _ in parts]
     widest = max(len(row[0]) for _, rows, _ in parts for row in rows)
@@ -92,6 +94,24 @@ def draw(comparison):
     return figure
 
 
+def read(source):
+    try:
+        comparison = json.loads(source.read_text(encoding="utf-8"))
+        found = any(cell["metric"] == metric for cell in comparison["cells"] for metric, _ in METRICS)
+    except OSError as error:
+        fail(f"{source}: {error.strerror}; give a file that `compare --json` wrote")
+    except (KeyError, TypeError, ValueError) as error:
+        refuse(source, error)
+    if not found:
+        fail(f"{source}: no cell is in both folders: there is nothing to draw")
+    return comparison
+
+
+def refuse(source, error):
+    why = f"it lacks {error}" if isinstance(error, KeyError) else error
+    fail(f"{source}: not what `compare --json` writes ({why}); give a file that it wrote")
+
+
 def main():
     if len(sys.argv) != 3:
         fail(f"usage: {sys.argv[0]} COMPARISON.json OUT.png")
@@ -100,14 +120,19 @@ def main():
     from warned import told_in_a_line
 
     source, target = Path(sys.argv[1]), Path(sys.argv[2])
+    comparison = read(source)
     try:
-        comparison = json.loads(source.read_text(encoding="utf-8"))
+        with told_in_a_line(target.name):
+            figure = draw(comparison)
+    except (KeyError, TypeError, ValueError) as error:
+        refuse(source, error)
+    try:
         metadata = {"Date": None, "Creator": None} if target.suffix == ".svg" else {"Software": None} if target.suffix == ".png" else None
         with told_in_a_line(target.name):
-            draw(comparison).savefig(target, dpi=style.DPI, bbox_inches="tight", metadata=metadata)
+            figure.savefig(target, dpi=style.DPI, bbox_inches="tight", metadata=metadata)
     except OSError as error:
         fail(f"{error.filename or target}: {error.strerror}; the figure could not be written")
-    except (KeyError, ValueError) as error:
+    except ValueError as error:
         fail(f"{target}: {error}; give a file that ends in .png, .svg or .pdf")
 
 

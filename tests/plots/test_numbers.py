@@ -3,13 +3,14 @@
 import json
 import math
 import random
+import subprocess
 import sys
 import unittest
 from pathlib import Path
 
 sys.dont_write_bytecode = True
 
-from made_results import Drawn, Folder, build, other, results_of, trace  # noqa: E402
+from made_results import PLOTS, Drawn, Folder, build, other, results_of, trace  # noqa: E402
 
 import ratios  # noqa: E402
 import report  # noqa: E402
@@ -335,6 +336,45 @@ class Loading(unittest.TestCase):
         self.assertEqual(results.structures[0].rows[0]["phase_seconds"], {"splits": 0.3, "leaves": 0.2})  # those of one build
         self.assertEqual(results.skipped, [("trace/bunny/list", "no such ray")])
         self.assertEqual(results.context, {"git_revision": "abc123"})
+
+
+class RatiosOfAComparison(unittest.TestCase):
+    CELL = {"scene": "bunny", "structure": "bvh8", "builder": "binned_sah", "leaf": "triangle8", "intersector": "watertight", "box": "padded", "traversal": "single",
+            "isa": "avx2", "workload": "primary", "threads": 1, "metric": "trace", "ratio": 1.1, "ratio_low": 1.0, "ratio_high": 1.2, "verdict": "faster"}
+    WHOLE = {"options": {"min_difference_percent": 2}, "cells": [CELL], "geometric_means": []}
+
+    def ratios(self, text, target="out.svg"):
+        folder = Folder(files={"comparison.json": text})
+        result = subprocess.run([sys.executable, str(PLOTS / "ratios.py"), str(folder.path / "comparison.json"), str(folder.path / target)],
+                                capture_output=True, text=True, timeout=300)
+        return result.returncode, result.stderr.strip(), folder.path
+
+    def test_drawn(self):
+        status, error, folder = self.ratios(json.dumps(self.WHOLE))
+        self.assertEqual((status, error), (0, ""))
+        self.assertIn("faster", (folder / "out.svg").read_text())
+
+    def test_what_is_no_comparison_is_named(self):
+        foreign = {**self.WHOLE, "cells": [{k: v for k, v in self.CELL.items() if k != "ratio_low"}]}
+        for text, why in (("{", "Expecting"), ("[]", "list indices"), ("{}", "it lacks 'cells'"), (json.dumps({"cells": [3]}), "not subscriptable"),
+                          (json.dumps(foreign), "it lacks 'ratio_low'"), (json.dumps({**self.WHOLE, "options": {}}), "it lacks 'min_difference_percent'")):
+            with self.subTest(text=text):
+                status, error, folder = self.ratios(text)
+                self.assertEqual(status, 2)
+                self.assertEqual(len(error.splitlines()), 1, error)
+                self.assertIn(f"error: {folder / 'comparison.json'}: not what `compare --json` writes (", error)
+                self.assertIn(why, error)
+
+    def test_nothing_to_draw(self):
+        for cells in ([], [{**self.CELL, "metric": "quality"}]):
+            status, error, folder = self.ratios(json.dumps({**self.WHOLE, "cells": cells}))
+            self.assertEqual((status, error), (2, f"error: {folder / 'comparison.json'}: no cell is in both folders: there is nothing to draw"))
+
+    def test_an_ending_that_nothing_draws(self):
+        status, error, folder = self.ratios(json.dumps(self.WHOLE), "out.doc")
+        self.assertEqual(status, 2)
+        self.assertIn(f"error: {folder / 'out.doc'}: ", error)
+        self.assertIn(".png, .svg or .pdf", error)
 
 
 if __name__ == "__main__":
