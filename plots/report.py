@@ -22,7 +22,7 @@ def write(results, drawn):
     if not results.complete:
         parts.append('<p class="bad">The run was cut off: these are the cells that had ended. '
                      "<code>--resume</code> measures the rest.</p>")
-    parts += [f'<p class="bad">Warning: {escape(text)}</p>' for text in warnings(results.context)]
+    parts += [f'<p class="bad">Warning: {escape(text)}</p>' for text in results.context.get("warnings", [])]
     parts.append(f"<p>{measured(results)} {answers(results)}</p>")
     beside = tables.embree_note(results, results.traces)
     parts.append('<h2 id="fastest-structures">Fastest structure</h2>' + beside + tables.best_table(results))
@@ -67,13 +67,8 @@ def counted(number, noun):
 
 
 def subtitle(results):
-    found = [results.context.get(key) for key in ("date", "cpu", "cpu_model", "host_name")]
+    found = [results.context.get(key) for key in ("date", "cpu", "host_name")]
     return ", ".join(str(v) for v in found if v)
-
-
-def warnings(context):
-    found = context.get("warnings") or context.get("warning") or []
-    return [str(w) for w in (found if isinstance(found, list) else [found])]
 
 
 def figure(results, name, module, reason):
@@ -97,7 +92,7 @@ def facts(context):
     """The context, flattened to lines that a person reads; long texts come with the reproduction."""
     found = []
     for key, value in context.items():
-        if key in ("experiment", "warnings", "warning", "plots", "executable", "library_build_type", "command", "load_avg"):
+        if key in ("experiment", "warnings", "plots", "executable", "library_build_type", "command", "load_avg"):
             continue
         if key == "memory_bytes" and isinstance(value, int):
             key, value = "memory", f"{value / 2**30:.1f} GiB"
@@ -128,19 +123,15 @@ def without_resume(command):
 def reproduce(results):
     context = results.context
     parts = []
-    command = context.get("command") or context.get("command_line")
-    if isinstance(command, list):
-        command = shlex.join(str(c) for c in command)
-    revision = context.get("git_revision") or context.get("revision")
+    revision = context.get("git_revision")
     lines = [f"git checkout {revision}"] if revision and revision != "unknown" else []
-    command = without_resume(str(command or "arboretum run effective.yaml"))
+    command = without_resume(context.get("command") or "arboretum run effective.yaml")
     lines.append(f"./{command}" if command.startswith("arboretum ") else command)
     parts.append(f"<pre>{escape(chr(10).join(lines))}</pre>")
-    if str(context.get("git_dirty", context.get("dirty", ""))).lower() in ("true", "1", "yes"):
+    if "true" in str(context.get("git_dirty")).lower():  # of merged parts "false | true"
         parts.append('<p class="bad">The tree had changes that no revision holds: these figures cannot be repeated exactly.</p>')
-    for key in ("config_hash", "configuration_hash"):
-        if context.get(key):
-            parts.append(f"<p>Hash of the configuration: <code>{escape(str(context[key]))}</code></p>")
+    if context.get("configuration_hash"):
+        parts.append(f"<p>Hash of the configuration: <code>{escape(context['configuration_hash'])}</code></p>")
     if results.effective_yaml:
         parts.append("<p>The effective configuration, every default filled in (<code>effective.yaml</code>):</p>"
                      f"<pre>{escape(results.effective_yaml)}</pre>")

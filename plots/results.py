@@ -304,7 +304,7 @@ def read_skipped(skipped):
 
 def choose_rows(entries):
     """The repetitions; a cell of which only aggregates were kept gives its median."""
-    entries = [e for e in entries if isinstance(e, dict) and not e.get("error_occurred")]
+    entries = [e for e in entries if isinstance(e, dict)]
     rows = [e for e in entries if e.get("run_type", "iteration") != "aggregate"]
     known = {e.get("run_name") or e.get("name") for e in rows}
     rows += [e for e in entries if e.get("run_type") == "aggregate" and e.get("aggregate_name") == "median"
@@ -340,8 +340,4 @@ def gather(rows):
 
     add_structures(["build_seconds"])  # what a build tells about itself goes before what traces repeat of it
     add_structures(["sah_cost", "bytes"], {key[:4] for key in structures})
-    for row in rows:  # accuracy that was measured apart belongs to the cell of the same axes
-        cell = traces.get(tuple(axes_of(row).values()))
-        if cell is not None and not any(row is r for r in cell.rows) and is_number(row.get("wrong_answers")):
-            cell.rows.append(row)
     return list(traces.values()), list(structures.values())

@@ -324,6 +324,10 @@ class Drawing(unittest.TestCase):
                                ("arboretum run a.yaml --filter it's --resume", "./arboretum run a.yaml --filter it&#x27;s --resume")):
             self.assertIn(f"{shown}</pre>", report.reproduce(load(Folder(whole(), {"command": command}).path)))
 
+    def test_a_tree_with_changes_is_said(self):
+        for dirty, said in ((True, True), ("false | true", True), (False, False)):
+            self.assertEqual("cannot be repeated exactly" in report.reproduce(load(Folder(whole(), {"git_dirty": dirty}).path)), said, dirty)
+
     def test_report_is_well_formed_and_escaped(self):
         evil = "<script>alert(1)</script>&\"'"
         folder = Folder(everything() + [trace(evil)], {"experiment": PUBLISHED, "cpu": evil, "warnings": [evil], "command": f"./arboretum run {evil}", "git_revision": "abc"},
