@@ -75,9 +75,7 @@ std::size_t fewest_repetitions(const std::vector<const ComparedCell*>& cells) {
 }
 
 /// The head of the intervals of ratios.
-std::string interval_head(std::size_t fewest) {
-  return fewest < 2 ? "-" : fewest < kFewestOfRatio ? "interval" : "95 %";
-}
+std::string interval_head(std::size_t fewest) { return fewest < kFewestOfRatio ? "interval" : "95 %"; }
 
 std::vector<const ComparedCell*> pointers(const Comparison& comparison) {
   std::vector<const ComparedCell*> cells;

@@ -90,10 +90,10 @@ void check_machine(const ResultFolder& first, const ResultFolder& part, const Me
 void check_begun(const ResultFolder& part, const MergeOptions& options, std::vector<std::string>& warnings) {
   if (part.begun.empty()) return;
   const std::string what = fmt::format("{} was {}", part.path.string(), fmt::join(part.begun, "; "));
-  const bool elsewhere = !begun_elsewhere(part.begun).empty();
-  if (elsewhere && !options.allow_different_machines)
+  const std::size_t elsewhere = begun_elsewhere(part.begun).size();
+  if (elsewhere > 0 && !options.allow_different_machines)
     throw UserError(what + "; its times do not compare; --allow-different-machines merges them all the same");
-  if (!elsewhere && !options.allow_different_revisions)
+  if (elsewhere < part.begun.size() && !options.allow_different_revisions)
     throw UserError(what + "; --allow-different-revisions merges them all the same");
   warnings.push_back(what);
 }

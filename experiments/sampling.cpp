@@ -57,7 +57,7 @@ Interval median_interval(std::span<const double> values) {
 double range_coverage(std::size_t values) { return 1.0 - std::exp2(1.0 - static_cast<double>(values)); }
 
 std::string interval_name(std::size_t least, std::size_t most) {
-  if (most < 2) return "-";
+  if (most < 2) return "interval";
   if (least >= kFewestOfInterval) return "95 %";
   return most < kFewestOfInterval ? "range" : "95 % or range";
 }

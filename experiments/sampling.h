@@ -25,7 +25,8 @@ inline constexpr std::size_t kFewestOfInterval = 6;
 [[nodiscard]] Interval median_interval(std::span<const double> values);
 /// How often the range of so many values covers their distribution's median: 1 - 2^(1 - n).
 [[nodiscard]] double range_coverage(std::size_t values);
-/// What the intervals of samples of `least` to `most` values are: "95 %", "range", "95 % or range"; "-" of one value.
+/// What the intervals of samples of `least` to `most` values are: "95 %", "range", "95 % or range"; where each is of
+/// one value, which has none, just "interval".
 [[nodiscard]] std::string interval_name(std::size_t least, std::size_t most);
 
 }  // namespace arboretum

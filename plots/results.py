@@ -159,10 +159,10 @@ def coverage(n, depth):
 
 
 def interval_name(counts):
-    """What intervals of samples of so many values are, in a word or two; "-" where each is of one."""
+    """What intervals of samples of so many values are, in a word or two; where each is of one value, which has none, just "interval"."""
     counts = set(counts)
     if max(counts, default=1) < 2:
-        return "-"
+        return "interval"
     if min(counts) >= FEWEST_OF_INTERVAL:
         return "95 % interval"
     return "range" if max(counts) < FEWEST_OF_INTERVAL else "95 % interval or range"
@@ -172,7 +172,7 @@ def interval_words(counts):
     """The same in the words of a caption."""
     counts = {n for n in counts if n > 1}
     fewest = min(counts, default=0)
-    return {"-": "no interval, which a single repetition has not",
+    return {"interval": "no interval, which a single repetition has not",
             "95 % interval": "the 95 % interval of the median",
             "range": f"the range of the {fewest} repetitions, which covers the median {100 * coverage(fewest, 1):.0f} times in 100 (95 take {FEWEST_OF_INTERVAL} repetitions)" if fewest else "",
             "95 % interval or range": f"the 95 % interval of the median, of fewer than {FEWEST_OF_INTERVAL} repetitions their range"}[interval_name(counts)]

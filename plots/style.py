@@ -204,8 +204,8 @@ def wrong_marker(label):
 
 def interval_legend(estimates):
     """[(title, handles)]: what the lines at the medians are; empty where none has any."""
-    name = interval_name(e.samples for e in estimates)
-    return [] if name == "-" else [("", [Line2D([], [], color="#222222", linewidth=0.9, label=name)])]
+    counts = [e.samples for e in estimates]
+    return [("", [Line2D([], [], color="#222222", linewidth=0.9, label=interval_name(counts))])] if max(counts, default=1) > 1 else []
 
 
 def marker_map(keys):

@@ -45,7 +45,7 @@ TEST_CASE("median and its interval") {
   CHECK(interval_name(6, 9) == "95 %");
   CHECK(interval_name(2, 5) == "range");
   CHECK(interval_name(5, 6) == "95 % or range");
-  CHECK(interval_name(1, 1) == "-");
+  CHECK(interval_name(1, 1) == "interval");
 }
 
 TEST_CASE("the interval of a median covers it about 95 times in 100, whatever the noise") {
@@ -220,7 +220,7 @@ TEST_CASE("tables and results say what stands beside a median: an interval, a ra
   const Folder folder;
   const Registry registry = paper_registry();
   const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
-  for (const auto& [repetitions, name, words] : {std::tuple{1u, " -  ", "of one repetition, which has no interval"},
+  for (const auto& [repetitions, name, words] : {std::tuple{1u, "interval", "of one repetition, which has no interval"},
                                                  {2u, "range", "range of 2 repetitions, which covers it 50 times"},
                                                  {5u, "range", "range of 5 repetitions, which covers it 94 times"},
                                                  {7u, "95 %", "median with its 95 % interval"}}) {

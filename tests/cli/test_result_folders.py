@@ -112,6 +112,7 @@ class ResultFolders(CommandLineCase):
         self.assertEqual(self.context("out")["merged_from"], parts)
         third = self.shard(3, 3)
         self.assert_error(self.call("merge", "again", "out", third), "out was begun under other conditions", "--allow-different-machines")
+        self.assert_error(self.call("merge", "again", "out", third, both[0]), "out was begun under other conditions", "--allow-different-revisions")
         self.assertIn(self.call("merge", "again", "out", third, *both).returncode, (0, 1))
         self.assertEqual(self.context("again")["merged_from"][0]["merged_from"], parts)
         self.assertIn(self.run_small(*FEW, "--resume", "--out", "out").returncode, (0, 1))

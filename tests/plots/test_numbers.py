@@ -39,10 +39,10 @@ class Numbers(Drawn):
             self.assertTrue(0.93 * 4000 <= covered <= 0.97 * 4000, f"{n}: {covered}")
 
     def test_what_intervals_are_called(self):
-        self.assertEqual([interval_name(n) for n in ([1, 1], [2, 5], [6], [5, 6], [])], ["-", "range", "95 % interval", "95 % interval or range", "-"])
+        self.assertEqual([interval_name(n) for n in ([1, 1], [2, 5], [6], [5, 6], [])], ["interval", "range", "95 % interval", "95 % interval or range", "interval"])
         self.assertEqual(interval_words([3, 3]), "the range of the 3 repetitions, which covers the median 75 times in 100 (95 take 6 repetitions)")
         self.assertIn("no interval", interval_words([1]))
-        for repetitions, name, interval in ((1, "-", None), (3, "range", "10.00 – 12.00"), (7, "95 % interval", "10.73 – 15.27")):
+        for repetitions, name, interval in ((1, "interval", None), (3, "range", "10.00 – 12.00"), (7, "95 % interval", "10.73 – 15.27")):
             folder = Folder([trace(rate=(10 + r) * 1e6, repetition=r) for r in range(repetitions)])
             self.assertEqual(folder.plot("--only", "rays_per_second").returncode, 0)
             self.assertEqual(f"<!-- {name} -->" in (folder.path / "rays_per_second.svg").read_text(), repetitions > 1)
