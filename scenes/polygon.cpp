@@ -46,50 +46,75 @@ bool is_strictly_convex(std::span<const Point2> points) {
   return turns_in_x <= 2;
 }
 
-/// Ear clipping is cubic at worst; larger polygons that are not convex are fanned.
+/// Larger polygons that are not convex are fanned: the work on one is quadratic.
 constexpr std::size_t kMaxClipped = 1024;
 
-}  // namespace
-
-void triangulate(std::span<const std::uint32_t> corners, std::span<const Vec3f> vertices,
-                 std::vector<Triangle>& triangles) {
-  if (corners.size() == 3) {
-    triangles.push_back({corners[0], corners[1], corners[2]});
-    return;
+/// Ear clipping, corner by corner around. What was found outside of a corner's triangle stays there until a neighbour
+/// of the corner goes: each corner asks on from where it last stopped.
+class EarClipper {
+ public:
+  EarClipper(std::span<const std::uint32_t> corners, std::span<const Point2> points)
+      : corners_(corners), points_(points), left_(corners.size()), has_gone_(corners.size()), outside_(corners.size()) {
+    for (std::uint32_t i = 0; i < left_.size(); ++i) left_[i] = i;
   }
-  const std::vector<Point2> points = project(corners, vertices);
-  std::vector<std::uint32_t> left(corners.size());
-  for (std::uint32_t i = 0; i < left.size(); ++i) left[i] = i;
 
-  const auto is_ear = [&](std::size_t i) {
-    const std::size_t n = left.size();
-    const std::uint32_t ia = left[(i + n - 1) % n], ib = left[i], ic = left[(i + 1) % n];
-    const Point2 a = points[ia], b = points[ib], c = points[ic];
+  void clip(std::vector<Triangle>& triangles) {
+    std::size_t next = 1;
+    while (left_.size() > 3) {
+      const std::size_t n = left_.size();
+      std::size_t ear = next % n;
+      std::size_t tried = 0;
+      while (tried < n && !is_ear(ear)) ear = after(ear), ++tried;
+      if (tried == n) ear = 1;  // no ear: not a simple polygon; any corner will do
+      const std::uint32_t a = left_[before(ear)], b = left_[ear], c = left_[after(ear)];
+      triangles.push_back({corners_[a], corners_[b], corners_[c]});
+      left_.erase(left_.begin() + std::ptrdiff_t(ear));
+      has_gone_[b] = true, outside_[a] = outside_[c] = 0;
+      next = ear;
+    }
+    triangles.push_back({corners_[left_[0]], corners_[left_[1]], corners_[left_[2]]});
+  }
+
+  [[nodiscard]] std::size_t tests() const noexcept { return tests_; }
+
+ private:
+  std::size_t before(std::size_t i) const { return i == 0 ? left_.size() - 1 : i - 1; }
+  std::size_t after(std::size_t i) const { return i + 1 == left_.size() ? 0 : i + 1; }
+
+  bool is_ear(std::size_t i) {
+    const std::uint32_t ia = left_[before(i)], ib = left_[i], ic = left_[after(i)];
+    const Point2 a = points_[ia], b = points_[ib], c = points_[ic];
     if (!(turn(a, b, c) > 0.0)) return false;
-    for (const std::uint32_t k : left) {
-      if (k == ia || k == ib || k == ic) continue;
-      if (corners[k] == corners[ia] || corners[k] == corners[ib] || corners[k] == corners[ic]) continue;
-      const Point2 p = points[k];
+    for (std::uint32_t& k = outside_[ib]; k < points_.size(); ++k) {
+      if (has_gone_[k] || k == ia || k == ib || k == ic) continue;
+      if (corners_[k] == corners_[ia] || corners_[k] == corners_[ib] || corners_[k] == corners_[ic]) continue;
+      ++tests_;
+      const Point2 p = points_[k];
       if (turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0) return false;
     }
     return true;
-  };
-  if (corners.size() > kMaxClipped || is_strictly_convex(points)) {
+  }
+
+  std::span<const std::uint32_t> corners_;
+  std::span<const Point2> points_;
+  std::vector<std::uint32_t> left_;     ///< places of the corners that have not gone, in their order
+  std::vector<std::uint8_t> has_gone_;  ///< by place
+  std::vector<std::uint32_t> outside_;  ///< by place: all corners before this one are outside of its triangle
+  std::size_t tests_ = 0;
+};
+
+}  // namespace
+
+std::size_t triangulate(std::span<const std::uint32_t> corners, std::span<const Vec3f> vertices,
+                        std::vector<Triangle>& triangles) {
+  const std::vector<Point2> points = corners.size() > 3 ? project(corners, vertices) : std::vector<Point2>();
+  if (corners.size() == 3 || corners.size() > kMaxClipped || is_strictly_convex(points)) {
     for (std::size_t i = 1; i + 1 < corners.size(); ++i) triangles.push_back({corners[0], corners[i], corners[i + 1]});
-    return;
+    return 0;
   }
-  std::size_t next = 1;
-  while (left.size() > 3) {
-    const std::size_t n = left.size();
-    std::size_t ear = next % n;
-    std::size_t tried = 0;
-    while (tried < n && !is_ear(ear)) ear = (ear + 1) % n, ++tried;
-    if (tried == n) ear = 1;  // no ear: not a simple polygon; any corner will do
-    triangles.push_back({corners[left[(ear + n - 1) % n]], corners[left[ear]], corners[left[(ear + 1) % n]]});
-    left.erase(left.begin() + std::ptrdiff_t(ear));
-    next = ear;
-  }
-  triangles.push_back({corners[left[0]], corners[left[1]], corners[left[2]]});
+  EarClipper clipper(corners, points);
+  clipper.clip(triangles);
+  return clipper.tests();
 }
 
 }  // namespace arboretum

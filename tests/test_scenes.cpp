@@ -5,6 +5,7 @@
 #include <clocale>
 #include <cmath>
 #include <memory>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -662,5 +663,26 @@ TEST_CASE("polygons: any simple one is covered exactly once") {
         CHECK(covered == Approx(area));
       }
     }
+  }
+}
+
+TEST_CASE("polygons: the work on one is quadratic, whatever its corners hide") {
+  for (const std::uint32_t n : {256u, 512u, 1024u}) {
+    // A zigzag band: each tooth's triangle holds the tip of a tooth of the other side, at the far end of the list
+    std::vector<Vec3f> vertices;
+    for (std::uint32_t i = 0; i < n / 2; ++i) vertices.push_back({float(i), i % 2 ? -10.0f : 0.0f, 0});
+    for (std::uint32_t i = n / 2; i-- > 0;) vertices.push_back({float(i), i % 2 ? -9.0f : 1.0f, 0});
+    std::vector<std::uint32_t> corners(n);
+    std::iota(corners.begin(), corners.end(), 0u);
+    std::vector<Triangle> triangles;
+    const std::size_t tests = triangulate(corners, vertices, triangles);
+    CAPTURE(n, tests);
+    CHECK(tests > 0);
+    CHECK(tests <= 4 * std::size_t{n} * n);
+    CHECK(triangles.size() == n - 2);
+    double covered = 0.0;
+    for (const Triangle& t : triangles)
+      covered += 0.5 * length(cross(vertices[t.b] - vertices[t.a], vertices[t.c] - vertices[t.a]));
+    CHECK(covered == Approx(n / 2 - 1));
   }
 }
