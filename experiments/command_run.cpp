@@ -150,10 +150,11 @@ void refuse_other_geometry(const std::filesystem::path& folder, const Experiment
     const auto then = before->geometry.find(scene.name);
     const auto now = geometry.find(scene.name);
     if (then == before->geometry.end() || now == geometry.end() || then->second == now->second) continue;
-    throw UserError(fmt::format(
-        "{}: scene {} is not what {} was measured with (geometry, camera, lights or materials: hash {}, then {}); put "
-        "its files back as they were, or choose another folder with --out",
-        scene.where, scene.name, folder.string(), now->second, then->second));
+    throw UserError(
+        fmt::format("{}: scene {} is not what {} was measured with (geometry, camera, shutter, lights, materials or "
+                    "images: hash {}, then {}); put "
+                    "its files back as they were, or choose another folder with --out",
+                    scene.where, scene.name, folder.string(), now->second, then->second));
   }
   geometry.insert(before->geometry.begin(), before->geometry.end());
 }

@@ -106,10 +106,11 @@ void refuse_different_geometry(const std::vector<ResultFolder>& parts) {
     for (const auto& [scene, hash] : part.plan->geometry) {
       const auto& [first, of_first] = known.try_emplace(scene, &part, hash).first->second;
       if (hash == of_first) continue;
-      throw UserError(fmt::format(
-          "{} and {} were measured with different scenes called {} (geometry, camera, lights or materials: hashes {} "
-          "and {}); measure one of them anew",
-          first->path.string(), part.path.string(), scene, of_first, hash));
+      throw UserError(
+          fmt::format("{} and {} were measured with different scenes called {} (geometry, camera, shutter, lights, "
+                      "materials or images: hashes {} "
+                      "and {}); measure one of them anew",
+                      first->path.string(), part.path.string(), scene, of_first, hash));
     }
   }
 }

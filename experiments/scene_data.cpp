@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "core/error.h"
 #include "core/timer.h"
 #include "experiments/exclusion.h"
 #include "experiments/fnv.h"
 #include "experiments/sampling.h"
 #include "rendering/hard_workload.h"
+#include "scenes/file_bytes.h"
 #include "scenes/sanitise.h"
 #include "scenes/vec3d.h"
 #include "structures/structure_file.h"
@@ -29,6 +32,21 @@ double median_aspect(const TriangleMesh& mesh) {
   return median(aspects);
 }
 
+template <class T>
+std::uint64_t hash_of_all(const std::vector<T>& values, std::uint64_t before) {
+  const auto bytes = std::as_bytes(std::span(values));
+  return fnv1a({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, before);
+}
+
+/// Of what it holds and not of its path: parts of a sweep find their files in different folders.
+std::uint64_t hash_of_image(const std::string& path) {
+  try {
+    return fnv1a(FileBytes(path).text());
+  } catch (const UserError&) {
+    return 0;  // what wears it goes without
+  }
+}
+
 }  // namespace
 
 SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, NoteFunction note)
@@ -46,6 +64,13 @@ SceneData::SceneData(const SceneChoice& choice, const MeasureSettings& measure, 
 
 std::string SceneData::geometry() const {
   const auto words = [](const Vec3f& v) { return fmt::format("{} {} {} ", v.x, v.y, v.z); };
+  std::map<std::string, std::uint64_t> images;  // materials share them
+  const auto image = [&](const std::string& path) {
+    if (path.empty()) return std::string();
+    const auto [known, fresh] = images.try_emplace(path);
+    if (fresh) known->second = hash_of_image(path);
+    return fmt::format("image {:x} ", known->second);
+  };
   std::string rest;
   if (const std::optional<Camera>& c = scene_.camera) {
     rest += words(c->position) + words(c->look_at) + words(c->up) +
@@ -58,9 +83,14 @@ std::string SceneData::geometry() const {
   if (scene_.environment != Vec3f{0, 0, 0}) rest += "environment " + words(scene_.environment);
   for (const Material& m : scene_.materials) {
     rest += "material " + words(m.diffuse) + words(m.specular) + words(m.emission) + words(m.transmission) +
-            fmt::format("{} {} {} {} {} ", m.shininess, m.roughness, m.ior, m.opacity, m.illum);
+            fmt::format("{} {} {} {} {} ", m.shininess, m.roughness, m.ior, m.opacity, m.illum) + image(m.diffuse_map) +
+            (m.opacity_map.empty() ? "" : "of opacity ") + image(m.opacity_map);
   }
-  return fmt::format("{:016x}", fnv1a(rest, hash_of(mesh())));
+  const auto [open, close] = scene_.shutter;
+  if (open != 0.0f || close != 0.0f) rest += fmt::format("shutter {} {} ", open, close);
+  rest += image(scene_.environment_image);
+  const std::uint64_t hash = hash_of_all(mesh().materials, fnv1a(rest, hash_of(mesh())));
+  return fmt::format("{:016x}", hash_of_all(scene_.texture_coordinates, hash));
 }
 
 Json SceneData::load_report() const {

@@ -35,8 +35,8 @@ class SceneData {
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return scene_.mesh; }
-  /// Hash of the mesh, as loaded and placed, and of the camera, lights, environment and materials (but their images)
-  /// that come with it: what a scene's name alone does not tell.
+  /// Hash of the mesh, as loaded and placed, and of the camera, shutter, lights, environment, materials and images that
+  /// come with it: what a scene's name alone does not tell.
   [[nodiscard]] std::string geometry() const;
   /// Of a scene that is placed: `offset`, `radius` (half the diagonal), `triangle_aspect_median`.
   [[nodiscard]] const Json& facts() const noexcept { return facts_; }

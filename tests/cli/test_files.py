@@ -83,6 +83,38 @@ class Files(CommandLineCase):
         self.write("yard_scene.yaml", scene % 3)
         self.assert_error(self.call("run", config, "--no-plots", "--out", "out", "--resume"), "scene yard is not what out was measured with (geometry, camera")
 
+    def test_a_scene_with_another_shutter_material_or_image_is_another_scene(self):
+        def model(name, material, move=0):
+            self.write(f"{name}.obj", f"mtllib all.mtl\nusemtl {material}\n" + CUBE.replace("v 0 0 0", f"v {move} 0 0").replace("f 3 4 8", "usemtl plain\nf 3 4 8"))
+
+        def image(name, *values):  # PGM
+            (self.folder / name).write_bytes(b"P5 2 1 255\n" + bytes(values))
+
+        def scene(close):
+            self.write("moving.yaml", f"name: moving\nmeshes: [{{keyframes: [a.obj, b.obj]}}]\nshutter: [0, {close}]\nenvironment: {{image: sky.pgm}}\n")
+
+        def as_it_was():
+            self.write("all.mtl", "newmtl plain\nKd 1 1 1\nnewmtl mirror\nKd 1 1 1\nKs 1 1 1\nillum 3\nnewmtl worn\nKd 1 1 1\nmap_Kd worn.pgm\n")
+            model("a", "mirror"), model("b", "mirror", move=-1), scene(1)
+            image("worn.pgm", 0, 255), image("sky.pgm", 0, 255)
+
+        config = self.write("motion.yaml", "scenes: [{scene: moving.yaml}]\naxes: {structure: bvh4_motion, isa: scalar, workload: [primary, shadow]}\n"
+                                           "metrics: [trace]\nmeasure: {repetitions: 3, min_time: 0.001, resolution: [16, 16]}\n")
+        as_it_was()
+        result = self.call("run", config, "--no-plots", "--out", "out", "--filter", "primary")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for what, change in (("shutter", lambda: scene(0.25)),
+                             ("materials of triangles", lambda: (model("a", "plain"), model("b", "plain", move=-1))),
+                             ("image of a material", lambda: image("worn.pgm", 255, 0)),
+                             ("image that is gone", lambda: (self.folder / "worn.pgm").unlink()),
+                             ("environment's image", lambda: image("sky.pgm", 255, 0))):
+            with self.subTest(what=what):
+                as_it_was()
+                change()
+                self.assert_error(self.call("run", config, "--no-plots", "--out", "out", "--resume"), "scene moving is not what out was measured with (geometry, camera, shutter")
+        as_it_was()
+        self.assertEqual(self.call("run", config, "--no-plots", "--out", "out", "--resume").returncode, 0)
+
     def test_parts_that_found_a_scene_in_different_folders_merge(self):
         for place, shard in (("here", "1/2"), ("there", "2/2")):
             (self.folder / place).mkdir()
