@@ -84,16 +84,16 @@ class CaseReader {
     if (value.is_number()) {
       // The shortest decimal of a float may lie beyond it, as that of the largest does
       const float x = static_cast<float>(value.get<double>());
-      if (!std::isfinite(x)) fail(fmt::format("{}: {} is beyond float32", what, value.dump()));
+      if (!std::isfinite(x)) fail(fmt::format("{}: {} is beyond float32", what, to_text(value)));
       return x;
     }
     if (value == "inf") return std::numeric_limits<float>::infinity();
     if (value == "-inf") return -std::numeric_limits<float>::infinity();
     if (value == "nan") return std::numeric_limits<float>::quiet_NaN();
-    fail(fmt::format("{}: {} is no number, \"inf\", \"-inf\" or \"nan\"", what, value.dump()));
+    fail(fmt::format("{}: {} is no number, \"inf\", \"-inf\" or \"nan\"", what, to_text(value)));
   }
   Vec3f point(const Json& value, std::string_view what) const {
-    if (!value.is_array() || value.size() != 3) fail(fmt::format("{} must be [x, y, z], not {}", what, value.dump()));
+    if (!value.is_array() || value.size() != 3) fail(fmt::format("{} must be [x, y, z], not {}", what, to_text(value)));
     return {number(value[0], what), number(value[1], what), number(value[2], what)};
   }
   void add_triangle(VerifyCase& c, std::uint32_t id, const Json& corners) const {
@@ -113,7 +113,7 @@ class CaseReader {
       if (std::ranges::find(known, key) == known.end()) fail(unknown_name_message("key", key, known));
     for (const char* name : {"id", "why", "source"})
       if (entry_.contains(name) && !entry_[name].is_string())
-        fail(fmt::format("{} must be a string, not {}", name, entry_[name].dump()));
+        fail(fmt::format("{} must be a string, not {}", name, to_text(entry_[name])));
   }
   /// A tnear below 0 is no ray's (core/ray.h), and no kernel's answer to it is promised: it may stand where 0 would do.
   void expect_nothing_below_zero(const VerifyCase& c, const ExactAnswer& truth) const {
@@ -128,13 +128,13 @@ class CaseReader {
   void expect_truth(const VerifyCase& c, const ExactAnswer& truth) const {
     const auto given = [&](const char* name, auto is_of_type, std::string_view type) -> const Json* {
       if (!entry_.contains(name)) return nullptr;
-      if (!is_of_type(entry_[name])) fail(fmt::format("{} must be {}, not {}", name, type, entry_[name].dump()));
+      if (!is_of_type(entry_[name])) fail(fmt::format("{} must be {}, not {}", name, type, to_text(entry_[name])));
       return &entry_[name];
     };
     const auto expect = [&](const char* name, bool holds, const std::string& found) {
       if (!holds)
-        fail(
-            fmt::format("{} is {}, but exact arithmetic finds {}; correct the file", name, entry_[name].dump(), found));
+        fail(fmt::format("{} is {}, but exact arithmetic finds {}; correct the file", name, to_text(entry_[name]),
+                         found));
     };
     const auto is_whole = [](const Json& j) { return j.is_number_unsigned(); };
     if (const Json* hit = given(
@@ -152,7 +152,7 @@ class CaseReader {
       std::set<std::uint64_t> exact;
       for (std::uint32_t i : truth.nearest) exact.insert(c.ids[i]);
       if (list->get<std::set<std::uint64_t>>().size() != list->size())
-        fail(fmt::format("nearest_ids names an id twice: {}", list->dump()));
+        fail(fmt::format("nearest_ids names an id twice: {}", to_text(*list)));
       expect("nearest_ids", list->get<std::set<std::uint64_t>>() == exact, fmt::format("[{}]", fmt::join(exact, ",")));
     }
     if (const Json* count = given("closed_hits", is_whole, "a whole number"))
@@ -177,7 +177,7 @@ Json parse(const std::filesystem::path& file, const std::string& text) {
     if (event == Json::parse_event_t::object_start) keys.emplace_back();
     if (event == Json::parse_event_t::object_end) keys.pop_back();
     if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
-      throw UserError(fmt::format("{}{}: {} is given twice; keep one", file.string(), place(), parsed.dump()));
+      throw UserError(fmt::format("{}{}: {} is given twice; keep one", file.string(), place(), to_text(parsed)));
     if (event == Json::parse_event_t::key && depth == kInDocument) list = parsed;
     if (event == Json::parse_event_t::key && depth == kInEntry) key = parsed;
     if (event == Json::parse_event_t::value && depth == kInEntry && key == "id" && parsed.is_string()) id = parsed;
@@ -233,9 +233,9 @@ std::string case_json(const std::string& id, const std::string& why, const Trian
   const ExactAnswer truth = exact_answer(mesh, ray);
   return fmt::format(
       R"({{"id":{},"triangles":[{}],"origin":{},"direction":{},"tnear":{},"tfar":{},"hit":{},"t":{},"nearest_ids":[{}],"closed_hits":{},"why":{},"source":"arboretum verify"}})",
-      Json(id).dump(), fmt::join(triangles, ","), decimal(ray.origin), decimal(ray.direction), decimal(ray.tnear),
+      to_text(Json(id)), fmt::join(triangles, ","), decimal(ray.origin), decimal(ray.direction), decimal(ray.tnear),
       decimal(ray.tfar), truth.hit(), truth.hit() ? fmt::format("{}", truth.t) : "null", fmt::join(truth.nearest, ","),
-      truth.closed_hits, Json(why).dump());
+      truth.closed_hits, to_text(Json(why)));
 }
 
 }  // namespace arboretum

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "experiments/commands.h"
+#include "experiments/json_text.h"
 #include "experiments/result.h"
 #include "scenes/inspect.h"
 
@@ -38,7 +39,7 @@ ExitStatus command_info(const std::string& word, bool json) {
   const Scene scene = load_scene(parse_scene_word(word));
   const SceneInfo info = inspect_scene(scene);
   if (json) {
-    fmt::print("{}\n", as_json(scene.name, info).dump(1));
+    fmt::print("{}\n", to_text(as_json(scene.name, info), 1));
     return ExitStatus::kDone;
   }
   const Vec3f lower = info.bounds.lower, upper = info.bounds.upper;

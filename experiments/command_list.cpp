@@ -5,6 +5,7 @@
 #include "core/names.h"
 #include "experiments/axes.h"
 #include "experiments/commands.h"
+#include "experiments/json_text.h"
 #include "experiments/parameters.h"
 #include "experiments/result.h"
 #include "intersectors/promises.h"
@@ -189,7 +190,7 @@ ExitStatus command_list(const std::string& wanted, bool json) {
 
   if (json) {
     // One axis: its list alone.
-    fmt::print("{}\n", wanted.empty() ? document.dump(1) : document.begin()->dump(1));
+    fmt::print("{}\n", to_text(wanted.empty() ? document : *document.begin(), 1));
     return ExitStatus::kDone;
   }
   for (const auto& [title, entries] : document.items()) {

@@ -10,6 +10,7 @@
 #include "experiments/commands.h"
 #include "experiments/conclusion.h"
 #include "experiments/folder_lock.h"
+#include "experiments/json_text.h"
 #include "experiments/plotting.h"
 #include "experiments/results_writer.h"
 #include "experiments/shell_words.h"
@@ -99,7 +100,7 @@ ExitStatus command_merge(const MergeCommand& command) {
   refuse_results_there(command.out);
   write_beside(command.out, parts, merged);
   std::string cells;
-  for (const Json& line : merged.lines) cells += line.dump() + "\n";
+  for (const Json& line : merged.lines) cells += to_text(line) + "\n";
   write_whole(command.out / "results.csv", results_csv(merged.outcome));
   write_whole(command.out / "results.json", results_json(merged.outcome, merged.plan, merged.context));
   write_whole(command.out / "cells.jsonl", cells);

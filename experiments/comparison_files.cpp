@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "experiments/comparison_text.h"
+#include "experiments/json_text.h"
 #include "experiments/results_writer.h"
 
 namespace arboretum {
@@ -75,7 +76,7 @@ std::string comparison_json(const Comparison& comparison, const ResultFolder& a,
   for (const auto& [name, reason] : comparison.incomparable)
     incomparable.push_back({{"name", name}, {"reason", reason}});
   json["only_a"] = comparison.only_a, json["only_b"] = comparison.only_b;
-  return json.dump(1) + "\n";
+  return to_text(json, 1) + "\n";
 }
 
 std::string comparison_csv(const Comparison& comparison) {

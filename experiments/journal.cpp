@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
+#include "experiments/json_text.h"
 
 namespace arboretum {
 namespace {
@@ -67,9 +68,9 @@ std::vector<Repetition> Journal::started(const std::string& name) const {
 void Journal::add(const std::string& name, const Repetition& repetition) {
   Json line = journal_line(name, repetition);
   line["configuration_hash"] = hash_;
-  repetitions_.append(line.dump());
+  repetitions_.append(to_text(line));
 }
 
-void Journal::finish(const CellResult& result) { cells_.append(cell_line(result, hash_).dump()); }
+void Journal::finish(const CellResult& result) { cells_.append(to_text(cell_line(result, hash_))); }
 
 }  // namespace arboretum

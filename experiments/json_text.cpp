@@ -9,6 +9,17 @@
 #include "core/error.h"
 
 namespace arboretum {
+namespace {
+
+template <class AnyJson>
+std::string text_of(const AnyJson& json, int indent) {
+  return json.dump(indent, ' ', false, AnyJson::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string to_text(const nlohmann::ordered_json& json, int indent) { return text_of(json, indent); }
+std::string to_text(const nlohmann::json& json, int indent) { return text_of(json, indent); }
 
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);

@@ -74,7 +74,7 @@ std::string to_text(const PlanRecord& record) {
   if (!record.geometry.empty()) json["geometry"] = record.geometry;
   json["excluded"] = record.excluded, json["filtered"] = record.filtered;
   json["cells"] = entries_json(record.cells), json["skipped"] = entries_json(record.skipped);
-  return json.dump(1) + "\n";
+  return to_text(json, 1) + "\n";
 }
 
 std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) {

@@ -5,6 +5,8 @@
 #include <set>
 #include <vector>
 
+#include "experiments/json_text.h"
+
 namespace arboretum {
 namespace {
 
@@ -55,7 +57,7 @@ std::vector<Json> entries_of(const CellResult& result, const ResultForm& form, b
 
 }  // namespace
 
-std::string plain_text(const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
+std::string plain_text(const Json& value) { return value.is_string() ? value.get<std::string>() : to_text(value); }
 
 std::string csv_field(const Json& value) {
   std::string text = plain_text(value);
@@ -86,7 +88,7 @@ std::string results_json(const RunOutcome& outcome, const Plan& plan, Json conte
   for (const auto* list : {&plan.skipped, &outcome.failed})
     for (const SkippedCell& cell : *list) skipped.push_back({{"name", cell.name}, {"reason", cell.reason}});
   if (!outcome.missing.empty()) document["missing"] = outcome.missing;
-  return document.dump(1) + "\n";
+  return to_text(document, 1) + "\n";
 }
 
 std::string results_csv(const RunOutcome& outcome, const ResultForm& form) {

@@ -14,6 +14,7 @@
 #include "experiments/append_file.h"
 #include "experiments/build_job.h"
 #include "experiments/interleave.h"
+#include "experiments/json_text.h"
 #include "experiments/progress.h"
 #include "experiments/sampling.h"
 #include "experiments/scene_data.h"
@@ -189,7 +190,7 @@ class Runner {
                     {"width", m.width},
                     {"height", m.height},
                     {"points", picture_points(data.seen_pixels(workload), kMostSeenPoints)}};
-    write_whole(journal_.folder() / seen_points_file(data.name()), file.dump() + "\n", kGoesOn);
+    write_whole(journal_.folder() / seen_points_file(data.name()), to_text(file) + "\n", kGoesOn);
   }
 
   void run_builds(const std::vector<const Cell*>& cells, SceneData& data, StructurePool& pool) {

@@ -58,11 +58,11 @@ Scene read_model(const std::filesystem::path& path) {
 
 std::string SceneSpec::name() const {
   if (!catalogue.empty()) return catalogue;
-  if (!file.empty()) return file.stem().string();
+  if (!file.empty()) return one_line(file.stem().string());
   if (!scene.empty()) {
     std::error_code error;
     return is_yaml(scene) && std::filesystem::is_regular_file(scene, error) ? scene_file_name(scene)
-                                                                            : scene.stem().string();
+                                                                            : one_line(scene.stem().string());
   }
   return fmt::format("{}-{}{}", generator, triangles, seed == 1 ? std::string() : fmt::format("-seed{}", seed));
 }

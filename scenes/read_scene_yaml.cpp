@@ -28,7 +28,7 @@ AffineMap as_map(const Transform& t) {
 /// Cell names are parted by '/'.
 std::string name_of(const YamlFile& file) {
   const YAML::Node node = file.root()["name"];
-  if (!node) return file.path().stem().string();
+  if (!node) return one_line(file.path().stem().string());
   for (const auto& entry : file.root())  // what is not there has the next line for its place
     if (entry.first.IsScalar() && entry.first.Scalar() == "name" && entry.second.IsNull())
       file.fail(entry.first, "name has no value; give one or take the line out");

@@ -115,6 +115,30 @@ class Files(CommandLineCase):
         as_it_was()
         self.assertEqual(self.call("run", config, "--no-plots", "--out", "out", "--resume").returncode, 0)
 
+    def test_names_that_are_no_utf8(self):
+        def raw(*words):
+            return self.call(*words, encoding="utf-8", errors="surrogateescape")
+
+        odd = os.fsdecode(b"mod\xffel")
+        self.write(odd + ".obj", CUBE)
+        words = ("run", self.write("model.yaml", MODEL.replace("{file: model.obj}", "bunny")), f"scene={odd}.obj", "--no-plots", "--out", odd)
+        result = raw(*words, "--filter", "bvh2")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = raw(*words, "--resume")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        names = [line["name"] for line in read_jsonl(self.folder / odd / "cells.jsonl")]
+        self.assertEqual([name.split("/")[1:3] for name in names], [["mod?el", "bvh2"], ["mod?el", "bvh4"]])
+        context = json.loads((self.folder / odd / "results.json").read_text(encoding="utf-8"))["context"]
+        self.assertIn("mod\ufffdel.obj", context["command"])
+        result = raw("compare", odd, odd, "--json", "c.json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(json.loads((self.folder / "c.json").read_text(encoding="utf-8"))["a"]["folder"], "mod\ufffdel")
+        result = raw("info", f"{odd}.obj", "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(json.loads(result.stdout)["name"], "mod?el")
+        result = raw("merge", "both", odd, "--no-plots")
+        self.assertEqual(result.returncode, 0, result.stderr)
+
     def test_parts_that_found_a_scene_in_different_folders_merge(self):
         for place, shard in (("here", "1/2"), ("there", "2/2")):
             (self.folder / place).mkdir()
