@@ -238,4 +238,11 @@ std::string case_json(const std::string& id, const std::string& why, const Trian
       truth.closed_hits, to_text(Json(why)));
 }
 
+std::string ray_json(const std::string& id, const std::string& why, const Ray& ray, float time) {
+  return fmt::format(
+      R"({{"id":{},"origin":{},"direction":{},"tnear":{},"tfar":{},"time":{},"why":{},"source":"arboretum verify"}})",
+      to_text(Json(id)), decimal(ray.origin), decimal(ray.direction), decimal(ray.tnear), decimal(ray.tfar),
+      decimal(time), to_text(Json(why)));
+}
+
 }  // namespace arboretum

@@ -29,4 +29,7 @@ struct VerifyCase {
 [[nodiscard]] std::string case_json(const std::string& id, const std::string& why, const TriangleMesh& mesh,
                                     const Ray& ray);
 
+/// A ray alone, on one line: of what no case could be made of. `id` tells the scene and the ray's number in it.
+[[nodiscard]] std::string ray_json(const std::string& id, const std::string& why, const Ray& ray, float time);
+
 }  // namespace arboretum

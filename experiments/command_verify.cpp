@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "core/instances.h"
 #include "core/names.h"
@@ -32,9 +33,13 @@ constexpr std::size_t kSpreadBatch = std::size_t{1} << 14, kLeastSpreadBatch = 2
 constexpr std::size_t kSubjectRays = 64;            // of one random mesh
 constexpr std::size_t kBruteForceTriangles = 2000;  // left out above it, unless it is asked for
 constexpr std::size_t kMostCases = 20;              // breaches that are told
+constexpr unsigned kMostTries = 16;                 // at a case of one cell
 constexpr std::size_t kCompany = 64;                // rays that a case is traced among: the largest packets'
 
 enum class Subject { scene, cases, random };
+
+/// Variant and ray: each variant counts from 0.
+using RayNumber = std::pair<std::size_t, std::uint64_t>;
 
 class Verify {
  public:
@@ -172,7 +177,7 @@ class Verify {
       } else {
         verify_all(cells_, variant, shelf, batch);
       }
-      keep_breaches(mesh, name);
+      keep_breaches(mesh, variant, name);
       progress.step(name, count);
     }
   }
@@ -241,27 +246,54 @@ class Verify {
       StructureShelf shelf(mesh, registry_, 1);
       verify_all(cells_, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch()), first}, company);
     });
-    keep_breaches(mesh, name);
+    keep_breaches(mesh, 0, name);
   }
 
   // What was found.
 
-  /// Of cells that break their promise for the first time: what happened, and a case of it.
-  void keep_breaches(const TriangleMesh& mesh, const std::string& name) {
-    breached_.resize(cells_.size(), false);
+  /// What is kept of a cell's breaches.
+  struct Kept {
+    bool has_case = false;
+    unsigned tries = 0;
+    RayNumber ray{};    ///< the first that no case could be made of
+    std::string words;  ///< of that ray; empty: none
+  };
+
+  /// Of the rays of the last batch: a case for each cell that breaks its promise and has none yet. `mesh` is what they
+  /// were traced on.
+  void keep_breaches(const TriangleMesh& mesh, std::size_t variant, const std::string& name) {
+    kept_.resize(cells_.size());
     for (std::size_t i = 0; i < cells_.size(); ++i) {
-      if (breached_[i]) continue;
-      const VerifyTally sum = cells_[i].sum();
-      if (sum.broken == 0) continue;
-      breached_[i] = true;
+      const Breach breach = std::exchange(cells_[i].newest, {});
+      Kept& kept = kept_[i];
+      if (breach.what.empty() || kept.has_case || kept.tries == kMostTries || cases_.size() >= kMostCases) continue;
+      const RayNumber ray{variant, breach.ray};
       // One case for a ray, however many cells it defeats.
-      if (cases_.size() >= kMostCases || !case_rays_.insert(sum.first.ray).second) continue;
-      if (const auto part = reduce(cells_[i], registry_, mesh, sum.first)) {
-        cases_.push_back(case_json(fmt::format("{}-ray{}", name, sum.first.ray),
-                                   fmt::format("{}: {}", cell_label(cells_[i].cell), sum.first.what), *part,
-                                   sum.first.given));
+      if (case_rays_.contains(ray)) {
+        kept.has_case = true;
+        continue;
+      }
+      ++kept.tries;
+      const std::string id = fmt::format("{}-ray{}", name, breach.ray),
+                        why = fmt::format("{}: {}", cell_label(cells_[i].cell), breach.what);
+      if (const auto part = reduce(cells_[i], registry_, mesh, breach)) {
+        cases_.push_back(case_json(id, why, *part, breach.given));
+        case_rays_.insert(ray), kept.has_case = true;
+      } else if (kept.words.empty()) {
+        kept.ray = ray, kept.words = ray_json(id, why, breach.given, breach.time);
       }
     }
+  }
+
+  /// Of cells that have no case; one for a ray.
+  std::vector<std::string> unreduced() const {
+    std::vector<std::string> lines;
+    std::set<RayNumber> told;
+    for (const Kept& kept : kept_)
+      if (!kept.has_case && !kept.words.empty() && lines.size() < kMostCases && !case_rays_.contains(kept.ray) &&
+          told.insert(kept.ray).second)
+        lines.push_back(kept.words);
+    return lines;
   }
 
   ExitStatus report() {
@@ -283,12 +315,16 @@ class Verify {
       if (++broken <= kMostCases) lines += describe_breach(cell, sum) + "\n";
     }
     if (!lines.empty()) fmt::print("\n{}", lines);
-    const std::string document = fmt::format("{{\"cases\": [\n{}\n]}}\n", fmt::join(cases_, ",\n"));
-    if (!cases_.empty()) fmt::print("\n{}", document);
+    const std::vector<std::string> rest = unreduced();
+    std::string document = fmt::format("{{\"cases\": [\n{}\n]", fmt::join(cases_, ",\n"));
+    if (!rest.empty()) document += fmt::format(", \"unreduced\": [\n{}\n]", fmt::join(rest, ",\n"));
+    document += "}\n";
+    const bool found = !cases_.empty() || !rest.empty();
+    if (found) fmt::print("\n{}", document);
     if (!command_.out.empty()) {
       write_whole(command_.out / "verify.csv", verify_csv(cells_, variants_));
       std::error_code ignored;
-      if (!cases_.empty())
+      if (found)
         write_whole(command_.out / "cases.json", document);
       else
         std::filesystem::remove(command_.out / "cases.json", ignored);  // of a run before
@@ -316,16 +352,17 @@ class Verify {
   std::string title_;
   std::size_t next_cell_ = 0;
   std::uint64_t total_rays_ = 0;
-  std::vector<bool> breached_;
-  std::set<std::uint64_t> case_rays_;
+  std::vector<Kept> kept_;
+  std::set<RayNumber> case_rays_;
   std::vector<std::string> cases_;
 };
 
 }  // namespace
 
-ExitStatus command_verify(const VerifyCommand& command) {
-  const Registry registry = this_registry();
+ExitStatus command_verify(const VerifyCommand& command, const Registry& registry) {
   return Verify(command, registry).run();
 }
+
+ExitStatus command_verify(const VerifyCommand& command) { return command_verify(command, this_registry()); }
 
 }  // namespace arboretum

@@ -76,6 +76,8 @@ ExitStatus command_run(RunCommand command);
 ExitStatus command_merge(const MergeCommand& command);
 ExitStatus command_compare(const CompareCommand& command);
 ExitStatus command_verify(const VerifyCommand& command);
+/// Of what `registry` has; tests hand in kernels that lie.
+ExitStatus command_verify(const VerifyCommand& command, const Registry& registry);
 /// `axis` empty: all of them.
 ExitStatus command_list(const std::string& axis, bool json);
 ExitStatus command_info(const std::string& scene, bool json);

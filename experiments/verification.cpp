@@ -184,7 +184,9 @@ VerifyTally VerifiedCell::sum() const {
 
 void VerifiedCell::add(std::size_t variant, const std::vector<VerifyTally>& by_kind) {
   if (tallies.size() <= variant) tallies.resize(variant + 1, std::vector<VerifyTally>(kHardKindNames.size()));
-  for (std::size_t k = 0; k < by_kind.size(); ++k) tallies[variant][k] += by_kind[k];
+  VerifyTally all;
+  for (std::size_t k = 0; k < by_kind.size(); ++k) tallies[variant][k] += by_kind[k], all += by_kind[k];
+  newest = all.first;
 }
 
 void verify_all(std::vector<VerifiedCell>& cells, std::size_t variant, StructureShelf& shelf, const VerifyBatch& batch,

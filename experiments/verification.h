@@ -63,6 +63,7 @@ struct VerifiedCell {
   Promise promise;
   std::vector<std::vector<VerifyTally>> tallies;
   std::vector<std::string> wrong_cases;  ///< of a cases file: ids that it gets wrong
+  Breach newest{};                       ///< the first of what was added last
 
   [[nodiscard]] VerifyTally sum() const;
   void add(std::size_t variant, const std::vector<VerifyTally>& by_kind);

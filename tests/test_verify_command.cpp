@@ -1,6 +1,8 @@
 // `verify` as a command: its verdicts and words, scenes of instances, and the cases files that it reads.
 #include <unistd.h>
 
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <sstream>
 
@@ -26,7 +28,7 @@ struct Outcome {
 };
 
 /// The program's command, its words on stdout and the error that it throws.
-Outcome verify(const VerifyCommand& command) {
+Outcome verify(const VerifyCommand& command, const Registry* registry = nullptr) {
   Outcome outcome;
   const Folder folder;
   const fs::path path = folder / "stdout";
@@ -34,7 +36,7 @@ Outcome verify(const VerifyCommand& command) {
   const int saved = dup(1);
   REQUIRE(std::freopen(path.c_str(), "w", stdout));
   try {
-    outcome.status = static_cast<int>(command_verify(command));
+    outcome.status = static_cast<int>(registry ? command_verify(command, *registry) : command_verify(command));
   } catch (const UserError& e) {
     outcome.status = static_cast<int>(ExitStatus::kUsage), outcome.error = e.what();
   }
@@ -137,6 +139,108 @@ TEST_CASE("a scene of instances is moved only for structures that do not read th
   CHECK(verify(command).status == 2);
   command.subject = "sphere:200";
   CHECK(verify(command).status == 0);
+}
+
+namespace {
+
+const KernelRow* first_liar = nullptr;
+
+/// The row that a liar stands for.
+const KernelRow& honest(const KernelRow& liar) { return kernel_table()[static_cast<std::size_t>(&liar - first_liar)]; }
+
+/// A registry in which the rows of `intersector` for these structures are liars.
+Registry with_liars(std::vector<KernelRow>& rows, std::string_view intersector,
+                    const std::vector<std::pair<std::string_view, ClosestHitFunction>>& liars) {
+  Registry registry = this_registry();
+  rows.assign(kernel_table().begin(), kernel_table().end());
+  for (KernelRow& row : rows)
+    for (const auto& [structure, lie] : liars)
+      if (row.structure == structure && row.intersector == intersector) row.timed.closest_hit = lie;
+  first_liar = rows.data(), registry.kernels = rows;
+  return registry;
+}
+
+void all_miss(std::span<Hit> hits) { std::ranges::fill(hits, Hit{}); }
+
+bool is_far_off(const RayBatch& rays) { return rays.rays.size() > 0 && std::fabs(rays.rays[0].origin.x) > 100; }
+
+/// What --out holds of a run with these liars.
+std::string cases_of(VerifyCommand command, const Registry& registry) {
+  const Folder folder;
+  command.out = folder.path();
+  CHECK(verify(command, &registry).status == 1);
+  std::stringstream text;
+  text << std::ifstream(folder.path() / "cases.json").rdbuf();
+  if (text.str().find("{\"cases\": [\n\n]") != 0) CHECK_FALSE(read_case_file(folder.path() / "cases.json").empty());
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("each placing of a scene has rays of its own, and each keeps its cases") {
+  // Both miss everything, one where the scene stands, the other far off: on rays of the same number.
+  std::vector<KernelRow> rows;
+  const Registry registry = with_liars(
+      rows, "watertight",
+      {{"bvh4",
+        [](const Accel& accel, const KernelRow& row, RayBatch batch, std::span<Hit> hits, Counters* counters) {
+          honest(row).closest_hit(accel, batch, hits, counters);
+          if (!is_far_off(batch)) all_miss(hits);
+        }},
+       {"bvh8", [](const Accel& accel, const KernelRow& row, RayBatch batch, std::span<Hit> hits, Counters* counters) {
+          honest(row).closest_hit(accel, batch, hits, counters);
+          if (is_far_off(batch)) all_miss(hits);
+        }}});
+  VerifyCommand command;
+  command.subject = "sphere:200", command.axes = {"structure=bvh4,bvh8", "intersector=watertight", "isa=" + any_isa()};
+  command.rays = 400, command.kinds = {"interior"}, command.offsets = {0, 1000}, command.threads = 1;
+  const std::string cases = cases_of(command, registry);
+  INFO(cases);
+  CHECK(cases.find("\"id\":\"sphere-200-offset0-scale0-ray0\"") != std::string::npos);
+  CHECK(cases.find("\"id\":\"sphere-200-offset1000-scale0-ray0\"") != std::string::npos);
+}
+
+namespace {
+int calls = 0;
+}  // namespace
+
+TEST_CASE("a breach that no case could be made of leaves the next one its turn") {
+  std::vector<KernelRow> rows;
+  const Registry registry = with_liars(
+      rows, "exact",
+      {{"bvh8", [](const Accel& accel, const KernelRow& row, RayBatch batch, std::span<Hit> hits, Counters* counters) {
+          honest(row).closest_hit(accel, batch, hits, counters);
+          // Once, on the first mesh, and always from the ninth or so on
+          if (++calls == 1 || calls > 10) all_miss(hits);
+        }}});
+  VerifyCommand command;
+  command.subject = "random", command.axes = {"structure=bvh8", "intersector=exact", "isa=" + any_isa()};
+  command.rays = 64 * 20, command.threads = 1;
+  calls = 0;
+  const std::string cases = cases_of(command, registry);
+  INFO(cases);
+  CHECK(cases.find("{\"id\":\"random-seed1-") != std::string::npos);
+  CHECK(cases.find("\"unreduced\"") == std::string::npos);
+}
+
+TEST_CASE("a breach that cannot be made small is kept as its scene's ray") {
+  // Honest on small meshes: what no part of the scene shows
+  std::vector<KernelRow> rows;
+  const Registry registry = with_liars(
+      rows, "watertight",
+      {{"bvh8", [](const Accel& accel, const KernelRow& row, RayBatch batch, std::span<Hit> hits, Counters* counters) {
+          honest(row).closest_hit(accel, batch, hits, counters);
+          if (accel.bytes() > 100'000) all_miss(hits);
+        }}});
+  VerifyCommand command;
+  command.subject = "sphere:5000", command.axes = {"structure=bvh8", "intersector=watertight", "isa=" + any_isa()};
+  command.rays = 400, command.kinds = {"interior"}, command.threads = 1;
+  const std::string cases = cases_of(command, registry);
+  INFO(cases);
+  CHECK(cases.find("{\"cases\": [\n\n], \"unreduced\": [\n{\"id\":\"sphere-5000-offset0-scale0-ray0\",\"origin\":[") ==
+        0);
+  CHECK(cases.find("\"why\":\"bvh8/") != std::string::npos);
+  CHECK(cases.find("lost through a closed surface") != std::string::npos);
 }
 
 TEST_CASE("cases files: right ones are checked, wrong ones are named") {
