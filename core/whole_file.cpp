@@ -46,14 +46,15 @@ Target target_of(std::filesystem::path path) {
   return {path, -1, std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)};
 }
 
-void write_in_place(const Target& target, std::string_view text, const std::filesystem::path& path) {
+void write_in_place(const Target& target, std::string_view text, const std::filesystem::path& path,
+                    std::string_view goes_on) {
   std::fflush(stdout);  // what was printed before comes first where both go to the same place
   const bool ours = target.descriptor >= 0;
   const int descriptor = ours ? target.descriptor : ::open(target.path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
-  if (descriptor < 0) cannot_write(path, errno);
+  if (descriptor < 0) cannot_write(path, errno, goes_on);
   int error = write_all(descriptor, text);
   if (!ours && ::close(descriptor) != 0 && error == 0) error = errno;
-  if (error != 0) cannot_write(path, error);
+  if (error != 0) cannot_write(path, error, goes_on);
 }
 
 }  // namespace
@@ -77,11 +78,11 @@ void cannot_write(const std::filesystem::path& path, int error, std::string_view
 
 void write_whole(const std::filesystem::path& path, std::string_view text, std::string_view goes_on) {
   const Target target = target_of(path);
-  if (target.in_place) return write_in_place(target, text, path);
+  if (target.in_place) return write_in_place(target, text, path, goes_on);
   std::filesystem::path beside = target.path;
   beside += ".part";
   const int descriptor = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0) cannot_write(path, errno);
+  if (descriptor < 0) cannot_write(path, errno, goes_on);
   int error = write_all(descriptor, text);
   if (::close(descriptor) != 0 && error == 0) error = errno;
   if (error == 0 && ::rename(beside.c_str(), target.path.c_str()) != 0) error = errno;

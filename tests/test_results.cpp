@@ -103,6 +103,8 @@ TEST_CASE("files of lines: a torn last line is dropped, an impossible write is o
     const std::string message = error_of([] { AppendFile("/dev/full", true).append("x"); });
     CHECK(message.find("No space left") != std::string::npos);
     CHECK(message.find("--resume") != std::string::npos);
+    CHECK(error_of([] { write_whole("/dev/full", "x", kGoesOn); }).find("--resume") != std::string::npos);
+    CHECK(error_of([] { write_whole("/dev/full", "x"); }).find("--resume") == std::string::npos);
   }
   CHECK(error_of([&] { write_whole(folder.path() / "none" / "file", "x"); }).find("cannot be written") !=
         std::string::npos);
