@@ -27,6 +27,7 @@ namespace {
 
 constexpr std::size_t kMostSeenPoints = 30000;
 constexpr std::size_t kPrepareUnits = 2;  // making a cell ready takes about two repetitions
+constexpr const char* kNoMemory = "out of memory; lower `measure: memory`, the resolution or the number of triangles";
 
 class Runner {
  public:
@@ -43,7 +44,7 @@ class Runner {
     } catch (const UserError& e) {
       outcome_.error = e.what();
     } catch (const std::bad_alloc&) {
-      outcome_.error = "out of memory; lower `measure: memory`, the resolution or the number of triangles";
+      outcome_.error = kNoMemory;
     }
     for (const Cell& cell : plan_.cells) {
       const std::string name = cell.name();
@@ -166,13 +167,18 @@ class Runner {
     std::deque<Job> jobs;
     std::vector<InterleavedJob> interleaved;
     for (const Cell* cell : cells) {
-      const Accel& accel = pool.get(*cell);
-      Job& job = jobs.emplace_back(*cell, accel, rays, buffers);
+      Json facts = Json::object();
+      const auto prepare = [&] {
+        const Accel& accel = pool.get(*cell);
+        facts.update(pool.facts(*cell, accel));
+        facts.update(data.facts());
+        pool.add_build_facts(*cell, facts);
+        jobs.emplace_back(*cell, accel, rays, buffers).prepare(facts, data, experiment_.measure);
+      };
+      if (!try_for({cell}, prepare)) continue;
+      Job& job = jobs.back();
       Running& running = begin(*cell);
-      running.result.facts.update(pool.facts(*cell, accel));
-      running.result.facts.update(data.facts());
-      pool.add_build_facts(*cell, running.result.facts);
-      job.prepare(running.result.facts, data, experiment_.measure);
+      running.result.facts.update(facts);
       interleaved.push_back(
           interleaved_job(running, job.passes(), [&job](TimedLoop& loop) { return job.measure(loop); }));
       if (options_.fail_fast && running.result.fact("wrong_answers") > 0) {
@@ -260,7 +266,7 @@ class Runner {
     } catch (const UserError& e) {
       for (const Cell* cell : cells) fail(*cell, e.what());
     } catch (const std::bad_alloc&) {
-      for (const Cell* cell : cells) fail(*cell, "not enough memory to build the structure");
+      for (const Cell* cell : cells) fail(*cell, kNoMemory);
     }
     if (options_.fail_fast) throw UserError(outcome_.failed.back().name + ": " + outcome_.failed.back().reason);
     return false;

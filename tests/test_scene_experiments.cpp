@@ -1,5 +1,8 @@
 // Instances and motion in experiments: what the plan keeps and skips, cells by the structure below, a run of both, and
 // its resumption.
+#include <new>
+
+#include "core/error.h"
 #include "experiments/config.h"
 #include "experiments/journal.h"
 #include "experiments/plan.h"
@@ -7,6 +10,7 @@
 #include "experiments/runner.h"
 #include "tests/catch.h"
 #include "tests/scene_files.h"
+#include "traversal/kernel_table.h"
 
 using namespace arboretum;
 using namespace arboretum::test;
@@ -52,6 +56,46 @@ TEST_CASE("the plan knows what moves and what can stand below, and gives reasons
   CHECK(with(plan, "trace/waving_cloth-600/bvh4_motion/") == 2);
   CHECK(skipped(plan, "waving_cloth-600/bvh8/", "bvh8 holds one moment, and the scene moves") == 2);
   CHECK(skipped(plan, "waving_cloth-600/two_level/", "two_level holds one moment, and the scene moves") > 0);
+}
+
+TEST_CASE("a cell that fails while it is made ready takes no other with it") {
+  const Folder folder;
+  Registry registry = this_registry();
+  std::vector<KernelRow> rows(kernel_table().begin(), kernel_table().end());
+  for (KernelRow& row : rows) {
+    if (row.structure == "bvh2")
+      row.timed.closest_hit = [](const Accel&, const KernelRow&, RayBatch, std::span<Hit>, Counters*) {
+        throw UserError("this kernel cannot");
+      };
+    if (row.structure == "bvh4")
+      row.timed.closest_hit = [](const Accel&, const KernelRow&, RayBatch, std::span<Hit>, Counters*) {
+        throw std::bad_alloc();
+      };
+  }
+  registry.kernels = rows;
+  const Experiment experiment = read_experiment(folder.write("sweep.yaml", R"(
+scenes: [{generate: sphere, triangles: 100}]
+axes: {structure: [bvh2, bvh4, bvh8], isa: [scalar], intersector: [watertight], workload: [primary]}
+measure: {repetitions: 2, warmup: 0, min_time: 0.001, resolution: [8, 8]}
+metrics: [trace]
+)"),
+                                                registry);
+  const Plan plan = make_plan(experiment, registry);
+  REQUIRE(plan.cells.size() == 3);
+  const auto run = [&](bool fail_fast) {
+    Journal journal(folder.path(), "hash", plan, false);
+    return run_plan(experiment, plan, registry, journal, {.fail_fast = fail_fast});
+  };
+  const RunOutcome outcome = run(false);
+  CHECK(outcome.error.empty());
+  REQUIRE(outcome.failed.size() == 2);
+  CHECK(outcome.failed[0].name.find("/bvh2/") != std::string::npos);
+  CHECK(outcome.failed[0].reason == "this kernel cannot");
+  CHECK(outcome.failed[1].reason.find("out of memory") == 0);
+  REQUIRE(outcome.results.size() == 1);
+  CHECK(outcome.results[0].cell.structure == "bvh8");
+  CHECK(outcome.results[0].repetitions.size() == 2);
+  CHECK(run(true).error.find("this kernel cannot") != std::string::npos);
 }
 
 TEST_CASE("a scene that was loaded before its turn is not loaded again; whose turn it is not is let go") {
