@@ -14,7 +14,7 @@ namespace arboretum {
 /// The nearest candidate, if it looks like a misspelling: at most a third of the longer word differs, or the first
 /// three letters are the same. Empty where none does.
 [[nodiscard]] std::string close_name(std::string_view name, std::span<const std::string> candidates);
-/// "unknown <kind> 'naem'; did you mean 'name'? (valid: a, b, c)": one line for UserError. Asks only for a close name,
+/// "unknown <kind> 'naem'; did you mean 'name'? (valid: a b c)": one line for UserError. Asks only for a close name,
 /// and shows the first 100 characters of a longer one.
 [[nodiscard]] std::string unknown_name_message(std::string_view kind, std::string_view name,
                                                std::span<const std::string> candidates);

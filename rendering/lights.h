@@ -3,8 +3,8 @@
 //
 // Point and spot lights: intensity in power per solid angle; a spot's cone opens by cone_degrees in all and has a sharp
 // edge. Directional: irradiance on a surface that faces it. Emissive triangles: radiance Ke on both sides, points
-// uniform over the area; one that moves has the power of its largest area while it does. The environment is constant
-// and in no table: rays that leave the scene meet it.
+// uniform over the area; one that moves has the power of its largest area while it does. The environment is in no
+// table: it has a choice of directions of its own (environment.h), and rays that leave the scene meet it.
 #pragma once
 
 #include <optional>
