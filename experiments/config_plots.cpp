@@ -3,33 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 
 #include "core/names.h"
 
 namespace arboretum {
 namespace {
-
-constexpr std::string_view kPlots[] = {
-    "rays_per_second",  "rays_by_builder",    "sah_cost",          "epo",
-    "leaf_histograms",  "bytes_per_triangle", "build_time",        "build_phases",
-    "sah_vs_time",      "build_vs_trace",     "memory_vs_time",    "visits_per_ray",
-    "accuracy_vs_time", "lane_utilization",   "published_ratios",  "leaks_vs_distance",
-    "leaks_vs_aspect",  "leak_picture",       "self_intersection", "traversal_ratios"};
-/// Drawn only where a configuration names them: few experiments have something for them to show.
-constexpr std::string_view kOnlyWhenNamed[] = {"lane_utilization", "published_ratios", "traversal_ratios"};
-
-bool is_measured(std::string_view plot, const Metrics& m) {
-  if (plot == "rays_per_second" || plot == "rays_by_builder" || plot == "lane_utilization" ||
-      plot == "memory_vs_time" || plot == "visits_per_ray" || plot == "published_ratios" ||
-      plot == "traversal_ratios" || plot == "self_intersection")  // how rays leave their surface is always checked
-    return m.trace;
-  if (plot == "build_time" || plot == "build_phases") return m.build;
-  if (plot == "sah_cost" || plot == "epo" || plot == "leaf_histograms") return m.quality;
-  if (plot == "bytes_per_triangle") return m.trace || m.build;
-  if (plot == "sah_vs_time") return m.quality && m.trace;
-  if (plot == "build_vs_trace") return m.build && m.trace;
-  return m.accuracy && m.trace;
-}
 
 template <class Predicate>
 bool has_workload(const Experiment& experiment, const Predicate& wanted) {
@@ -38,43 +18,90 @@ bool has_workload(const Experiment& experiment, const Predicate& wanted) {
          std::ranges::any_of(experiment.include, [&](const CellChoice& c) { return has(c.axes); });
 }
 
-/// What a plot needs and the experiment has not, its metrics apart; empty: nothing.
-std::string what_lacks(std::string_view plot, const Experiment& experiment) {
-  if ((plot == "leaks_vs_distance" || plot == "leaks_vs_aspect") &&
-      !has_workload(experiment, [](const std::string& w) { return w.starts_with("hard"); }))
-    return "it shows workloads of hard rays, as hard_edge";
-  if (plot == "leak_picture" && !has_workload(experiment, [](const std::string& w) { return w == "camera_edges"; }))
-    return "it shows the workload camera_edges";
-  if (plot == "self_intersection" &&
-      !(has_rays_on_surfaces(experiment) && experiment.rays.self_intersection.size() > 1))
-    return "it shows several ways of `rays: self_intersection`";
-  return {};
+bool traced(const Metrics& m) { return m.trace; }
+bool built(const Metrics& m) { return m.build; }
+bool of_quality(const Metrics& m) { return m.quality; }
+bool traced_or_built(const Metrics& m) { return m.trace || m.build; }
+bool traced_and_built(const Metrics& m) { return m.trace && m.build; }
+bool traced_of_quality(const Metrics& m) { return m.trace && m.quality; }
+bool checked(const Metrics& m) { return m.trace && m.accuracy; }
+
+/// What a plot shows and the experiment has not; empty: nothing.
+std::string_view no_hard_rays(const Experiment& experiment) {
+  return has_workload(experiment, [](const std::string& w) { return w.starts_with("hard"); })
+             ? ""
+             : "workloads of hard rays, as hard_edge";
 }
+std::string_view no_camera_edges(const Experiment& experiment) {
+  return has_workload(experiment, [](const std::string& w) { return w == "camera_edges"; })
+             ? ""
+             : "the workload camera_edges";
+}
+std::string_view one_way_off_surfaces(const Experiment& experiment) {
+  return has_rays_on_surfaces(experiment) && experiment.rays.self_intersection.size() > 1
+             ? ""
+             : "several ways of `rays: self_intersection`";
+}
+
+struct Plot {
+  std::string_view name;
+  bool (*is_measured)(const Metrics&);
+  bool only_when_named = false;  ///< few experiments have something for it to show
+  std::string_view (*lack)(const Experiment&) = [](const Experiment&) { return std::string_view(); };
+};
+
+constexpr Plot kPlots[] = {
+    {"rays_per_second", traced},
+    {"rays_by_builder", traced},
+    {"sah_cost", of_quality},
+    {"epo", of_quality},
+    {"leaf_histograms", of_quality},
+    {"bytes_per_triangle", traced_or_built},
+    {"build_time", built},
+    {"build_phases", built},
+    {"sah_vs_time", traced_of_quality},
+    {"build_vs_trace", traced_and_built},
+    {"memory_vs_time", traced},
+    {"visits_per_ray", traced},
+    {"accuracy_vs_time", checked},
+    {"lane_utilization", traced, true},
+    {"published_ratios", traced, true},
+    {"leaks_vs_distance", checked, false, no_hard_rays},
+    {"leaks_vs_aspect", checked, false, no_hard_rays},
+    {"leak_picture", checked, false, no_camera_edges},
+    {"self_intersection", traced, false, one_way_off_surfaces},  // how rays leave their surface is always checked
+    {"traversal_ratios", traced, true},
+};
+constexpr auto kNames = [] {
+  std::array<std::string_view, std::size(kPlots)> names;
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = kPlots[i].name;
+  return names;
+}();
 
 }  // namespace
 
-std::span<const std::string_view> plot_names() { return kPlots; }
+std::span<const std::string_view> plot_names() { return kNames; }
 
 std::vector<std::string> default_plots(const Experiment& experiment) {
   std::vector<std::string> plots;
-  for (std::string_view plot : kPlots)
-    if (is_measured(plot, experiment.metrics) && what_lacks(plot, experiment).empty() &&
-        std::ranges::find(kOnlyWhenNamed, plot) == std::end(kOnlyWhenNamed))
-      plots.emplace_back(plot);
+  for (const Plot& plot : kPlots)
+    if (plot.is_measured(experiment.metrics) && plot.lack(experiment).empty() && !plot.only_when_named)
+      plots.emplace_back(plot.name);
   return plots;
 }
 
 std::vector<std::string> read_plots(const YamlReader& yaml, const YAML::Node& node, const Experiment& experiment) {
   std::vector<std::string> plots;
   if (node.IsSequence() && node.size() == 0) return plots;  // none, said plainly
-  const std::vector<std::string> known(std::begin(kPlots), std::end(kPlots));
   for (const YAML::Node& value : yaml.list(node, "plots")) {
     const std::string name = value.Scalar();
-    if (std::ranges::find(known, name) == known.end()) yaml.fail(value, unknown_name_message("plot", name, known));
-    if (!is_measured(name, experiment.metrics))
+    const Plot* plot = std::ranges::find(kPlots, name, &Plot::name);
+    if (plot == std::end(kPlots))
+      yaml.fail(value, unknown_name_message("plot", name, std::vector<std::string>(kNames.begin(), kNames.end())));
+    if (!plot->is_measured(experiment.metrics))
       yaml.fail(value, fmt::format("plot {} has no data: a metric that it shows is not in metrics", name));
-    if (const std::string lack = what_lacks(name, experiment); !lack.empty() && !experiment.overridden)
-      yaml.fail(value, fmt::format("plot {} has no data: {}, and there are none", name, lack));
+    if (const std::string_view lack = plot->lack(experiment); !lack.empty() && !experiment.overridden)
+      yaml.fail(value, fmt::format("plot {} has no data: it shows {}, and there are none", name, lack));
     plots.push_back(name);
   }
   return plots;

@@ -173,8 +173,8 @@ class Rows(Drawn):
 
     def test_a_configuration_can_name_every_figure(self):
         source = (PLOTS.parent / "experiments" / "config_plots.cpp").read_text(encoding="utf-8")
-        known = re.search(r"kPlots\[\] = \{(.*?)\}", source, re.DOTALL).group(1)
-        self.assertEqual(sorted(re.findall(r'"(\w+)"', known)), sorted(ALL))
+        known = re.search(r"kPlots\[\] = \{(.*?)\n\};", source, re.DOTALL).group(1)
+        self.assertEqual(sorted(re.findall(r'\{"(\w+)"', known)), sorted(ALL))
 
 
 if __name__ == "__main__":
