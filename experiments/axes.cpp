@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <utility>
 
 #include "experiments/call_axis.h"
 #include "experiments/rendered_rays.h"
 #include "intersectors/promises.h"
+#include "oracle/hard_rays.h"
 #include "rendering/hard_workload.h"
 
 namespace arboretum {
@@ -72,18 +74,23 @@ constexpr Summary kWorkloads[] = {
     {"whitted", "a picture by Whitted's method, shading included: direct light, mirrors, glass"},
     {"path", "a picture by path tracing, shading included"},
     {"hard", "closest hit, all kinds of hard rays but `far` in turn: what accuracy is measured by"},
-    {"hard_vertex", "closest hit, aimed at vertices, every fourth exactly"},
-    {"hard_edge", "closest hit, aimed at edges that two triangles share"},
-    {"hard_border", "closest hit, aimed at edges of one triangle, or of more than two"},
-    {"hard_interior", "closest hit, aimed at points within triangles"},
-    {"hard_grazing", "closest hit, nearly in a triangle's plane"},
-    {"hard_axis", "closest hit, along an axis, through vertices, edges and triangles"},
-    {"hard_plane", "closest hit, in the planes of box faces"},
-    {"hard_surface", "closest hit, from points of triangles, or off them by their rounding"},
-    {"hard_far", "closest hit, from 4 to 2^27 scene radii away"},
-    {"hard_interval", "closest hit, with tnear or tfar at the hit"},
     {"camera_edges", "closest hit, from the camera at edges and vertices: a picture of leaks"},
 };
+
+/// Of hard_KIND, in the order of HardKind.
+constexpr std::string_view kHardKinds[] = {
+    "aimed at vertices, every fourth exactly",
+    "aimed at edges that two triangles share",
+    "aimed at edges of one triangle, or of more than two",
+    "aimed at points within triangles",
+    "nearly in a triangle's plane",
+    "along an axis, through vertices, edges and triangles",
+    "in the planes of box faces",
+    "from points of triangles, or off them by their rounding",
+    "from 4 to 2^27 scene radii away",
+    "with tnear or tfar at the hit",
+};
+static_assert(std::size(kHardKinds) == static_cast<std::size_t>(HardKind::invalid), "a kind of ray without a summary");
 
 std::string_view look_up(std::span<const Summary> table, std::string_view key) {
   for (const Summary& s : table)
@@ -143,6 +150,13 @@ std::string builder_summary(std::string_view builder) {
   if (!builder.ends_with(suffix)) return std::string(look_up(kBuilders, builder));
   builder.remove_suffix(suffix.size());
   return std::string(look_up(kBuilders, builder)) + "; then subtrees reinserted where they cost least";
+}
+
+std::string workload_summary(std::string_view workload) {
+  constexpr std::string_view kPrefix = "hard_";
+  for (std::size_t k = 0; workload.starts_with(kPrefix) && k < std::size(kHardKinds); ++k)
+    if (workload.substr(kPrefix.size()) == kHardKindNames[k]) return "closest hit, " + std::string(kHardKinds[k]);
+  return std::string(look_up(kWorkloads, workload));
 }
 
 }  // namespace
@@ -238,7 +252,7 @@ std::string summary_of(Axis axis, std::string_view value, const Registry& regist
     case Axis::traversal: return traversal_summary(value);
     case Axis::call: return std::string(look_up(kCallSummaries, value));
     case Axis::isa: return std::string(look_up(kIsas, value));
-    case Axis::workload: return std::string(look_up(kWorkloads, value));
+    case Axis::workload: return workload_summary(value);
     case Axis::threads: return {};
   }
   return {};

@@ -14,6 +14,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <new>
+#include <span>
 #include <system_error>
 
 #include "core/names.h"
@@ -21,6 +22,7 @@
 #include "experiments/build_info.h"
 #include "experiments/commands.h"
 #include "experiments/shell_words.h"
+#include "oracle/hard_rays.h"
 
 namespace arboretum {
 namespace {
@@ -144,7 +146,7 @@ void declare_verify(CLI::App& app, VerifyCommand& verify) {
       ->delimiter(',')
       ->allow_extra_args(false);
   c->add_option("--kinds", verify.kinds,
-                "Kinds of rays: vertex, edge, border, interior, grazing, axis, plane, surface, far, interval, invalid")
+                fmt::format("Kinds of rays: {}", fmt::join(std::span(kHardKindNames).first(kMadeKinds), ", ")))
       ->delimiter(',')
       ->allow_extra_args(false);
   c->add_option("--out", verify.out, "Folder for verify.csv and the cases found");

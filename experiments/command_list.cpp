@@ -90,26 +90,32 @@ Json scene_entries() {
   return entries;
 }
 
+constexpr std::pair<std::string_view, std::string_view> kEffectSummaries[] = {
+    {"shadow_hard", "shadows of point, directional and spot lights"},
+    {"shadow_soft", "shadows of light-emitting triangles"},
+    {"env_light", "light of the surroundings"},
+    {"mirror", "perfect reflection"},
+    {"glossy", "blurred reflection"},
+    {"dielectric", "glass and water: reflection and refraction"},
+    {"diffuse_gi", "light from surface to surface"},
+    {"dof", "depth of field of a thin lens"},
+    {"motion_blur", "movement while the shutter is open"},
+    {"alpha_cutout", "holes cut by an opacity map"},
+    {"instancing", "a mesh in several places"},
+    {"texture", "colours from images"},
+    {"multi_light", "more than one light"},
+};
+
+constexpr const std::string_view* effect_summary(std::string_view name) {
+  for (const auto& [effect, summary] : kEffectSummaries)
+    if (effect == name) return &summary;
+  return nullptr;
+}
+static_assert(std::ranges::all_of(kEffectNames, effect_summary), "an effect without a summary");
+
 Json effect_entries() {
-  constexpr std::pair<std::string_view, std::string_view> kSummaries[] = {
-      {"shadow_hard", "shadows of point, directional and spot lights"},
-      {"shadow_soft", "shadows of light-emitting triangles"},
-      {"env_light", "light of the surroundings"},
-      {"mirror", "perfect reflection"},
-      {"glossy", "blurred reflection"},
-      {"dielectric", "glass and water: reflection and refraction"},
-      {"diffuse_gi", "light from surface to surface"},
-      {"dof", "depth of field of a thin lens"},
-      {"motion_blur", "movement while the shutter is open"},
-      {"alpha_cutout", "holes cut by an opacity map"},
-      {"instancing", "a mesh in several places"},
-      {"texture", "colours from images"},
-      {"multi_light", "more than one light"}};
   Json entries = Json::array();
-  for (std::string_view name : kEffectNames) {
-    const auto found = std::ranges::find(kSummaries, name, &std::pair<std::string_view, std::string_view>::first);
-    entries.push_back({{"name", name}, {"summary", found == std::end(kSummaries) ? "" : found->second}});
-  }
+  for (std::string_view name : kEffectNames) entries.push_back({{"name", name}, {"summary", *effect_summary(name)}});
   return entries;
 }
 

@@ -1,7 +1,6 @@
 #include "rendering/hard_workload.h"
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -14,10 +13,6 @@ namespace arboretum {
 namespace {
 
 constexpr std::string_view kMixture = "hard", kCameraEdges = "camera_edges", kPrefix = "hard_";
-constexpr std::array<std::string_view, 12> kNames{kMixture,        "hard_vertex",  "hard_edge",     "hard_border",
-                                                  "hard_interior", "hard_grazing", "hard_axis",     "hard_plane",
-                                                  "hard_surface",  "hard_far",     "hard_interval", kCameraEdges};
-
 /// The kinds that a workload is made of, as far as the mesh has them. The mixture is without `far`: from 2^27 radii
 /// away every box is within rounding of the ray, and each such ray visits the whole structure.
 std::vector<HardKind> kinds_of(std::string_view name, const HardRayMaker& maker) {
@@ -55,9 +50,26 @@ Workload camera_edges(const Scene& scene, const View& view) {
 
 }  // namespace
 
-std::span<const std::string_view> hard_workload_names() { return kNames; }
+std::span<const std::string_view> hard_workload_names() {
+  static const std::vector<std::string> of_kinds = [] {
+    std::vector<std::string> names;
+    for (std::size_t k = 0; k < kMadeKinds; ++k)
+      if (static_cast<HardKind>(k) != HardKind::invalid) names.emplace_back(kPrefix).append(kHardKindNames[k]);
+    return names;
+  }();
+  static const std::vector<std::string_view> names = [] {
+    std::vector<std::string_view> all{kMixture};
+    all.insert(all.end(), of_kinds.begin(), of_kinds.end());
+    all.push_back(kCameraEdges);
+    return all;
+  }();
+  return names;
+}
 
-bool is_hard(std::string_view workload) noexcept { return std::ranges::find(kNames, workload) != kNames.end(); }
+bool is_hard(std::string_view workload) {
+  const auto names = hard_workload_names();
+  return std::ranges::find(names, workload) != names.end();
+}
 
 Workload make_hard_workload(std::string_view name, const Scene& scene, const View& view) {
   if (!is_hard(name)) throw std::invalid_argument("make_hard_workload: no hard workload is called so");

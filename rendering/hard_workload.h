@@ -11,7 +11,7 @@ namespace arboretum {
 
 /// `hard`, a mixture of all kinds but `far`, and `hard_KIND` for each of them that is a ray at all; `camera_edges`.
 [[nodiscard]] std::span<const std::string_view> hard_workload_names();
-[[nodiscard]] bool is_hard(std::string_view workload) noexcept;
+[[nodiscard]] bool is_hard(std::string_view workload);
 
 /// Closest hit. `camera_edges`: from the camera at points of edges and, every fourth, at vertices, with
 /// Workload::pixels. No ray at all where the mesh lacks what they are aimed at (`hard_border` of a closed one).
