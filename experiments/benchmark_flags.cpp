@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "experiments/config.h"
 
 namespace arboretum {
 namespace {
@@ -123,7 +124,7 @@ BenchmarkFlags take_benchmark_flags(std::vector<std::string>& words) {
       throw UserError(fmt::format("{} has an empty value; give one, or leave it out", flag));
     if (!given.insert(flag).second) throw UserError(fmt::format("{} is given twice; keep one", flag));
     if (flag == "--benchmark_repetitions")
-      flags.repetitions = number<unsigned>(flag, value, 1, 100000);
+      flags.repetitions = number<unsigned>(flag, value, 1, kMaxRepetitions);
     else if (flag == "--benchmark_min_time")
       flags.min_time = number<double>(flag, value, 0.0, 3600.0);
     else if (flag == "--benchmark_min_warmup_time")

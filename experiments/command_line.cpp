@@ -19,6 +19,7 @@
 
 #include "core/names.h"
 #include "experiments/append_file.h"
+#include "experiments/axis_words.h"
 #include "experiments/build_info.h"
 #include "experiments/commands.h"
 #include "experiments/shell_words.h"
@@ -78,9 +79,9 @@ void declare_run(CLI::App& app, RunCommand& run) {
   c->add_flag("--resume", run.resume, "Go on with a run that was cut off");
   c->add_option("--shard", run.shard, "I/N: the I-th of N parts of the plan; `merge` joins them");
   c->add_option("--repetitions", run.overrides.repetitions, "Timed repetitions of each cell")
-      ->check(CLI::Range(1, 100000));
+      ->check(CLI::Range(1u, kMaxRepetitions));
   c->add_option("--threads", run.overrides.threads, "Threads, in place of the configuration's")
-      ->check(CLI::Range(1, 4096));
+      ->check(CLI::Range(1u, kMaxThreads));
   c->add_option("--seed", run.overrides.seed, "Seed of the workloads' random numbers")->check(refuse_no_count);
   c->add_flag("--fail-fast", run.fail_fast, "Stop at the first wrong answer");
   c->add_flag("--no-plots", run.no_plots, "Draw no plots and write no report");
@@ -136,7 +137,8 @@ void declare_verify(CLI::App& app, VerifyCommand& verify) {
       ->required();
   c->add_option("AXIS", verify.axes, "axis=value,value: which combinations (isa=avx2,avx512); axis=all");
   c->add_option("--rays", verify.rays,
-                "Rays in all (default 100000; a cases file: each case once, and mutations of them beyond that)")
+                fmt::format("Rays in all (default {}; a cases file: each case once, and mutations of them beyond that)",
+                            kVerifyRays))
       ->check(refuse_no_count);
   c->add_option("--seed", verify.seed, "Seed of the rays (default 1)")->check(refuse_no_count);
   c->add_option("--offset", verify.offsets, "Moves the scene by these distances along (1, -3/4, 1/2)")
@@ -150,7 +152,7 @@ void declare_verify(CLI::App& app, VerifyCommand& verify) {
       ->delimiter(',')
       ->allow_extra_args(false);
   c->add_option("--out", verify.out, "Folder for verify.csv and the cases found");
-  c->add_option("--threads", verify.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
+  c->add_option("--threads", verify.threads, "Threads (default: all)")->check(CLI::Range(1u, kMaxThreads));
   c->add_flag("--spread", verify.spread, "Share the rays among the combinations instead of giving each all of them");
   c->add_option("--filter", verify.filter, "Only combinations whose name this regular expression finds");
   c->add_option("--skip", verify.skip, "No combinations whose name this regular expression finds");
@@ -181,7 +183,7 @@ void declare_render(CLI::App& app, RenderCommand& render) {
   c->add_option("--seed", render.settings.seed, "Seed of the random numbers (default 1)")->check(refuse_no_count);
   for (const char* const of_light : {"--integrator", "--spp", "--depth", "--clamp", "--exposure", "--seed"})
     c->get_option(of_light)->excludes(heat_map);
-  c->add_option("--threads", render.settings.threads, "Threads (default: all)")->check(CLI::Range(1, 4096));
+  c->add_option("--threads", render.settings.threads, "Threads (default: all)")->check(CLI::Range(1u, kMaxThreads));
   c->add_option("--structure", render.kernel.structure,
                 "Structure to trace with (default bvh8, bvh4_motion for what moves)");
   c->add_option("--builder", render.kernel.builder, "Its builder");

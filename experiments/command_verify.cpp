@@ -71,7 +71,7 @@ class Verify {
     if (!command_.out.empty()) make_output_folder(command_.out);
     if (subject_ == Subject::scene) scene();
     if (subject_ == Subject::cases) cases();
-    if (subject_ == Subject::random) random(nullptr, command_.rays.value_or(100'000));
+    if (subject_ == Subject::random) random(nullptr, command_.rays.value_or(kVerifyRays));
     if (cells_.empty()) return nothing();
     return report();
   }
@@ -114,7 +114,8 @@ class Verify {
     for (double offset : command_.offsets.empty() ? std::vector<double>{0.0} : command_.offsets)
       for (int exponent : command_.scales.empty() ? std::vector<int>{0} : command_.scales)
         variants_.push_back({offset, exponent});
-    const std::uint64_t rays = command_.rays.value_or(100'000), each = (rays + variants_.size() - 1) / variants_.size();
+    const std::uint64_t rays = command_.rays.value_or(kVerifyRays),
+                        each = (rays + variants_.size() - 1) / variants_.size();
     expect_instances_stay(choice.name, mesh);
     title_ = fmt::format("{}: {} triangles", choice.name, mesh.size());
     Progress progress(variants_.size(), variants_.size() * each);

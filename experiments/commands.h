@@ -28,10 +28,13 @@ struct RunCommand {
   std::string command_line;  ///< as typed, for the results
 };
 
+/// Of a scene or random meshes, where no number is given.
+inline constexpr std::uint64_t kVerifyRays = 100'000;
+
 struct VerifyCommand {
   std::string subject;                ///< a scene word, a cases file (.json), or `random`
   std::vector<std::string> axes;      ///< `isa=avx2,avx512`, as typed
-  std::optional<std::uint64_t> rays;  ///< in all; empty: 100 000, or each case of a file once
+  std::optional<std::uint64_t> rays;  ///< in all; empty: kVerifyRays, or each case of a file once
   std::uint64_t seed = 1;
   std::vector<double> offsets;
   std::vector<int> scales;         ///< exponents of two

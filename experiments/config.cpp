@@ -167,7 +167,7 @@ class ConfigReader {
                                              "threads", "memory", "seed", "structure_cache"});
     MeasureSettings& m = experiment_.measure;
     if (const auto n = map["repetitions"])
-      m.repetitions = static_cast<unsigned>(yaml_.integer(n, "repetitions", 1, 100000));
+      m.repetitions = static_cast<unsigned>(yaml_.integer(n, "repetitions", 1, kMaxRepetitions));
     if (const auto n = map["warmup"]) m.warmup = static_cast<unsigned>(yaml_.integer(n, "warmup", 0, 1000));
     if (const auto n = map["min_warmup_time"])
       m.min_warmup_time = yaml_.number(n, "min_warmup_time (seconds)", 0.0, 3600.0);

@@ -43,6 +43,9 @@ struct CellChoice {
   std::string where;  ///< file:line
 };
 
+/// Most repetitions of a cell.
+inline constexpr unsigned kMaxRepetitions = 100'000;
+
 struct MeasureSettings {
   unsigned repetitions = 7;
   unsigned warmup = 1;           ///< untimed passes over all rays before the first repetition
