@@ -309,10 +309,10 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   const double seconds = seconds_left(
       experiment, plan, [&](const std::string& name) { return journal.done().contains(name); },
       [&](const Cell& cell) { return journal.started(cell.name()).size(); });
-  remove_files(folder, present(folder, concluding_files()));
   write_whole(folder / "effective.yaml",
               fmt::format("# configuration hash: {}\n{}{}", hash,
-                          shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)));
+                          shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)),
+              kGoesOn);
   if (!shard.is_whole()) context["shard"] = shard.text();
   const Before before = command.resume ? what_was_before(folder) : Before{};
   if (!before.merged_from.is_null()) context["merged_from"] = before.merged_from;
@@ -321,7 +321,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   std::vector<std::string> changed;
   for (const Json& earlier : record.earlier)
     std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
-  write_whole(folder / kPlanFile, to_text(record));
+  write_whole(folder / kPlanFile, to_text(record), kGoesOn);
+  remove_files(folder, present(folder, concluding_files()));  // not before something could be written
   for (const std::string& line : experiment.left_out) fmt::print(stderr, "{}\n", line);
   fmt::print(stderr, "{}: {} ({} done before), {} skipped{}; about {}\n", experiment.name,
              counted(plan.cells.size(), "cell"), journal.done().size(), plan.skipped.size(),

@@ -300,6 +300,15 @@ class CommandLine(CommandLineCase):
         self.assertIn(f"({len(whole)} done before)", result.stderr)
         self.assertIn("about 0 s", result.stderr)  # nothing is left
 
+    def test_resume_on_a_full_disk_leaves_the_results_there(self):
+        self.assertIn(self.run_small("--out", "out", "--filter", "bvh4").returncode, (0, 1))
+        before = {p.name: p.read_bytes() for p in (self.folder / "out").iterdir()}
+        for size in (10, 2000):  # not even effective.yaml; not the plan
+            result = self.run_small("--out", "out", "--resume", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
+            self.assert_error(result, "cannot be written", "--resume")
+            self.assertEqual((self.folder / "out/results.json").read_bytes(), before["results.json"])
+            self.assertEqual((self.folder / "out/results.csv").read_bytes(), before["results.csv"])
+
     def test_output_that_cannot_be_written(self):
         self.write("file", "")
         self.assert_error(self.run_small("--out", self.folder / "file" / "below"), "output folder")
