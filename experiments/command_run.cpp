@@ -18,6 +18,7 @@
 #include "experiments/estimate.h"
 #include "experiments/folder_lock.h"
 #include "experiments/interleave.h"
+#include "experiments/interrupt.h"
 #include "experiments/machine_info.h"
 #include "experiments/name_filter.h"
 #include "experiments/plan.h"
@@ -329,9 +330,13 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
              shard.is_whole() ? "" : fmt::format(", {} in other shards", plan.in_other_shards),
              format_duration(seconds));
 
-  RunOutcome outcome = run_plan(
-      experiment, plan, registry, journal,
-      {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)}, std::move(loaded));
+  RunOutcome outcome;
+  {
+    const InterruptNote note;
+    outcome = run_plan(
+        experiment, plan, registry, journal,
+        {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)}, std::move(loaded));
+  }
   name_origins(outcome, before.origin);
   outcome.warnings = changed;
   std::ranges::move(run_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),

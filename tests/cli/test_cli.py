@@ -300,6 +300,25 @@ class CommandLine(CommandLineCase):
         self.assertIn(f"({len(whole)} done before)", result.stderr)
         self.assertIn("about 0 s", result.stderr)  # nothing is left
 
+    def test_an_interrupted_run_says_how_it_goes_on(self):
+        words = ("--out", "out", "--benchmark_min_time=0.05")
+        for sent in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(signal=sent):
+                shutil.rmtree(self.folder / "out", ignore_errors=True)
+                process = subprocess.Popen([ARBORETUM, "run", self.config, "--no-plots", *words], cwd=self.folder, stdout=subprocess.DEVNULL,
+                                           stderr=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(sent, signal.SIG_DFL))
+                journal = self.folder / "out" / "repetitions.jsonl"
+                for _ in range(3000):
+                    if journal.exists() and journal.read_bytes().count(b"\n") >= 3:
+                        break
+                    time.sleep(0.01)
+                process.send_signal(sent)
+                error = process.communicate(timeout=60)[1]
+                self.assertEqual(process.returncode, -sent)
+                self.assertEqual(error.splitlines()[-1], "arboretum: interrupted; what was measured is kept, and the same command with --resume goes on from there")
+        result = self.run_small(*words, "--resume")
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+
     def test_resume_on_a_full_disk_leaves_the_results_there(self):
         self.assertIn(self.run_small("--out", "out", "--filter", "bvh4").returncode, (0, 1))
         before = {p.name: p.read_bytes() for p in (self.folder / "out").iterdir()}
