@@ -333,9 +333,9 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   RunOutcome outcome;
   {
     const InterruptNote note;
-    outcome = run_plan(
-        experiment, plan, registry, journal,
-        {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)}, std::move(loaded));
+    outcome = run_plan(experiment, plan, registry, journal,
+                       {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)},
+                       std::move(loaded));
   }
   name_origins(outcome, before.origin);
   outcome.warnings = changed;

@@ -341,13 +341,23 @@ TEST_CASE("lanes by depth, switches and queue lengths: packets, hybrids and queu
   CHECK_FALSE(facts.contains("children_hit"));
 }
 
-TEST_CASE("a packet whose rays go eight ways uses one lane a register, and says so") {
-  const TriangleMesh mesh = sphere(24);
+namespace {
+
+/// From the origin, one into each of the octants.
+std::vector<Ray> into_octants(std::initializer_list<unsigned> octants) {
   std::vector<Ray> rays;
-  for (unsigned octant = 0; octant < 8; ++octant) {
+  for (const unsigned octant : octants) {
     const auto sign = [&](unsigned a) { return octant >> a & 1u ? -1.0f : 1.0f; };
     rays.push_back({{0, 0, 0}, 0, {sign(0), 0.7f * sign(1), 0.4f * sign(2)}, kInfinity});
   }
+  return rays;
+}
+
+}  // namespace
+
+TEST_CASE("a packet whose rays go two ways uses one lane a register, and says so") {
+  const TriangleMesh mesh = sphere(24);
+  const std::vector<Ray> rays = into_octants({1, 6});
   Structures structures(mesh);
   std::size_t seen = 0;
   for (const KernelRow& row : runnable_rows()) {
@@ -361,7 +371,7 @@ TEST_CASE("a packet whose rays go eight ways uses one lane a register, and says 
       } else {
         (void)closest_hit(row, structures.get(row), rays, {}, &c);
       }
-      CHECK(c.depths[0].visits == 8);
+      CHECK(c.depths[0].visits == 2);
       CHECK(c.nodes_shared == 0);
       std::uint64_t lanes = 0, active = 0;
       for (const Counters::Depth& d : c.depths) {
@@ -374,6 +384,33 @@ TEST_CASE("a packet whose rays go eight ways uses one lane a register, and says 
       Json facts;
       add_facts(facts, c, rays.size(), row.traversal);
       CHECK(facts["simd_utilization"].get<double>() < 0.75);
+    }
+    ++seen;
+  }
+  CHECK(seen > 0);
+}
+
+TEST_CASE("a small packet whose rays go eight ways goes as one: the root is visited once, its lanes are full") {
+  const TriangleMesh mesh = sphere(24);
+  const std::vector<Ray> rays = into_octants({0, 1, 2, 3, 4, 5, 6, 7});
+  Structures structures(mesh);
+  std::size_t seen = 0;
+  for (const KernelRow& row : runnable_rows()) {
+    if (row.structure != "bvh8" || row.box != "padded") continue;
+    if (row.traversal != "packet8" && row.traversal != "hybrid16") continue;
+    INFO(name_of(row));
+    const std::uint64_t width = std::min<std::uint64_t>(8, std::uint64_t(native_width(row.isa)));
+    for (bool any : {false, true}) {
+      Counters c;
+      if (any) {
+        (void)any_hit(row, structures.get(row), rays, {}, &c);
+      } else {
+        (void)closest_hit(row, structures.get(row), rays, {}, &c);
+      }
+      CHECK(c.depths[0].visits == 1);
+      if (row.traversal == "packet8" && width == 8) CHECK(c.depths[0].lanes == c.depths[0].lanes_active);
+      CHECK(c.nodes_shared > 0);
+      CHECK(c.interval_tests == 0);
     }
     ++seen;
   }
