@@ -124,7 +124,10 @@ def reproduce(results):
     context = results.context
     parts = []
     revision = context.get("git_revision")
-    lines = [f"git checkout {revision}"] if revision and revision != "unknown" else []
+    several = " | " in str(revision)  # of merged parts
+    lines = [f"git checkout {revision}"] if revision and revision != "unknown" and not several else []
+    if several:
+        parts.append(f"<p>Parts are of several revisions: <code>{escape(revision)}</code>; the rows say which.</p>")
     command = without_resume(context.get("command") or "arboretum run effective.yaml")
     lines.append(f"./{command}" if command.startswith("arboretum ") else command)
     parts.append(f"<pre>{escape(chr(10).join(lines))}</pre>")

@@ -316,8 +316,10 @@ class Drawing(unittest.TestCase):
         style.plt.close(figure)
 
     def test_no_checkout_of_an_unknown_revision(self):
-        for revision, told in (("unknown", False), ("", False), ("abc", True)):
-            self.assertEqual("git checkout" in report.reproduce(load(Folder(whole(), {"git_revision": revision}).path)), told)
+        for revision, told in (("unknown", False), ("", False), ("abc", True), ("abc | def", False)):
+            page = report.reproduce(load(Folder(whole(), {"git_revision": revision}).path))
+            self.assertEqual("git checkout" in page, told)
+            self.assertEqual("of several revisions: <code>abc | def</code>" in page, "|" in revision)
 
     def test_what_is_repeated_is_measured_anew(self):
         for command, shown in (("arboretum run a.yaml --resume --filter 'a|b'", "./arboretum run a.yaml --filter &#x27;a|b&#x27;"),
