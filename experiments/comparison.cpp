@@ -77,8 +77,9 @@ class Comparer {
   /// Why the two do not compare although their names are equal; empty where they do.
   static std::string other_work(const CellResult& a, const CellResult& b, const std::set<std::string>& other_scenes) {
     if (other_scenes.contains(a.cell.scene))
-      return fmt::format("measured with different scenes called {} (geometry, camera, lights or materials)",
-                         a.cell.scene);
+      return fmt::format(
+          "measured with different scenes called {} (geometry, camera, shutter, lights, materials or images)",
+          a.cell.scene);
     for (const char* fact : {"triangles", "rays"}) {
       if (a.fact(fact) != b.fact(fact))
         return fmt::format("{:.0f} {} in A, {:.0f} in B", a.fact(fact), fact, b.fact(fact));

@@ -42,16 +42,14 @@ constexpr Parameter<S> kTraversalTable[] = {
     {.name = "rays_in_flight", .member = &S::rays_in_flight, .limits = {1, S::kMostInFlight}},
 };
 
+constexpr std::size_t kBuilderMembers = 16, kTraversalMembers = 2;
 /// The compiler refuses these where a struct has another number of members.
-[[maybe_unused]] constexpr std::size_t members_of(const B& parameters) {
+[[maybe_unused]] void bind_all(const B& parameters) {
   [[maybe_unused]] const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = parameters;
-  return 16;
 }
-[[maybe_unused]] constexpr std::size_t members_of(const S& settings) {
-  [[maybe_unused]] const auto& [a, b] = settings;
-  return 2;
-}
-static_assert(std::size(kBuilderTable) == 16 && std::size(kTraversalTable) == 2, "each member has a row");
+[[maybe_unused]] void bind_all(const S& settings) { [[maybe_unused]] const auto& [a, b] = settings; }
+static_assert(std::size(kBuilderTable) == kBuilderMembers && std::size(kTraversalTable) == kTraversalMembers,
+              "each member has a row");
 static_assert(B::kOwn == S::kOwn);
 
 template <class T>

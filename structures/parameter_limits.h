@@ -35,7 +35,8 @@ struct Parameter {
   bool has_own = std::is_same_v<Set, TraversalSettings>;  ///< kOwn is a value, too, and the default
 };
 
-/// In the order of the members. A new one needs a row here and no other edit, but for the documents.
+/// In the order of the members. A new member needs a row in parameter_limits.cpp, which does not compile without, and
+/// whoever reads it has to say so (parameters_read.h; of a way of traversal concerns() in experiments/parameters.cpp).
 [[nodiscard]] std::span<const Parameter<BuilderParameters>> builder_parameter_table() noexcept;
 [[nodiscard]] std::span<const Parameter<TraversalSettings>> traversal_setting_table() noexcept;
 

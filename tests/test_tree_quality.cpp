@@ -62,7 +62,7 @@ TEST_CASE("no leaf names a triangle twice or is larger than it may be, whatever 
     void leaf(const LeafView& leaf) override {
       std::vector<std::uint32_t> ids(leaf.primitives.begin(), leaf.primitives.end());
       std::ranges::sort(ids);
-      repeated += std::size_t(std::ranges::unique(ids).size());
+      repeated += std::size_t(ids.end() - std::unique(ids.begin(), ids.end()));
       most_blocks = std::max(most_blocks, leaf.blocks);
       references += leaf.primitives.size();
     }

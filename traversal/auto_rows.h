@@ -109,19 +109,19 @@ struct AutoFunctions {
     const float near = Family::kForNearRays ? kNear * spread(&rays[0], rays.size(), 64, &Ray::origin).extent : 0.0f;
     Way kind = Way::any;
     std::size_t others = 0, change = 0;  // tiles of the other kind, one after the other, and where they begin
-    std::size_t alike = 0;               // tiles of `kind`, one after the other
+    std::size_t alike = 0, last = 0;     // tiles of `kind`, one after the other, and the last of them
     for (std::size_t at = 0; at < rays.size(); at += kTile) {
       const Way now = way(&rays[at], std::min(kTile, rays.size() - at), cone, near);
       if (now == Way::any) continue;  // goes as the tiles beside it do
       if (kind == Way::any) kind = now;
       if (now == kind) {
-        others = 0;
+        others = 0, last = at;
         // Then one tile in kSwitch is looked at: a change of so many tiles is seen all the same.
         if (++alike >= kSwitch) at += (kSwitch - 1) * kTile;
         continue;
       }
       if (others == 0 && alike >= kSwitch) {  // those that were passed over
-        at -= std::min(at, kSwitch * kTile), alike = 0;
+        at = last, alike = 0;
         continue;
       }
       alike = 0;

@@ -40,6 +40,7 @@ struct PacketBatch {
     typename Family::template Packets<W, Leaves, AnyHit, Counting> packet(
         static_cast<const typename Family::Structure&>(accel), row, Counting(counters));
     if constexpr (Counting::kCounting) packet.set_width(unsigned(register_lanes<Family>(rays_each)));
+    if constexpr (requires { packet.set_size(rays_each); }) packet.set_size(rays_each);
     for (std::size_t begin = 0; begin < rays.size(); begin += std::size_t(rays_each)) {
       const std::size_t count = std::min(std::size_t(rays_each), rays.size() - begin);
       packet.trace(rays.part(begin, count), threshold);

@@ -79,9 +79,9 @@ class Converter {
       const std::size_t first = lists_.ids.size();
       lists_.ids.insert(lists_.ids.end(), begin, begin + tree_.nodes[node].count);
       // Where leaves were merged a triangle may come from several of them.
-      const auto own = std::ranges::subrange(lists_.ids.begin() + std::ptrdiff_t(first), lists_.ids.end());
-      std::ranges::sort(own);
-      lists_.ids.erase(std::ranges::unique(own).begin(), lists_.ids.end());
+      const auto own = lists_.ids.begin() + std::ptrdiff_t(first);
+      std::sort(own, lists_.ids.end());
+      lists_.ids.erase(std::unique(own, lists_.ids.end()), lists_.ids.end());
       const auto count = std::uint32_t(lists_.ids.size() - first);
       const std::uint32_t blocks = (count + costs_.block_width - 1) / costs_.block_width;
       sah_cost_ += region.area() * double(costs_.intersection_cost) * blocks;

@@ -1,11 +1,13 @@
 // Packets: up to 64 rays go through a wide BVH together, with masks of those that are still in it.
 //
-// Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant, but a small one
-// of many octants goes as one, each lane with its own near planes, without the interval test. A node's N
+// Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant. A node's N
 // children are first tested at once against an interval that holds all rays of the packet, then each that is left
 // against the rays, W at a time, with the very arithmetic of single rays. Children go on the stack with the mask of
 // their rays, nearest on top by the interval's entry. Where no more than `threshold` rays are in a node they go on
 // alone, with all N children in lanes, and the packet with what is left on its stack.
+//
+// A small packet of many octants goes as one (`mix`): each lane with its own near planes, without the interval test;
+// children then go on the stack by the first of their rays' entries.
 //
 // The interval test. With r = 1/d and o within the packet's bounds a plane b is met at (b - o) r, whose ends over the
 // packet are products of ends. What a ray's own test computes is off it by less than 2^-20 (M + |o|)|r|
@@ -37,6 +39,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       : Base(row, leaves_of<Leaves>(tree, row), counting), base_(tree.base()), root_(tree.root()),
         max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"), stack_(tree.stack_entries()),
         single_stack_(tree.stack_entries()) {}
+
+  /// Of packets of so many rays, the last of a batch fewer.
+  void set_size(int rays_each) { may_mix_ = rays_each <= kMostMixed; }
 
   /// Traces `rays`, 1 to kMost; their hits are then in best().
   void trace(const RayBatch& rays, int threshold) {
@@ -85,9 +90,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   /// Traces the rays as one where that is better than octant by octant; else returns false.
   ARBORETUM_INLINE bool mix(int count) {
     if constexpr (Leaves::kRaysInLanes) {
-      return false;  // packets of 32 and 64 rays
+      return false;  // those are packets of 32 and 64 rays
     } else {
-      if (count > kMostMixed || lanes_.valid == 0) return false;
+      if (!may_mix_ || lanes_.valid == 0) return false;
       int octants = 0;
       Base::by_octant([&](Mask, unsigned) { ++octants; });
       if (octants < (count > 4 ? kMixedOfMore : kMixedOfFour)) return false;
@@ -374,7 +379,8 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     alignas(64) float of_ray[kMost];
     float first, last;
     void load(const RayBatch& rays) {
-      for (std::size_t i = 0; i < std::size_t(kMost); ++i)
+      // A register may be wider than the rays are many.
+      for (std::size_t i = 0; i < ((rays.size() + 15) & ~std::size_t{15}); ++i)
         of_ray[i] = within_frames(i < rays.size() ? rays.time(i) : 0.0f);
     }
   };
@@ -387,6 +393,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   const bvh::NodeReference root_;
   const float max_coordinate_;
   const bool padded_;
+  bool may_mix_ = false;
   [[no_unique_address]] std::conditional_t<kMoves, Times, Nothing> times_;
   BatchStack<Entry, 512> stack_;
   TraversalStack single_stack_;
