@@ -490,7 +490,7 @@ TEST_CASE("damaged bytes in any format end in an error or a usable scene, never 
       if (n % 3 == 2)
         for (int i = 0; i < 6; ++i) damaged[random(damaged.size())] = char(random(256));
       INFO(name << " case " << n);
-      errors += !error_of([&] {
+      errors += !error_of([&, &name = name] {
                    const Scene scene = load_file(folder.write(name, damaged));
                    REQUIRE(scene.mesh.size() > 0);
                    for (const Triangle& t : scene.mesh.triangles)
