@@ -109,6 +109,17 @@ class Structures {
   return any_hit(row, accel, rays, TraversalSettings{}, counters);
 }
 
+/// What the counting kernel of the one or the other query counts.
+[[nodiscard]] inline Counters counted(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, bool any) {
+  Counters counters;
+  if (any) {
+    (void)any_hit(row, accel, rays, &counters);
+  } else {
+    (void)closest_hit(row, accel, rays, &counters);
+  }
+  return counters;
+}
+
 /// What rows of the table answer to the same rays, each asked once however many others are held against it.
 class Answers {
  public:

@@ -365,12 +365,7 @@ TEST_CASE("a packet whose rays go two ways uses one lane a register, and says so
     INFO(name_of(row));
     const std::uint64_t width = std::min<std::uint64_t>(8, std::uint64_t(native_width(row.isa)));
     for (bool any : {false, true}) {
-      Counters c;
-      if (any) {
-        (void)any_hit(row, structures.get(row), rays, {}, &c);
-      } else {
-        (void)closest_hit(row, structures.get(row), rays, {}, &c);
-      }
+      const Counters c = counted(row, structures.get(row), rays, any);
       CHECK(c.depths[0].visits == 2);
       CHECK(c.nodes_shared == 0);
       std::uint64_t lanes = 0, active = 0;
@@ -401,12 +396,7 @@ TEST_CASE("a small packet whose rays go eight ways goes as one: the root is visi
     INFO(name_of(row));
     const std::uint64_t width = std::min<std::uint64_t>(8, std::uint64_t(native_width(row.isa)));
     for (bool any : {false, true}) {
-      Counters c;
-      if (any) {
-        (void)any_hit(row, structures.get(row), rays, {}, &c);
-      } else {
-        (void)closest_hit(row, structures.get(row), rays, {}, &c);
-      }
+      const Counters c = counted(row, structures.get(row), rays, any);
       CHECK(c.depths[0].visits == 1);
       if (row.traversal == "packet8" && width == 8) CHECK(c.depths[0].lanes == c.depths[0].lanes_active);
       CHECK(c.nodes_shared > 0);
@@ -532,12 +522,7 @@ TEST_CASE("streams and the kd-tree follow their depth too") {
     } shown;
     REQUIRE(accel.visit(shown));
     for (bool any : {false, true}) {
-      Counters c;
-      if (any) {
-        (void)any_hit(row, accel, rays, {}, &c);
-      } else {
-        (void)closest_hit(row, accel, rays, {}, &c);
-      }
+      const Counters c = counted(row, accel, rays, any);
       REQUIRE(!c.depths.empty());
       CHECK(c.depths.size() <= shown.nodes.size());
       CHECK(c.depths[0].visits <= rays.size());  // the root, once a ray at most

@@ -75,16 +75,11 @@ class Converter {
       // the code comes later
       nodes_[slot] = {{std::bit_cast<float>(std::uint32_t(lists_.begin.size())), 0.0f}, Node::kLeaf};
       lists_.begin.push_back(std::uint32_t(lists_.ids.size()));
-      const auto begin = tree_.primitives.begin() + tree_.begin_of(node);
-      const std::size_t first = lists_.ids.size();
-      lists_.ids.insert(lists_.ids.end(), begin, begin + tree_.nodes[node].count);
-      // Where leaves were merged a triangle may come from several of them.
-      const auto own = lists_.ids.begin() + std::ptrdiff_t(first);
-      std::sort(own, lists_.ids.end());
-      lists_.ids.erase(std::unique(own, lists_.ids.end()), lists_.ids.end());
-      const auto count = std::uint32_t(lists_.ids.size() - first);
-      const std::uint32_t blocks = (count + costs_.block_width - 1) / costs_.block_width;
-      sah_cost_ += region.area() * double(costs_.intersection_cost) * blocks;
+      LeafPrimitives room;
+      const std::span<const std::uint32_t> ids =
+          distinct({tree_.primitives.data() + tree_.begin_of(node), tree_.nodes[node].count}, room);
+      lists_.ids.insert(lists_.ids.end(), ids.begin(), ids.end());
+      sah_cost_ += region.area() * double(costs_.intersection_cost) * collapse_.blocks(node);
       return;
     }
     count_node();

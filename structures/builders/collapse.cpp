@@ -19,14 +19,13 @@ namespace arboretum {
 namespace {
 constexpr std::uint32_t kTooMany = 1000;  // references, more than a leaf holds
 
-/// The references without repetitions, sorted, in `room`.
+}  // namespace
+
 std::span<const std::uint32_t> distinct(std::span<const std::uint32_t> references, LeafPrimitives& room) noexcept {
   const auto end = std::copy(references.begin(), references.end(), room.begin());
   std::sort(room.begin(), end);
   return {room.data(), std::size_t(std::unique(room.begin(), end) - room.begin())};
 }
-
-}  // namespace
 
 /// cost[k - 1]: least cost of the subtree in at most k slots of its parent; infinite above `slots`, and so is what
 /// stands before it.

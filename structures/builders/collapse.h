@@ -32,6 +32,9 @@ struct CollapseSettings {
 
 /// Room for the primitives of a leaf that is merged from a subtree.
 using LeafPrimitives = std::array<std::uint32_t, kMaxMergedReferences>;
+/// At most kMaxMergedReferences of them without repetitions, sorted, in `room`.
+[[nodiscard]] std::span<const std::uint32_t> distinct(std::span<const std::uint32_t> references,
+                                                      LeafPrimitives& room) noexcept;
 
 /// The wide children of a binary node, at most kMaxBranching, and where the references of each begin.
 struct Slots {
