@@ -12,6 +12,7 @@
 
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
+#include "experiments/earlier_run.h"
 #include "experiments/conclusion.h"
 #include "experiments/config_plots.h"
 #include "experiments/effective.h"
@@ -122,71 +123,6 @@ void refuse_other_configuration(const std::filesystem::path& folder, const std::
                   folder.string()));
 }
 
-/// A shard's folder takes no other shard: its results.json would lose what is there. The whole plan may go on from a
-/// shard.
-void refuse_other_shard(const std::filesystem::path& folder, const Shard& shard) {
-  const std::optional<PlanRecord> before = read_plan_record(folder);
-  if (!before || shard.is_whole() || before->shard == shard) return;
-  throw UserError(fmt::format(
-      "{}: holds {}, this is shard {}; choose another folder with --out, then `merge` them", folder.string(),
-      before->shard.is_whole() ? "results of the whole plan" : "shard " + before->shard.text(), shard.text()));
-}
-
-/// Adds what the folder says of scenes that are not loaded now.
-void take_up_scenes(const std::filesystem::path& folder, Json& scenes) {
-  const std::optional<PlanRecord> before = read_plan_record(folder);
-  if (!before) return;
-  const Json earlier = before->context.value("scenes", Json::object());
-  for (const auto& [name, report] : earlier.items())
-    if (!scenes.contains(name)) scenes[name] = report;
-}
-
-/// What was measured of a scene stays beside what will be: both must be of the same triangles. Takes up what the folder
-/// says of scenes that are not measured now. Folders of older revisions say nothing.
-void refuse_other_geometry(const std::filesystem::path& folder, const Experiment& experiment,
-                           std::map<std::string, std::string>& geometry) {
-  const std::optional<PlanRecord> before = read_plan_record(folder);
-  if (!before) return;
-  for (const SceneChoice& scene : experiment.scenes) {
-    const auto then = before->geometry.find(scene.name);
-    const auto now = geometry.find(scene.name);
-    if (then == before->geometry.end() || now == geometry.end() || then->second == now->second) continue;
-    throw UserError(
-        fmt::format("{}: scene {} is not what {} was measured with (geometry, camera, shutter, lights, materials or "
-                    "images: hash {}, then {}); put "
-                    "its files back as they were, or choose another folder with --out",
-                    scene.where, scene.name, folder.string(), now->second, then->second));
-  }
-  geometry.insert(before->geometry.begin(), before->geometry.end());
-}
-
-/// The contexts of a run that is gone on with, one for each of its conditions that are not those of now.
-std::vector<Json> other_contexts(const std::filesystem::path& folder, const Json& now) {
-  const std::optional<PlanRecord> before = read_plan_record(folder);
-  if (!before) return {};
-  std::vector<Json> all = before->earlier, others;
-  all.push_back(before->context);
-  for (const Json& context : all) {
-    const auto same = [&](const Json& other) { return differing_conditions(context, other).empty(); };
-    if (!same(now) && std::ranges::none_of(others, same)) others.push_back(context);
-  }
-  return others;
-}
-
-/// What those who measured before said of themselves and no longer can: the parts that were merged, and, in results of
-/// older revisions, whose repetitions do not say it, the one machine and revision.
-struct Before {
-  Json merged_from;
-  Origin origin;
-};
-
-Before what_was_before(const std::filesystem::path& folder) {
-  const std::optional<PlanRecord> record = read_plan_record(folder);
-  if (!record) return {};
-  return {.merged_from = record->context.value("merged_from", Json()),
-          .origin = record->earlier.empty() ? origin_of(record->context) : Origin{}};
-}
-
 void name_origins(RunOutcome& outcome, const Origin& before) {
   for (CellResult& result : outcome.results)
     for (Repetition& repetition : result.repetitions)
@@ -271,14 +207,18 @@ void add_custom_context(Json& context, const BenchmarkFlags& flags) {
   }
 }
 
-/// Names of the cells that the folder holds; none where there is none.
-std::set<std::string> done_before(const Experiment& experiment, const Shard& shard, const RunCommand& command) {
+/// Names of the plan's cells that the folder holds; none where there is none. Refuses what the run would.
+std::set<std::string> done_before(const Experiment& experiment, const Plan& plan, const Shard& shard,
+                                  const RunCommand& command) {
   const std::filesystem::path folder = command.out.empty() ? default_folder(experiment, shard) : command.out;
   std::error_code ignored;
   if (!std::filesystem::exists(folder / "cells.jsonl", ignored)) return {};
   refuse_other_configuration(folder, configuration_hash(experiment));
-  std::set<std::string> names;
-  for (const CellResult& cell : read_result_folder(folder).cells) names.insert(cell.cell.name());
+  EarlierRun(folder).refuse_other_shard(shard);
+  std::set<std::string> held, names;
+  for (const CellResult& cell : read_result_folder(folder).cells) held.insert(cell.cell.name());
+  for (const Cell& cell : plan.cells)
+    if (held.contains(cell.name())) names.insert(cell.name());
   return names;
 }
 
@@ -297,11 +237,11 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   require_structure_cache(experiment);
   make_output_folder(folder);
   const FolderLock lock(folder, "give another --out");
-  if (command.resume) {
-    refuse_other_configuration(folder, hash), refuse_other_shard(folder, shard);
-    refuse_other_geometry(folder, experiment, record.geometry);
-    take_up_scenes(folder, scenes);
-  }
+  if (command.resume) refuse_other_configuration(folder, hash);
+  const EarlierRun before = command.resume ? EarlierRun(folder) : EarlierRun();
+  before.refuse_other_shard(shard);
+  before.refuse_other_geometry(experiment, record.geometry);
+  before.take_up_scenes(scenes);
   context["scenes"] = scenes;
   if (!command.benchmark.out.empty()) require_writable(command.benchmark.out);
   if (!command.resume) set_aside(folder);
@@ -315,10 +255,9 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
                           shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)),
               kGoesOn);
   if (!shard.is_whole()) context["shard"] = shard.text();
-  const Before before = command.resume ? what_was_before(folder) : Before{};
-  if (!before.merged_from.is_null()) context["merged_from"] = before.merged_from;
+  if (const Json parts = before.merged_from(); !parts.is_null()) context["merged_from"] = parts;
   record.context = context;
-  if (command.resume) record.earlier = other_contexts(folder, context);
+  record.earlier = before.other_contexts(context);
   std::vector<std::string> changed;
   for (const Json& earlier : record.earlier)
     std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
@@ -337,7 +276,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
                        {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)},
                        std::move(loaded));
   }
-  name_origins(outcome, before.origin);
+  name_origins(outcome, before.origin());
   outcome.warnings = changed;
   std::ranges::move(run_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
                     std::back_inserter(outcome.warnings));
@@ -394,7 +333,7 @@ ExitStatus command_run(RunCommand command) {
   if (command.list || command.benchmark.list) return print_list(experiment, plan);
   if (command.dry_run)
     return print_dry_run(experiment, plan,
-                         command.resume ? done_before(experiment, shard, command) : std::set<std::string>());
+                         command.resume ? done_before(experiment, plan, shard, command) : std::set<std::string>());
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
     flush_output();

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "experiments/axes.h"
 #include "experiments/name_filter.h"
+#include "experiments/plan_record.h"
 #include "experiments/ratio_bootstrap.h"
 #include "experiments/results_writer.h"
 
@@ -77,9 +78,7 @@ class Comparer {
   /// Why the two do not compare although their names are equal; empty where they do.
   static std::string other_work(const CellResult& a, const CellResult& b, const std::set<std::string>& other_scenes) {
     if (other_scenes.contains(a.cell.scene))
-      return fmt::format(
-          "measured with different scenes called {} (geometry, camera, shutter, lights, materials or images)",
-          a.cell.scene);
+      return fmt::format("measured with different scenes called {} ({})", a.cell.scene, kHeldByGeometry);
     for (const char* fact : {"triangles", "rays"}) {
       if (a.fact(fact) != b.fact(fact))
         return fmt::format("{:.0f} {} in A, {:.0f} in B", a.fact(fact), fact, b.fact(fact));

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "experiments/plan_record.h"
 #include "experiments/results_writer.h"
 #include "experiments/scene_data.h"
 #include "experiments/shell_words.h"
@@ -107,10 +108,9 @@ void refuse_different_geometry(const std::vector<ResultFolder>& parts) {
       const auto& [first, of_first] = known.try_emplace(scene, &part, hash).first->second;
       if (hash == of_first) continue;
       throw UserError(
-          fmt::format("{} and {} were measured with different scenes called {} (geometry, camera, shutter, lights, "
-                      "materials or images: hashes {} "
-                      "and {}); measure one of them anew",
-                      first->path.string(), part.path.string(), scene, of_first, hash));
+          fmt::format("{} and {} were measured with different scenes called {} ({}: hashes {} and {}); measure one of "
+                      "them anew",
+                      first->path.string(), part.path.string(), scene, kHeldByGeometry, of_first, hash));
     }
   }
 }

@@ -33,6 +33,8 @@ struct PlanRecord {
 };
 
 inline constexpr const char* kPlanFile = "plan.json";
+/// What a scene's hash in PlanRecord::geometry tells apart, in words.
+inline constexpr const char* kHeldByGeometry = "geometry, camera, shutter, lights, materials or images";
 
 /// `plan` is whole: not yet one shard alone.
 [[nodiscard]] PlanRecord record_of(const Plan& plan, const std::map<std::string, unsigned>& shards, const Shard& shard);

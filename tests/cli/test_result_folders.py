@@ -160,6 +160,9 @@ class ResultFolders(CommandLineCase):
         self.assertIn("about 0 s", dry)  # what is left
         self.assertIn(f"{len(first)} cells done before", dry)
         self.assertNotIn("done before", self.run_small(*FEW, "--dry-run").stdout)
+        # Of the plan that is shown, and refused where the run would be
+        self.assertNotIn("done before", self.run_small(*FEW, "--resume", "--dry-run", "--filter", "bvh2").stdout)
+        self.assert_error(self.run_small(*FEW, "--resume", "--dry-run", "--shard", "1/2", "--out", "results/small"), "results of the whole plan")
         self.assert_error(self.run_small("--repetitions", "2", "--resume", "--dry-run"), "another configuration")
         again = self.run_small(*FEW, "--resume", "--filter", "bvh2/.*/sse/")
         self.assertIn(f"({len(first)} done before)", again.stderr)
