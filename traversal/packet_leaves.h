@@ -31,28 +31,29 @@ class PacketLeaves {
 
   /// Traces `rays`, 1 to kMost; their hits are then in best(). `prepare(count, ray_at, each)` hands these to the
   /// prepare() of lanes_; `traverse(mask, octant)` is called for the valid rays of each octant that has some, unless
-  /// all() has traced all valid rays and returns true. Where no more than `threshold` rays are in a node they may go on
-  /// alone.
-  template <class Prepare, class Traverse, class All>
+  /// `together(octants)`, of how many octants they are, has traced them all and returns true. Where no more than
+  /// `threshold` rays are in a node they may go on alone.
+  template <class Prepare, class Traverse, class Together>
   ARBORETUM_INLINE void trace(const RayBatch& rays, int threshold, const Prepare& prepare, const Traverse& traverse,
-                              const All& all) {
+                              const Together& together) {
     threshold_ = threshold;
     if constexpr (Counting::kCounting) ++counting_.counters.packets;
     load(rays, prepare);
-    if (!all()) by_octant(traverse);
+    Mask masks[8];
+    unsigned octants = 0, octant_of[8];
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      Mask mask = lanes_.valid;
+      for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? lanes_.negative[a] : ~lanes_.negative[a];
+      masks[octants] = mask, octant_of[octants] = octant;
+      octants += mask != 0;
+    }
+    if (!together(octants))
+      for (unsigned i = 0; i < octants; ++i) traverse(masks[i], octant_of[i]);
     finish();
   }
   template <class Prepare, class Traverse>
   ARBORETUM_INLINE void trace(const RayBatch& rays, int threshold, const Prepare& prepare, const Traverse& traverse) {
-    trace(rays, threshold, prepare, traverse, [] { return false; });
-  }
-  template <class Traverse>
-  ARBORETUM_INLINE void by_octant(const Traverse& traverse) const {
-    for (unsigned octant = 0; octant < 8; ++octant) {
-      Mask mask = lanes_.valid;
-      for (unsigned a = 0; a < 3; ++a) mask &= (octant >> a & 1u) ? lanes_.negative[a] : ~lanes_.negative[a];
-      if (mask != 0) traverse(mask, octant);
-    }
+    trace(rays, threshold, prepare, traverse, [](unsigned) { return false; });
   }
 
   /// Where lanes are counted: those of a register of the timed kernel, which the counting one may have more of.

@@ -51,7 +51,8 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
           lanes_.template prepare<W, N>(count, ray_at, padded_, BoxPad{max_coordinate_}, each);
           if constexpr (kMoves) times_.load(rays);
         },
-        [&](Mask mask, unsigned) { traverse<false>(mask); }, [&] { return mix(int(rays.size())); });
+        [&](Mask mask, unsigned) { traverse<false>(mask); },
+        [&](unsigned octants) { return mix(octants, rays.size()); });
   }
 
  private:
@@ -85,17 +86,16 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
 
   /// Packets of no more rays go through the tree as one where these are of so many octants or more: of four rays, of
   /// more (docs/performance/packets.md).
-  static constexpr int kMostMixed = 16, kMixedOfFour = 3, kMixedOfMore = 4;
+  static constexpr int kMostMixed = 16;
+  static constexpr unsigned kMixedOfFour = 3, kMixedOfMore = 4;
 
-  /// Traces the rays as one where that is better than octant by octant; else returns false.
-  ARBORETUM_INLINE bool mix(int count) {
+  /// Traces the rays, which are of so many octants, as one where that is better than octant by octant; else returns
+  /// false.
+  ARBORETUM_INLINE bool mix(unsigned octants, std::size_t count) {
     if constexpr (Leaves::kRaysInLanes) {
       return false;  // those are packets of 32 and 64 rays
     } else {
-      if (!may_mix_ || lanes_.valid == 0) return false;
-      int octants = 0;
-      Base::by_octant([&](Mask, unsigned) { ++octants; });
-      if (octants < (count > 4 ? kMixedOfMore : kMixedOfFour)) return false;
+      if (!may_mix_ || octants < (count > 4 ? kMixedOfMore : kMixedOfFour)) return false;
       for (int k = 0; k < chunks_ * W; k += W) {
         for (int a = 0; a < 3; ++a) {
           const vm<W> negative = sign_bits(F::load(lanes_.r[a] + k)) < vi<W>(0);
