@@ -109,6 +109,17 @@ class Structures {
   return any_hit(row, accel, rays, TraversalSettings{}, counters);
 }
 
+/// The best ISA that runs here and that this build has kernels for (ARBORETUM_ISAS may leave some out).
+[[nodiscard]] inline Isa tested_isa() {
+  static const Isa best = [] {
+    Isa found = Isa::scalar;
+    for (const KernelRow& row : kernel_table())
+      if (is_available(row.isa)) found = std::max(found, row.isa);
+    return found;
+  }();
+  return best;
+}
+
 /// What the counting kernel of the one or the other query counts.
 [[nodiscard]] inline Counters counted(const KernelRow& row, const Accel& accel, std::span<const Ray> rays, bool any) {
   Counters counters;

@@ -23,17 +23,6 @@
 
 namespace arboretum::test {
 
-/// The best ISA that runs here and that this build has kernels for (ARBORETUM_ISAS may leave some out).
-[[nodiscard]] inline Isa tested_isa() {
-  static const Isa best = [] {
-    Isa found = Isa::scalar;
-    for (const KernelRow& row : kernel_table())
-      if (is_available(row.isa)) found = std::max(found, row.isa);
-    return found;
-  }();
-  return best;
-}
-
 /// A structure with one of its builders, and the rows of the kernel table that trace it.
 struct Combination {
   const StructureEntry* entry = nullptr;

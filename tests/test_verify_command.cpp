@@ -13,6 +13,7 @@
 #include "tests/catch.h"
 #include "tests/folder.h"
 #include "tests/small_meshes.h"
+#include "tests/kernel_runner.h"
 #include "traversal/kernel_table.h"
 
 using namespace arboretum;
@@ -49,12 +50,7 @@ Outcome verify(const VerifyCommand& command, const Registry* registry = nullptr)
   return outcome;
 }
 
-std::string any_isa() {
-  // ARBORETUM_ISAS may leave some out of the build.
-  for (const KernelRow& row : kernel_table())
-    if (is_available(row.isa) && row.structure == "bvh8") return std::string(to_string(row.isa));
-  return "scalar";
-}
+std::string any_isa() { return std::string(to_string(tested_isa())); }
 
 }  // namespace
 
