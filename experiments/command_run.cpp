@@ -123,12 +123,6 @@ void refuse_other_configuration(const std::filesystem::path& folder, const std::
                   folder.string()));
 }
 
-void name_origins(RunOutcome& outcome, const Origin& before) {
-  for (CellResult& result : outcome.results)
-    for (Repetition& repetition : result.repetitions)
-      if (repetition.origin.empty()) repetition.origin = before;
-}
-
 std::filesystem::path default_folder(const Experiment& experiment, const Shard& shard) {
   const std::string part = shard.is_whole() ? "" : fmt::format("-shard-{}-of-{}", shard.index, shard.of);
   return std::filesystem::path("results") / (experiment.name + part);
@@ -276,7 +270,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
                        {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)},
                        std::move(loaded));
   }
-  name_origins(outcome, before.origin());
+  name_origins(outcome.results, before.origin());
   outcome.warnings = changed;
   std::ranges::move(run_warnings(outcome, plan, std::max(1u, std::thread::hardware_concurrency())),
                     std::back_inserter(outcome.warnings));

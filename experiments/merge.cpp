@@ -177,12 +177,9 @@ Json merged_context(const std::vector<ResultFolder>& parts, const std::string& c
 }
 
 /// In a cell's line too each repetition says where it is from.
-void name_origins(Json& line, const CellResult& cell) {
-  for (std::size_t i = 0; i < cell.repetitions.size(); ++i) {
-    const Origin& origin = cell.repetitions[i].origin;
-    if (!origin.empty())
-      line["repetitions"][i]["cpu"] = origin.cpu, line["repetitions"][i]["git_revision"] = origin.git_revision;
-  }
+void add_origins(Json& line, const CellResult& cell) {
+  for (std::size_t i = 0; i < cell.repetitions.size(); ++i)
+    add_origin(line["repetitions"][i], cell.repetitions[i].origin);
 }
 
 /// The plan of the whole in the making: the union of the parts' plans, and what the parts say of its cells.
@@ -291,7 +288,7 @@ Merged merge_folders(const std::vector<ResultFolder>& parts, const MergeOptions&
     for (std::size_t i = 0; i < merged.lines.size(); ++i) {
       const std::size_t part = owners.at(merged.outcome.results[i].cell.name());
       merged.outcome.results[i].facts["part"] = part, merged.lines[i]["part"] = part;
-      name_origins(merged.lines[i], merged.outcome.results[i]);
+      add_origins(merged.lines[i], merged.outcome.results[i]);
     }
   }
   Plan measured{

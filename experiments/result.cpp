@@ -46,8 +46,7 @@ Json measured_fields(const Repetition& repetition) {
   json["wall_seconds"] = repetition.wall_seconds;
   json["cpu_seconds"] = repetition.cpu_seconds;
   if (repetition.refit_seconds > 0.0) json["refit_wall_seconds"] = repetition.refit_seconds;
-  if (!repetition.origin.empty())
-    json["cpu"] = repetition.origin.cpu, json["git_revision"] = repetition.origin.git_revision;
+  add_origin(json, repetition.origin);
   if (!repetition.phases.empty()) {
     Json& phases = json["phase_seconds"] = Json::object();
     for (const auto& [name, seconds] : repetition.phases) phases[name] = seconds;
@@ -62,7 +61,7 @@ Repetition parse_measured_fields(const Json& json) {
   repetition.wall_seconds = json.at("wall_seconds").get<double>();
   repetition.cpu_seconds = json.at("cpu_seconds").get<double>();
   repetition.refit_seconds = json.value("refit_wall_seconds", 0.0);
-  repetition.origin = {json.value("cpu", ""), json.value("git_revision", "")};
+  repetition.origin = read_origin(json);
   if (const auto phases = json.find("phase_seconds"); phases != json.end()) {
     for (const auto& [name, seconds] : phases->items()) repetition.phases.emplace_back(name, seconds.get<double>());
   }
@@ -70,6 +69,18 @@ Repetition parse_measured_fields(const Json& json) {
 }
 
 }  // namespace
+
+void add_origin(Json& json, const Origin& origin) {
+  if (!origin.empty()) json["cpu"] = origin.cpu, json["git_revision"] = origin.git_revision;
+}
+
+Origin read_origin(const Json& json) { return {json.value("cpu", ""), json.value("git_revision", "")}; }
+
+void name_origins(std::vector<CellResult>& results, const Origin& origin) {
+  for (CellResult& result : results)
+    for (Repetition& repetition : result.repetitions)
+      if (repetition.origin.empty()) repetition.origin = origin;
+}
 
 std::vector<double> CellResult::rates(bool cpu) const {
   std::vector<double> values;

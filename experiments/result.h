@@ -26,6 +26,9 @@ struct Origin {
   [[nodiscard]] bool empty() const noexcept { return cpu.empty() && git_revision.empty(); }
   friend auto operator<=>(const Origin&, const Origin&) = default;
 };
+/// As `cpu` and `git_revision` of a JSON object: none where it is empty, empty where they are none.
+void add_origin(Json& json, const Origin& origin);
+[[nodiscard]] Origin read_origin(const Json& json);
 
 /// One timed repetition: `iterations` passes over all rays, or that many builds.
 struct Repetition {
@@ -52,6 +55,9 @@ struct CellResult {
   [[nodiscard]] double fact(const char* name, double otherwise = 0.0) const;
   [[nodiscard]] bool has_fact(const char* name) const { return facts.contains(name); }
 };
+
+/// Repetitions that do not say where they are from are of `origin`.
+void name_origins(std::vector<CellResult>& results, const Origin& origin);
 
 void add_facts(Json& facts, const StructureStatistics& statistics);
 /// `counters` of the counting pass over `rays` rays of a cell; those that were traced more than once (`exclusion`)

@@ -73,7 +73,7 @@ Repetition repetition_of(const Json& entry) {
   const double scale = 1e-3 * static_cast<double>(r.iterations);
   r.wall_seconds = entry.at("real_time").get<double>() * scale;
   r.cpu_seconds = entry.at("cpu_time").get<double>() * scale;
-  r.origin = {entry.value("cpu", ""), entry.value("git_revision", "")};
+  r.origin = read_origin(entry);
   return r;
 }
 
@@ -179,15 +179,6 @@ std::vector<std::string> begun_under(const ResultFolder& folder) {
   return begun;
 }
 
-/// What runs of older revisions did not say of each repetition, where the folder is of one of them alone.
-void name_origins(ResultFolder& folder) {
-  if (!folder.begun.empty()) return;
-  const Origin origin = origin_of(folder.context);
-  for (CellResult& cell : folder.cells)
-    for (Repetition& repetition : cell.repetitions)
-      if (repetition.origin.empty()) repetition.origin = origin;
-}
-
 constexpr std::string_view kBetween = " | ";  // values of a merged context that differ
 
 }  // namespace
@@ -236,7 +227,8 @@ ResultFolder read_result_folder(const fs::path& path) {
                                 (path / "results.json").string()));
   }
   folder.begun = begun_under(folder);
-  name_origins(folder);
+  // What runs of older revisions did not say of each repetition, where the folder is of one of them alone.
+  if (folder.begun.empty()) name_origins(folder.cells, origin_of(folder.context));
   if (!folder.complete && folder.plan) {
     for (const PlanRecord::Entry& cell : folder.plan->skipped)
       if (cell.shard == folder.plan->shard.index) folder.skipped.push_back({cell.name, cell.reason});
@@ -289,7 +281,7 @@ std::string short_revision(const Json& context) {
 }
 
 Origin origin_of(const Json& context) {
-  const Origin origin{context.value("cpu", ""), context.value("git_revision", "")};
+  const Origin origin = read_origin(context);
   const auto several = [](const std::string& text) { return text.find(kBetween) != std::string::npos; };
   return several(origin.cpu) || several(origin.git_revision) ? Origin{} : origin;
 }

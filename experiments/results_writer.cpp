@@ -46,8 +46,7 @@ std::vector<Json> entries_of(const CellResult& result, const ResultForm& form, b
   if (repetitions) {
     for (const Repetition& repetition : result.repetitions) {
       Json& entry = entries.emplace_back(repetition_entry(result, repetition));
-      if (origins && !repetition.origin.empty())
-        entry["cpu"] = repetition.origin.cpu, entry["git_revision"] = repetition.origin.git_revision;
+      if (origins) add_origin(entry, repetition.origin);
     }
   }
   if (aggregates) std::ranges::move(aggregate_entries(result), std::back_inserter(entries));
