@@ -32,10 +32,31 @@ std::string_view leaf_of(const TracerSettings& s, Isa isa) {
   return is_auto(s.leaf) ? default_leaf(s.structure, s.intersector, isa) : std::string_view(s.leaf);
 }
 
+/// Of a structure that stands above others the row where the one below has the same, so that a scene without instances
+/// is answered.
+const KernelRow* find_both(const TracerSettings& s, std::string_view leaf, std::string_view traversal, Isa isa) {
+  const auto find_of = [&](std::string_view structure) {
+    return find_kernel(structure, leaf, s.intersector, s.box, traversal, isa);
+  };
+  const KernelRow* row = find_of(s.structure);
+  return row && find_structure(s.structure)->info.takes_below && !find_of(s.parameters.below) ? nullptr : row;
+}
+
 const KernelRow* find(const TracerSettings& s, std::string_view traversal, Isa isa) {
   const std::string_view leaf = leaf_of(s, isa);
-  const KernelRow* row = find_kernel(s.structure, leaf, s.intersector, s.box, resolve_traversal(traversal, isa), isa);
-  return row || traversal != kAuto ? row : find_kernel(s.structure, leaf, s.intersector, s.box, "single", isa);
+  const KernelRow* row = find_both(s, leaf, resolve_traversal(traversal, isa), isa);
+  return row || traversal != kAuto ? row : find_both(s, leaf, "single", isa);
+}
+
+/// Why find() found none.
+std::string why_none(const TracerSettings& s, Isa isa) {
+  const std::string traversal = resolve_traversal(s.traversal, isa);
+  const auto why = [&](std::string_view structure) {
+    return why_no_kernel(structure, leaf_of(s, isa), s.intersector, s.box, traversal, isa);
+  };
+  const std::string of_structure = why(s.structure);
+  if (!of_structure.empty() || !find_structure(s.structure)->info.takes_below) return of_structure;
+  return s.structure + " over " + s.parameters.below + ": " + why(s.parameters.below);
 }
 
 /// In this order: instances are looked at through indices.
@@ -82,8 +103,7 @@ const KernelRow& resolve_kernel(TracerSettings& s) {
       return *row;
     }
   }
-  throw UserError(why_no_kernel(s.structure, leaf_of(s, isas.front()), s.intersector, s.box,
-                                resolve_traversal(s.traversal, isas.front()), isas.front()));
+  throw UserError(why_none(s, isas.front()));
 }
 
 }  // namespace

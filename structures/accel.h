@@ -109,8 +109,8 @@ struct StructureInfo {
   bool can_refit = false;     ///< Accel::refit() fits it to moved vertices; others refuse
   /// why it has no other way of traversal, where that is so: what skipped cells say
   std::string_view only_single_rays = {};
-  /// why its rays do not go as streams, where they go in other ways than alone: the same
-  std::string_view no_streams = {};
+  /// why its rays do not go as streams, or not in flight, where they go in other ways than alone: the same
+  std::string_view no_streams = {}, no_queue = {};
   /// false where the builders read none of BuilderParameters: sweeping them makes no new cells
   bool uses_parameters = true;
   /// Why a builder of the structure does not make a leaf of it, empty where it does: what skipped cells and refused

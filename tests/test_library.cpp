@@ -416,6 +416,11 @@ TEST_CASE("misuse is told in one line that names the mend") {
   CHECK_THAT(tuned("grid", [](BuilderParameters& p) { p.morton_bits = 31; }), Catch::Contains("neither 30 nor 63"));
   CHECK(tuned("bvh8", [](BuilderParameters& p) { p.spatial_gain = 0.01f, p.grid_density = 0.01f; }).empty());
   CHECK(tuned("two_level", [](BuilderParameters& p) { p.below = "grid"; }).empty());
+  TracerSettings over_grid = with(&TracerSettings::structure, "two_level");
+  over_grid.parameters.below = "grid";
+  CHECK(Tracer(sphere(4), over_grid).settings().traversal == "single");
+  over_grid.traversal = "packet8";
+  CHECK_THAT(message_of(over_grid), Catch::Contains("two_level over grid: grid has no packet8"));
 
   const std::string line = message_of(with(&TracerSettings::structure, "bvh8\n\x1b[2J" + std::string(100000, 'x')));
   CHECK_THAT(line, Catch::Contains("unknown structure 'bvh8\\n\\x1b[2Jxxx") && Catch::Contains("(100009 characters)"));

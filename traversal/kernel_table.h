@@ -48,7 +48,7 @@ struct Counters {
   };
   std::vector<Depth> depths;  ///< of trees whose kernels follow their depth (the BVHs, the kd-tree), else empty
 
-  std::uint64_t packets = 0;
+  std::uint64_t packets = 0;  ///< what of one goes into an instance counts as one of its own
   std::uint64_t rays_in_packets = 0, rays_in_streams = 0, rays_in_flight = 0;  ///< of `rays`; the others went singly
   std::uint64_t switches = 0;      ///< times that a packet had its rays go on alone in a node
   std::uint64_t rays_alone = 0;    ///< the rays that did, at all switches

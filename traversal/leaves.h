@@ -97,6 +97,13 @@ ARBORETUM_INLINE bool any_hit_in_leaf(const Leaves& leaves, RayData& data, [[may
   }
 }
 
+/// Leaves that know how a leaf is tested with many rays: by test_many(), which takes what test_leaf() does after the
+/// leaves.
+template <class Leaves>
+inline constexpr bool kTestsMany = requires {
+  Leaves::kMany;
+};
+
 /// Tests a leaf with `rays`, a bit each: one ray after the other, or one block after the other where that is better.
 /// `ray(i)` and `data(i)`: the i-th ray and what the intersector keeps for it. Of any hit `hit(i)` is called once, for
 /// one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
@@ -105,7 +112,9 @@ ARBORETUM_INLINE void test_leaf(const Leaves& leaves, [[maybe_unused]] const Lea
                                 [[maybe_unused]] const Counting& counting, const std::byte* blocks, unsigned count,
                                 std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best,
                                 const OnHit& hit) {
-  if constexpr (Leaves::kBlockByBlock) {
+  if constexpr (kTestsMany<Leaves>) {
+    leaves.template test_many<AnyHit>(form, counting, blocks, count, rays, ray, data, best, hit);
+  } else if constexpr (Leaves::kBlockByBlock) {
     test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks),
                                                               count, rays, ray, data, best, hit);
   } else {

@@ -82,7 +82,7 @@ class PacketLeaves {
   }
 
  private:
-  /// None of the rays has met anything.
+  /// None of the rays has met anything, but where the leaves know better.
   template <class Prepare>
   ARBORETUM_INLINE void load(const RayBatch& rays, const Prepare& prepare) {
     const int count = int(rays.size());
@@ -90,7 +90,13 @@ class PacketLeaves {
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
     prepare(
         count, [this](int i) -> const Ray& { return rays_[i]; }, [this](int k) { prepare_lanes(k); });
-    for (int i = 0; i < count; ++i) best_[i] = NearestHit{lanes_.t[i]};
+    for (int i = 0; i < count; ++i) {
+      if constexpr (requires { leaves_.best_so_far(i); }) {
+        best_[i] = leaves_.best_so_far(i);
+      } else {
+        best_[i] = NearestHit{lanes_.t[i]};
+      }
+    }
     if constexpr (!Leaves::kRaysInLanes) {
       for (Mask rest = lanes_.valid; rest; rest &= rest - 1) {
         const int i = __builtin_ctzll(rest);

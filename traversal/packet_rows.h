@@ -84,17 +84,21 @@ struct PacketFunctions {
 /// of up to 16 rays stay together to the end, which is what tells them from hybrids.
 inline constexpr int kFewOf32 = 4, kFewOf64 = 6, kFewOfHybrid4 = 1, kFewOfHybrid8 = 2, kFewOfHybrid16 = 3;
 
-/// `Compiled`: what packet32 and packet64 have compiled in.
-template <class Structure, class Family, class Compiled>
+/// The functions of rows as they are.
+template <class Functions>
+using AsTheyAre = Functions;
+
+/// `Compiled`: what packet32 and packet64 have compiled in. `Of`: what a structure makes of rows' functions.
+template <class Structure, class Family, template <class> class Of = AsTheyAre, class Compiled>
 void add_packet_rows(KernelRows& rows, Compiled compiled) {
-  add_rows<Structure, PacketFunctions<Family, 4, 0>>(rows, "packet4", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 8, 0>>(rows, "packet8", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 16, 0>>(rows, "packet16", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 32, kFewOf32>>(rows, "packet32", compiled);
-  add_rows<Structure, PacketFunctions<Family, 64, kFewOf64>>(rows, "packet64", compiled);
-  add_rows<Structure, PacketFunctions<Family, 4, kFewOfHybrid4, true>>(rows, "hybrid4", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 8, kFewOfHybrid8, true>>(rows, "hybrid8", TypeList<>{});
-  add_rows<Structure, PacketFunctions<Family, 16, kFewOfHybrid16, true>>(rows, "hybrid16", TypeList<>{});
+  add_rows<Structure, Of<PacketFunctions<Family, 4, 0>>>(rows, "packet4", TypeList<>{});
+  add_rows<Structure, Of<PacketFunctions<Family, 8, 0>>>(rows, "packet8", TypeList<>{});
+  add_rows<Structure, Of<PacketFunctions<Family, 16, 0>>>(rows, "packet16", TypeList<>{});
+  add_rows<Structure, Of<PacketFunctions<Family, 32, kFewOf32>>>(rows, "packet32", compiled);
+  add_rows<Structure, Of<PacketFunctions<Family, 64, kFewOf64>>>(rows, "packet64", compiled);
+  add_rows<Structure, Of<PacketFunctions<Family, 4, kFewOfHybrid4, true>>>(rows, "hybrid4", TypeList<>{});
+  add_rows<Structure, Of<PacketFunctions<Family, 8, kFewOfHybrid8, true>>>(rows, "hybrid8", TypeList<>{});
+  add_rows<Structure, Of<PacketFunctions<Family, 16, kFewOfHybrid16, true>>>(rows, "hybrid16", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -36,9 +36,12 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   using Base::best, Base::kMost, Base::set_width, Base::times_alone;
 
   BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
-      : Base(row, leaves_of<Leaves>(tree, row), counting), base_(tree.base()), root_(tree.root()),
-        max_coordinate_(tree.max_coordinate()), padded_(row.box == "padded"), stack_(tree.stack_entries()),
-        single_stack_(tree.stack_entries()) {}
+      : BvhPackets(tree, row, counting, leaves_of<Leaves>(tree, row), row.box == "padded", tree.max_coordinate()) {}
+  /// With leaves that are there, and boxes padded, where they are, for that largest coordinate.
+  BvhPackets(const bvh::BvhBase& tree, const KernelRow& row, Counting counting, const Leaves& leaves, bool padded,
+             float max_coordinate)
+      : Base(row, leaves, counting), base_(tree.base()), root_(tree.root()), max_coordinate_(max_coordinate),
+        padded_(padded), stack_(tree.stack_entries()), single_stack_(tree.stack_entries()) {}
 
   /// Of packets of so many rays, the last of a batch fewer.
   void set_size(int rays_each) { may_mix_ = rays_each <= kMostMixed; }

@@ -152,7 +152,8 @@ struct BvhSingle {
 
    public:
     Kernel(const Accel& accel, const KernelRow& row, Counting counting)
-        : Kernel(static_cast<const bvh::BvhBase&>(accel), row, counting) {}
+        : Kernel(static_cast<const bvh::BvhBase&>(accel), row, counting,
+                 leaves_of<Leaves>(static_cast<const bvh::BvhBase&>(accel), row)) {}
 
     template <bool AnyHit>
     ARBORETUM_INLINE bool trace(const Ray& ray, float time, NearestHit& best) {
@@ -171,12 +172,12 @@ struct BvhSingle {
     }
     void finish_all() requires kLater { unfinished_.finish_all(); }
 
-   private:
-    Kernel(const bvh::BvhBase& tree, const KernelRow& row, Counting counting)
-        : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()),
-          leaves_(leaves_of<Leaves>(tree, row)), form_(*row.tests->form), counting_(counting),
-          stack_(tree.stack_entries()) {}
+   protected:
+    Kernel(const bvh::BvhBase& tree, const KernelRow& row, Counting counting, const Leaves& leaves)
+        : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(leaves),
+          form_(*row.tests->form), counting_(counting), stack_(tree.stack_entries()) {}
 
+   private:
     const std::byte* base_;
     bvh::NodeReference root_;
     float max_coordinate_;

@@ -38,63 +38,80 @@ void map_vertices(const std::byte* from, const two_level::Placed& instance, std:
     flat.id[i] = object.id[i] == kNoPrimitive ? kNoPrimitive : object.id[i] + instance.first_primitive;
 }
 
-/// Leaves (traversal/leaves.h) of one instance after the other, for one world-space ray.
+/// Tests blocks of one instance after the other with rays in world space.
+class PlacedBlocks {
+ public:
+  PlacedBlocks(const LeafTests& tests, const TriangleMesh& flat) : tests_(&tests), flat_(&flat) {
+    for_each_type(EveryWidth<VertexBlock>{}, [&]<class Block>(std::type_identity<Block>) {
+      if (Block::kName == tests.leaf) map_ = &map_vertices<Block::kWidth>;
+    });
+  }
+
+  void enter(const two_level::Placed& instance) { instance_ = &instance; }
+  [[nodiscard]] const LeafTests& tests() const { return *tests_; }
+  [[nodiscard]] const LeafForm& form() const { return *tests_->form; }
+
+  /// Calls test(block of the flat mesh) for each of `count` blocks until it returns true; whether it did.
+  template <class Test>
+  bool any_of(const std::byte* blocks, unsigned count, const Test& test) {
+    alignas(64) std::byte flat[kLargestBlock];
+    for (; count > 0; --count, blocks += form().bytes) {
+      make_flat(blocks, flat);
+      if (test(flat)) return true;
+    }
+    return false;
+  }
+  bool closest_hit(PreparedRay& ray, const std::byte* block, float tnear, NearestHit& best) const {
+    return tests_->closest_hit(ray, block, 1, flat_->vertices.data(), tnear, best);
+  }
+  bool any_hit(PreparedRay& ray, const std::byte* block, float tnear, float tfar) const {
+    return tests_->any_hit(ray, block, 1, flat_->vertices.data(), tnear, tfar);
+  }
+
+ private:
+  void make_flat(const std::byte* block, std::byte* to) {
+    if (map_ && instance_->laid_out) return map_(block, *instance_, to);
+    ids_.clear();
+    form().append(block, 1, ids_);
+    for (std::uint32_t& id : ids_) id += instance_->first_primitive;
+    form().fill(to, *flat_, ids_);
+  }
+
+  const LeafTests* tests_;
+  const TriangleMesh* flat_;
+  void (*map_)(const std::byte*, const two_level::Placed&, std::byte*) = nullptr;
+  const two_level::Placed* instance_ = nullptr;
+  std::vector<std::uint32_t> ids_;
+};
+
+/// Leaves (traversal/leaves.h) of an instance for one ray, which stands prepared as it is in world space, whatever ray
+/// searches the structure.
 class PlacedLeaves {
  public:
   using RayData = PreparedRay&;
   static constexpr bool kRaysInLanes = false, kBlockByBlock = false;
 
-  PlacedLeaves(const LeafTests& tests, const TriangleMesh& flat) : tests_(tests), flat_(flat) {
-    for_each_type(EveryWidth<VertexBlock>{}, [&]<class Block>(std::type_identity<Block>) {
-      if (Block::kName == tests.leaf) map_ = &map_vertices<Block::kWidth>;
-    });
-  }
-  PlacedLeaves(const PlacedLeaves&) = delete;
-  PlacedLeaves& operator=(const PlacedLeaves&) = delete;
+  PlacedLeaves(PlacedBlocks& blocks, PreparedRay& ray) : blocks_(blocks), ray_(ray) {}
+  [[nodiscard]] const LeafForm& form() const { return blocks_.form(); }
+  [[nodiscard]] std::size_t block_bytes() const { return form().bytes; }
 
-  void begin(const Ray& world) { tests_.prepare(world, ray_); }
-  void enter(const two_level::Placed& instance) { instance_ = &instance; }
-  void finish(NearestHit& best) {
-    if (tests_.finish && best.primitive != NearestHit::kNone) tests_.finish(ray_, best);
-  }
-  [[nodiscard]] const LeafForm& form() const { return *tests_.form; }
-
-  /// The world-space ray's, whatever ray searches the structure.
   RayData prepare(const Ray&) const { return ray_; }
-  bool closest_hit(RayData data, const std::byte* blocks, unsigned count, float tnear, NearestHit& best) const {
+  bool closest_hit(RayData ray, const std::byte* blocks, unsigned count, float tnear, NearestHit& best) const {
     bool changed = false;
-    alignas(64) std::byte flat[kLargestBlock];
-    for (; count > 0; --count, blocks += block_bytes()) {
-      make_flat(blocks, flat);
-      changed |= tests_.closest_hit(data, flat, 1, flat_.vertices.data(), tnear, best);
-    }
+    blocks_.any_of(blocks, count, [&](const std::byte* flat) {
+      changed |= blocks_.closest_hit(ray, flat, tnear, best);
+      return false;
+    });
     return changed;
   }
-  bool any_hit(RayData data, const std::byte* blocks, unsigned count, float tnear, float tfar) const {
-    alignas(64) std::byte flat[kLargestBlock];
-    for (; count > 0; --count, blocks += block_bytes()) {
-      make_flat(blocks, flat);
-      if (tests_.any_hit(data, flat, 1, flat_.vertices.data(), tnear, tfar)) return true;
-    }
-    return false;
+  bool any_hit(RayData ray, const std::byte* blocks, unsigned count, float tnear, float tfar) const {
+    return blocks_.any_of(blocks, count,
+                          [&](const std::byte* flat) { return blocks_.any_hit(ray, flat, tnear, tfar); });
   }
-  [[nodiscard]] std::size_t block_bytes() const { return tests_.form->bytes; }
 
  private:
-  void make_flat(const std::byte* block, std::byte* to) const {
-    if (map_ && instance_->laid_out) return map_(block, *instance_, to);
-    ids_.clear();
-    tests_.form->append(block, 1, ids_);
-    for (std::uint32_t& id : ids_) id += instance_->first_primitive;
-    tests_.form->fill(to, flat_, ids_);
-  }
-
-  const LeafTests& tests_;
-  const TriangleMesh& flat_;
-  void (*map_)(const std::byte*, const two_level::Placed&, std::byte*) = nullptr;
-  const two_level::Placed* instance_ = nullptr;
-  mutable PreparedRay ray_;
-  mutable std::vector<std::uint32_t> ids_;
+  PlacedBlocks& blocks_;
+  PreparedRay& ray_;
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -233,9 +233,9 @@ const StructureInfo& TwoLevel::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "a BVH over instances, a structure of another kind (parameter below) for each prototype";
-    i.only_single_rays =
-        "not built: an instance's map takes all rays of a packet alike, but the loop hands one ray at a time to the "
-        "structure below and settles each hit in world space";
+    i.no_streams = i.no_queue =
+        "not built: a ray that waits would keep both its searches, the top's and that in an instance; rays go alone or "
+        "in packets";
     i.builders = binary_builder_names();
     i.takes_below = true;
     i.leaves = all_leaf_names();

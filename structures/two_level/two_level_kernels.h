@@ -1,8 +1,9 @@
-// One ray through two levels: the top's boxes in world space, then for each instance the boxes of the structure below
-// in object space, with the ray mapped there, and the triangles in its leaves in world space again, as the flat mesh
-// has them (placed_leaves_single.h). The direction is mapped without being normalised, so t keeps its meaning. What is
-// hit, and where, is thus decided as in a structure over the flat mesh, by the same operations on the same numbers, bit
-// for bit; only which boxes are visited is decided in object space, and there padded boxes lose nothing:
+// Rays through two levels, alone or in packets: the top's boxes in world space, then for each instance the boxes of the
+// structure below in object space, with the rays mapped there, and the triangles in its leaves in world space again, as
+// the flat mesh has them (placed_leaves_single.h). The direction is mapped without being normalised, so t keeps its
+// meaning. What is hit, and where, is thus decided as in a structure over the flat mesh, by the same operations on the
+// same numbers, bit for bit; only which boxes are visited is decided in object space, and there padded boxes lose
+// nothing:
 //
 // u = 2^-24. An instance maps x to L x + T, its stored inverse w to A(w) = R w + c; |.| is the largest |component|, of
 // a linear part the largest row sum; M the prototype's largest |coordinate|, o, d the world-space ray, o*, d* its exact
@@ -28,93 +29,112 @@
 // pad for a largest coordinate of M + P is 8 u (M + P + |o'_i|), and so with P = p / 8 u
 //   5.1 u (M + |o'_i|) + 1.1 u (M + 2 |o'_i|) + p < 8 u (M + P + |o'_i|):
 // the box is met, within any interval that holds t. P is Placed::pad + Placed::pad_per_distance |o'|, both rounded up,
-// pad_per_distance = 4.01 k. The top's boxes hold the flat mesh's corners, and the ray is itself there.
+// pad_per_distance = 4.01 k. The top's boxes hold the flat mesh's corners, and the ray is itself there. In a packet all
+// rays have the largest pad of theirs.
 #pragma once
 
-#include "structures/two_level/placed_search_single.h"
+#include "structures/two_level/instances_kernels.h"
+#include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
+#include "traversal/packet_rows.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// Single rays: the top's boxes are padded whatever those below are.
+template <class, bool, class Counting>
+class TwoLevelKernel
+    : public BvhSingle<SoaTests<4>::Nodes>::Kernel<InstanceLeaves<Counting>, true, TopCounting<Counting>> {
+  using Base =
+      typename BvhSingle<SoaTests<4>::Nodes>::template Kernel<InstanceLeaves<Counting>, true, TopCounting<Counting>>;
+
+ public:
+  TwoLevelKernel(const Accel& accel, const KernelRow& row, Counting counting)
+      : TwoLevelKernel(static_cast<const two_level::TwoLevel&>(accel), row, counting) {}
+
+ private:
+  TwoLevelKernel(const two_level::TwoLevel& accel, const KernelRow& row, Counting counting)
+      : Base(accel.top(), row, TopCounting<Counting>(counting), InstanceLeaves<Counting>(accel, row, counting)) {}
+};
+
+/// As traversal/packet_rows.h wants it. What of a packet goes into an instance counts as a packet of its own.
+struct TwoLevelPacketFamily {
+  using Structure = two_level::TwoLevel;
+  static constexpr bool kFewerLanes = false, kForNearRays = false;
+
+  template <int W, class, bool AnyHit, class Counting>
+  class Packets {
+   public:
+    Packets(const Structure& accel, const KernelRow& row, Counting counting)
+        : top_(accel.top(), row, TopCounting<Counting>(counting),
+               InstanceLeaves<Counting>(accel, row, counting, find_packets<W, AnyHit, Counting>(accel.below()),
+                                        threshold_),
+               true, accel.top().max_coordinate()) {}
+
+    void set_size(int rays_each) { top_.set_size(rays_each); }
+    void set_width(unsigned width) requires Counting::kCounting { top_.set_width(width); }
+    void trace(const RayBatch& rays, int threshold) { threshold_ = threshold, top_.trace(rays, threshold); }
+    [[nodiscard]] const NearestHit& best(int i) const { return top_.best(i); }
+    [[nodiscard]] std::size_t times_alone() const { return top_.times_alone(); }
+
+   private:
+    int threshold_ = 0;
+    BvhPackets<SoaPacketNodes<4>, W, InstanceLeaves<Counting>, AnyHit, TopCounting<Counting>> top_;
+  };
+};
+
 /// The kernels of the structure below that a row stands for.
 [[nodiscard]] inline const KernelRow& row_below(const two_level::TwoLevel& accel, const KernelRow& above) {
-  const KernelRow* row = find_kernel(accel.below(), accel.leaf(), above.intersector, above.box, "single", kIsa);
+  const KernelRow* row = find_kernel(accel.below(), accel.leaf(), above.intersector, above.box, above.traversal, kIsa);
   if (!row) {
     throw UserError("two_level over " + accel.below() + ": " +
-                    why_no_kernel(accel.below(), accel.leaf(), above.intersector, above.box, "single", kIsa));
+                    why_no_kernel(accel.below(), accel.leaf(), above.intersector, above.box, above.traversal, kIsa));
   }
   return *row;
 }
 
-/// The structure below knows its leaves.
-template <class, bool Padded, class Counting>
-class TwoLevelKernel {
- public:
-  TwoLevelKernel(const Accel& accel, const KernelRow& row, Counting counting)
-      : accel_(static_cast<const two_level::TwoLevel&>(accel)), counting_(counting),
-        stack_(accel_.top().stack_entries()), leaves_(*row_below(accel_, row).tests, accel_.mesh()),
-        closest_(find_search<false, Padded, Counting>(accel_.below())),
-        any_(find_search<true, Padded, Counting>(accel_.below())) {}
-
-  template <bool AnyHit>
-  bool trace(const Ray& ray, float /*time*/, NearestHit& best) {
-    const bvh::Bvh4& top = accel_.top();
-    SoaNodeTest<4, true> nodes(ray, top.max_coordinate());
-    leaves_.begin(ray);
-    const bool over = walk_bvh<false>(
-        top.base(), top.root(), nodes, stack_.data(), best.t, counting_, [&](bvh::NodeReference reference) {
-          const auto& block = *reinterpret_cast<const IndexBlock<1>*>(top.base() + bvh::offset_of(reference));
-          const two_level::Placed& instance = accel_.placed()[block.id[0]];
-          leaves_.enter(instance);
-          const PlacedRay placed(ray, instance, best.t);
-          const bool found = (AnyHit ? any_ : closest_)(*instance.below, placed, leaves_, best, counting_);
-          nodes.shorten(best.t);
-          return AnyHit && found;
-        });
-    if constexpr (!AnyHit) leaves_.finish(best);
-    return over;
-  }
-
- private:
-  const two_level::TwoLevel& accel_;
-  Counting counting_;
-  TraversalStack stack_;
-  PlacedLeaves leaves_;
-  PlacedSearch<Counting> closest_, any_;
-};
-
-/// Which rows the structure below has is asked when a cell is planned. A scene without instances is the structure
-/// below: it gets the batch as it is.
-struct TwoLevelFunctions {
-  template <class Counting, bool Padded>
-  struct Rays : SingleRays<TwoLevelKernel<CalledLeaves, Padded, Counting>, Counting> {
-    using Base = SingleRays<TwoLevelKernel<CalledLeaves, Padded, Counting>, Counting>;
+/// A scene without instances is the structure below: it gets the batch as it is. Which rows it has is asked before:
+/// when a cell is planned, when a program makes a Tracer.
+template <class Functions>
+struct OrBelow {
+  template <RowFunctions (*Of)()>
+  struct Rows {
     static void closest_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<Hit> hits,
                             Counters* counters) {
       const auto& two = static_cast<const two_level::TwoLevel&>(accel);
       if (const Accel* below = two.only()) return row_below(two, row).closest_hit(*below, rays, hits, counters);
-      Base::closest_hit(accel, row, rays, hits, counters);
+      Of().closest_hit(accel, row, rays, hits, counters);
     }
     static void any_hit(const Accel& accel, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded,
                         Counters* counters) {
       const auto& two = static_cast<const two_level::TwoLevel&>(accel);
       if (const Accel* below = two.only()) return row_below(two, row).any_hit(*below, rays, occluded, counters);
-      Base::any_hit(accel, row, rays, occluded, counters);
+      Of().any_hit(accel, row, rays, occluded, counters);
     }
   };
-  template <class, bool Padded>
+  template <class Leaves, bool Padded>
   static RowFunctions timed() {
-    return {&Rays<NoCounters, Padded>::closest_hit, &Rays<NoCounters, Padded>::any_hit};
+    using R = Rows<&Functions::template timed<Leaves, Padded>>;
+    return {&R::closest_hit, &R::any_hit};
   }
   template <bool Padded>
   static RowFunctions counting() {
-    return {&Rays<WithCounters, Padded>::closest_hit, &Rays<WithCounters, Padded>::any_hit};
+    using R = Rows<&Functions::template counting<Padded>>;
+    return {&R::closest_hit, &R::any_hit};
   }
 };
 
 inline void add_kernels(std::type_identity<two_level::TwoLevel>, KernelRows& rows) {
-  add_rows<two_level::TwoLevel, TwoLevelFunctions>(rows, "single", TypeList<>{});
+  using Structure = two_level::TwoLevel;
+  using Single = SingleRayFunctions<TwoLevelKernel>;
+  add_rows<Structure, OrBelow<Single>>(rows, "single", TypeList<>{});
+  add_packet_rows<Structure, TwoLevelPacketFamily, OrBelow>(rows, TypeList<>{});
+  // Small packets map an instance's leaves for several rays at once: worth while for rays that share little, too, where
+  // a register holds eight (docs/performance/other-structures.md).
+  using Hybrid = PacketFunctions<TwoLevelPacketFamily, 16, kFewOfHybrid16>;
+  using Incoherent = std::conditional_t<(kRegisterWidth >= 8), Hybrid, Single>;
+  using Auto = AutoFunctions<TwoLevelPacketFamily, TypeList<>, Incoherent, Single, false>;
+  add_rows<Structure, OrBelow<Auto>>(rows, "auto", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
