@@ -38,16 +38,11 @@ struct vi<8> {
   friend ARBORETUM_INLINE vm<8> operator==(vi a, vi b) { return vm<8>(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, b.v))); }
   friend ARBORETUM_INLINE vm<8> operator<(vi a, vi b) { return b > a; }
   friend ARBORETUM_INLINE vm<8> operator>(vi a, vi b) { return vm<8>(_mm256_castsi256_ps(_mm256_cmpgt_epi32(a.v, b.v))); }
-  friend ARBORETUM_INLINE vi min(vi a, vi b) { return vi(_mm256_min_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return vi(_mm256_max_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi select(vm<8> m, vi a, vi b) { return vi(_mm256_blendv_epi8(b.v, a.v, _mm256_castps_si256(m.v))); }
   template <int S>
   ARBORETUM_INLINE vi shift_left() const {
     return vi(_mm256_slli_epi32(v, S));
-  }
-  template <int S>
-  ARBORETUM_INLINE vi shift_right_logical() const {
-    return vi(_mm256_srli_epi32(v, S));
   }
 };
 

@@ -38,16 +38,11 @@ struct vi<4> {
   friend ARBORETUM_INLINE vm<4> operator==(vi a, vi b) { return vm<4>::from_bits(_mm_cmpeq_epi32_mask(a.v, b.v)); }
   friend ARBORETUM_INLINE vm<4> operator<(vi a, vi b) { return vm<4>::from_bits(_mm_cmplt_epi32_mask(a.v, b.v)); }
   friend ARBORETUM_INLINE vm<4> operator>(vi a, vi b) { return b < a; }
-  friend ARBORETUM_INLINE vi min(vi a, vi b) { return vi(_mm_min_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return vi(_mm_max_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi select(vm<4> m, vi a, vi b) { return vi(_mm_mask_blend_epi32(m.v, b.v, a.v)); }
   template <int S>
   ARBORETUM_INLINE vi shift_left() const {
     return vi(_mm_slli_epi32(v, S));
-  }
-  template <int S>
-  ARBORETUM_INLINE vi shift_right_logical() const {
-    return vi(_mm_srli_epi32(v, S));
   }
 };
 
@@ -129,16 +124,11 @@ struct vi<8> {
   friend ARBORETUM_INLINE vm<8> operator==(vi a, vi b) { return vm<8>::from_bits(_mm256_cmpeq_epi32_mask(a.v, b.v)); }
   friend ARBORETUM_INLINE vm<8> operator<(vi a, vi b) { return vm<8>::from_bits(_mm256_cmplt_epi32_mask(a.v, b.v)); }
   friend ARBORETUM_INLINE vm<8> operator>(vi a, vi b) { return b < a; }
-  friend ARBORETUM_INLINE vi min(vi a, vi b) { return vi(_mm256_min_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return vi(_mm256_max_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi select(vm<8> m, vi a, vi b) { return vi(_mm256_mask_blend_epi32(m.v, b.v, a.v)); }
   template <int S>
   ARBORETUM_INLINE vi shift_left() const {
     return vi(_mm256_slli_epi32(v, S));
-  }
-  template <int S>
-  ARBORETUM_INLINE vi shift_right_logical() const {
-    return vi(_mm256_srli_epi32(v, S));
   }
 };
 
@@ -218,16 +208,11 @@ struct vi<16> {
   friend ARBORETUM_INLINE vm<16> operator==(vi a, vi b) { return vm<16>::from_bits(_mm512_cmpeq_epi32_mask(a.v, b.v)); }
   friend ARBORETUM_INLINE vm<16> operator<(vi a, vi b) { return vm<16>::from_bits(_mm512_cmplt_epi32_mask(a.v, b.v)); }
   friend ARBORETUM_INLINE vm<16> operator>(vi a, vi b) { return b < a; }
-  friend ARBORETUM_INLINE vi min(vi a, vi b) { return vi(_mm512_min_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return vi(_mm512_max_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi select(vm<16> m, vi a, vi b) { return vi(_mm512_mask_blend_epi32(m.v, b.v, a.v)); }
   template <int S>
   ARBORETUM_INLINE vi shift_left() const {
     return vi(_mm512_slli_epi32(v, S));
-  }
-  template <int S>
-  ARBORETUM_INLINE vi shift_right_logical() const {
-    return vi(_mm512_srli_epi32(v, S));
   }
 };
 

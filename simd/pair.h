@@ -37,16 +37,11 @@ struct vi {
   friend ARBORETUM_INLINE vm<W> operator==(vi a, vi b) { return {a.lo == b.lo, a.hi == b.hi}; }
   friend ARBORETUM_INLINE vm<W> operator<(vi a, vi b) { return {a.lo < b.lo, a.hi < b.hi}; }
   friend ARBORETUM_INLINE vm<W> operator>(vi a, vi b) { return b < a; }
-  friend ARBORETUM_INLINE vi min(vi a, vi b) { return {min(a.lo, b.lo), min(a.hi, b.hi)}; }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return {max(a.lo, b.lo), max(a.hi, b.hi)}; }
   friend ARBORETUM_INLINE vi select(vm<W> m, vi a, vi b) { return {select(m.lo, a.lo, b.lo), select(m.hi, a.hi, b.hi)}; }
   template <int S>
   ARBORETUM_INLINE vi shift_left() const {
     return {lo.template shift_left<S>(), hi.template shift_left<S>()};
-  }
-  template <int S>
-  ARBORETUM_INLINE vi shift_right_logical() const {
-    return {lo.template shift_right_logical<S>(), hi.template shift_right_logical<S>()};
   }
 };
 

@@ -73,9 +73,6 @@ struct vi {
     return test([&](int i) { return a.lane[i] < b.lane[i]; });
   }
   friend vm<W> operator>(vi a, vi b) { return b < a; }
-  friend vi min(vi a, vi b) {
-    return map([&](int i) { return a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i]; });
-  }
   friend vi max(vi a, vi b) {
     return map([&](int i) { return a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i]; });
   }
@@ -85,10 +82,6 @@ struct vi {
   template <int S>
   vi shift_left() const {
     return map([&](int i) { return std::int32_t(std::uint32_t(lane[i]) << S); });
-  }
-  template <int S>
-  vi shift_right_logical() const {
-    return map([&](int i) { return std::int32_t(std::uint32_t(lane[i]) >> S); });
   }
 };
 
@@ -177,7 +170,7 @@ inline vi<W> truncate_to_int(vf<W> a) {
     return a.lane[i] >= -2147483648.0f && a.lane[i] < 2147483648.0f ? std::int32_t(a.lane[i]) : std::numeric_limits<std::int32_t>::min();
   });
 }
-/// The lanes that `m` names, moved to the front in order; the lanes behind them are unspecified.
+/// The lanes that `m` names, moved to the front in order; those behind are 0.
 template <int W>
 inline vi<W> compress(vm<W> m, vi<W> a) {
   vi<W> r(0);

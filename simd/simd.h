@@ -1,4 +1,4 @@
-// W lanes of float (vf), int (vi) and mask (vm), W = 4, 8, 16, on every instruction set.
+// W lanes of float (vf), int (vi) and mask (vm), W = 1, 4, 8, 16, on every instruction set.
 //
 // A width beyond the register is several registers (simd/pair.h). The semantics are the same on every ISA:
 //   min_x86(a, b) is a < b ? a : b, so NaN or a tie (+0, -0) gives b; max_x86 likewise with >.

@@ -38,16 +38,11 @@ struct vi<4> {
   friend ARBORETUM_INLINE vm<4> operator==(vi a, vi b) { return vm<4>(_mm_castsi128_ps(_mm_cmpeq_epi32(a.v, b.v))); }
   friend ARBORETUM_INLINE vm<4> operator<(vi a, vi b) { return vm<4>(_mm_castsi128_ps(_mm_cmplt_epi32(a.v, b.v))); }
   friend ARBORETUM_INLINE vm<4> operator>(vi a, vi b) { return b < a; }
-  friend ARBORETUM_INLINE vi min(vi a, vi b) { return vi(_mm_min_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi max(vi a, vi b) { return vi(_mm_max_epi32(a.v, b.v)); }
   friend ARBORETUM_INLINE vi select(vm<4> m, vi a, vi b) { return vi(_mm_blendv_epi8(b.v, a.v, _mm_castps_si128(m.v))); }
   template <int S>
   ARBORETUM_INLINE vi shift_left() const {
     return vi(_mm_slli_epi32(v, S));
-  }
-  template <int S>
-  ARBORETUM_INLINE vi shift_right_logical() const {
-    return vi(_mm_srli_epi32(v, S));
   }
 };
 

@@ -57,7 +57,6 @@ class ExactPredicate {
   [[nodiscard]] const DecisionCounts& counts() const noexcept { return counts_; }
 
  private:
-  struct Relative;
   struct Approximate;
   [[nodiscard]] int edge_sign_in_double_double(const Triple<DoubleDouble>& p, const Triple<DoubleDouble>& q,
                                                double scale, bool& certain) const;

@@ -34,7 +34,8 @@ struct SpatialMap {
   }
   /// The bins of three coordinates.
   ARBORETUM_INLINE vi<4> operator()(vf<4> position) const {
-    return min(max(truncate_to_int(three_lanes(position - lower) * scale), vi<4>(0)), vi<4>(std::int32_t(bins) - 1));
+    const vf<4> bin = three_lanes(position - lower) * scale;
+    return truncate_to_int(min_x86(max_x86(bin, vf<4>(0.0f)), vf<4>(float(bins - 1))));
   }
   ARBORETUM_INLINE void reach(const Reference& r, std::int32_t* first, std::int32_t* last) const {
     (*this)(-vf<4>::load(r.neg_lower)).store(first), (*this)(vf<4>::load(r.upper)).store(last);

@@ -214,7 +214,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
           goto pop;
         }
         const float plane = __builtin_bit_cast(float, std::uint32_t(node));
-        const std::byte* pair = base_ + std::size_t(link & ~3u) * 4;
+        const std::byte* pair = place_in_kdtree(base_, node);
         std::uint64_t near, far;
         std::memcpy(&near, pair + (far_side[axis] ^ 8u), 8), std::memcpy(&far, pair + far_side[axis], 8);
         const bool has_near = near != kdtree::kEmptyCell, has_far = far != kdtree::kEmptyCell;
@@ -254,7 +254,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
         const Side& taken = skip ? later : next;
         node = taken.node, mask = taken.rays, first = taken.first, last = taken.last;
       }
-      if (const auto blocks = std::uint32_t(node); blocks != 0) Base::leaf(place_of(node), blocks, mask);
+      if (const auto blocks = std::uint32_t(node); blocks != 0) Base::leaf(place_in_kdtree(base_, node), blocks, mask);
     pop:
       do {
         if (top == stack) return;
@@ -322,11 +322,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     }
   }
 
-  /// A node's pair of children, or a leaf's blocks.
-  ARBORETUM_INLINE const std::byte* place_of(std::uint64_t node) const {
-    return base_ + std::size_t(std::uint32_t(node >> 32) & ~3u) * 4;
-  }
-  ARBORETUM_INLINE void prefetch(std::uint64_t node) const { prefetch_lines<4>(place_of(node)); }
+  ARBORETUM_INLINE void prefetch(std::uint64_t node) const { prefetch_lines<4>(place_in_kdtree(base_, node)); }
 
   const std::byte* base_;
   const std::uint64_t root_;
