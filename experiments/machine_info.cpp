@@ -51,9 +51,27 @@ std::string git(const std::filesystem::path& folder, const std::string& argument
   return text;
 }
 
+/// Whether a source of the program is newer than the program, which then was not built from what stands there.
+bool is_older_than(const std::filesystem::path& source) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_time_type built = fs::last_write_time("/proc/self/exe", error);
+  if (error) return false;
+  constexpr std::string_view kFolders[] = {"core",   "simd",   "structures", "traversal", "intersectors",
+                                           "scenes", "oracle", "library",    "rendering", "experiments"};
+  for (const std::string_view folder : kFolders) {
+    for (fs::recursive_directory_iterator file(source / folder, error), end; !error && file != end;
+         file.increment(error)) {
+      const fs::path ending = file->path().extension();
+      if ((ending == ".h" || ending == ".cpp") && file->last_write_time(error) > built) return true;
+    }
+  }
+  return false;
+}
+
 struct Revision {
   std::string hash;
-  bool dirty = false;
+  bool dirty = false;  ///< files differ from that revision, or the program is older than they are
 };
 
 /// Of what was compiled: of the sources that the program's own build tree links to, else what was written down when it
@@ -64,7 +82,8 @@ Revision revision() {
   Revision r;
   if (std::filesystem::exists(data / "source")) {
     r.hash = git(data / "source", "rev-parse HEAD");
-    r.dirty = !r.hash.empty() && !git(data / "source", "status --porcelain --untracked-files=no").empty();
+    r.dirty = !r.hash.empty() && (!git(data / "source", "status --porcelain --untracked-files=no").empty() ||
+                                  is_older_than(data / "source"));
   } else {
     std::ifstream stream(data / "revision");
     std::string word;

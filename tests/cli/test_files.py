@@ -3,10 +3,12 @@
 
 import json
 import os
+import shutil
 import subprocess
 import threading
 import time
 import unittest
+from pathlib import Path
 
 from command_line_case import ARBORETUM, CommandLineCase, read_jsonl
 
@@ -213,6 +215,19 @@ class Files(CommandLineCase):
             self.compared("--csv", "link")
             self.assertTrue((self.folder / "link").is_symlink())
             self.assertTrue((self.folder / target).read_text().startswith("name,"))
+
+    def test_a_program_that_is_older_than_its_sources_does_not_stand_for_their_revision(self):
+        program = self.folder / "arboretum"
+        shutil.copy(ARBORETUM, program)
+        os.symlink(Path(ARBORETUM).resolve().parent / "share", self.folder / "share")
+        os.utime(program, (1e9, 1e9))
+        self.write("model.obj", CUBE)
+        command = [program, "run", self.write("model.yaml", MODEL), "--no-plots", "--out", "out", *FEW]
+        subprocess.run(command, cwd=self.folder, check=True, capture_output=True)
+        context = json.loads((self.folder / "out" / "results.json").read_text())["context"]
+        if context["git_revision"] == "unknown":
+            self.skipTest("no git repository")
+        self.assertTrue(context["git_dirty"])
 
     def test_descriptors_of_the_shell_are_written_to(self):
         self.assertEqual(self.run_small("--out", "out", *FEW).returncode, 0)
