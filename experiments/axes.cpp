@@ -51,7 +51,7 @@ constexpr Summary kTraversals[] = {
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
     {"auto",
      "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (rays in flight where they "
-     "share too little on SSE, and in bvh4_aos and the quantised BVHs; single rays where neither pays)"},
+     "share too little on SSE, and in bvh4_aos, bvh4_motion and the quantised BVHs; single rays where neither pays)"},
 };
 constexpr Summary kCallSummaries[] = {
     {"batch", "all rays in one call"},

@@ -11,6 +11,7 @@
 #include "intersectors/promises.h"
 #include "scenes/catalogue.h"
 #include "scenes/effects.h"
+#include "scenes/generators/generators.h"
 
 namespace arboretum {
 namespace {
@@ -85,6 +86,10 @@ Json scene_entries() {
                   {"triangles", scene.triangles},
                   {"available", scene.is_present()}};
     if (!generated) entry["package"] = scene.package, entry["licence"] = scene.licence;
+    if (generated) {
+      const auto generator = std::ranges::find(generators(), scene.name, &GeneratorInfo::name);
+      entry["takes_seed"] = generator != generators().end() && generator->takes_seed;
+    }
     entries.push_back(std::move(entry));
   }
   return entries;
@@ -158,8 +163,9 @@ std::string remark(const Json& entry) {
                         names.size() < all ? fmt::format("; each also as …{}", kAgain) : "");
   }
   if (entry.contains("generator")) {
-    line += entry["generator"].get<bool>() ? " (generated, any triangle count)"
-                                           : fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>());
+    line += !entry["generator"].get<bool>()   ? fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>())
+            : entry["takes_seed"].get<bool>() ? " (generated, any triangle count and seed)"
+                                              : " (generated, any triangle count)";
   }
   if (entry.contains("available") && !entry["available"].get<bool>()) {
     line += entry.contains("generator")

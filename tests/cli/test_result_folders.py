@@ -5,10 +5,21 @@ import csv
 import json
 import os
 import unittest
+from pathlib import Path
 
 from command_line_case import CommandLineCase, read_jsonl
 
 FEW = ("--skip", "diffuse", "--repetitions", "7")
+
+
+# Something of every kind that results have fields of.
+EVERYTHING = """\
+scenes: [{generate: sphere, triangles: 400}, {generate: sphere, triangles: 100, offset: [10]}]
+axes: {structure: [bvh8, kdtree, grid], isa: sse, traversal: [single, packet8, hybrid4, queued, stream, auto],
+       workload: [primary, diffuse, shadow, hard, camera_edges, whitted]}
+include: [{structure: bvh4, builder: [morton, ploc, binned_sah_reinsertion], workload: primary}]
+measure: {repetitions: 2, min_time: 0.0001, resolution: [16, 16]}
+"""
 
 
 class ResultFolders(CommandLineCase):
@@ -16,6 +27,16 @@ class ResultFolders(CommandLineCase):
         result = self.run_small("--shard", f"{index}/{of}", *FEW, *words)
         self.assertIn(result.returncode, (0, 1), result.stderr)
         return f"results/small-shard-{index}-of-{of}"
+
+    def test_docs_results_md_has_every_column_of_results_csv(self):
+        page = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
+        self.assertIn(self.call("run", self.write("all.yaml", EVERYTHING), "--no-plots", "--out", "all").returncode, (0, 1))
+        with open(self.folder / "all" / "results.csv", newline="") as table:
+            columns = next(csv.reader(table))
+        self.assertGreater(len(columns), 85)
+        for column in columns:
+            with self.subTest(column):
+                self.assertIn(f"`{column.removeprefix('phase_seconds.').removesuffix('_per_million')}`", page)
 
     def edit_cells(self, folder, change, to="edited"):
         """A copy of a result folder's cells and machine, changed: `change` gets each cell, `context` the machine."""
