@@ -113,7 +113,6 @@ TriangleMesh Layout::take(bool keep_instances) {
     for (TriangleMesh& part : parts_) part.materials = {};
     instancing->prototypes = std::move(parts_);
     mesh.instancing = std::move(instancing);
-    mesh.instancing = kept_instances(mesh, std::vector<bool>(mesh.size(), true));
   }
   parts_.clear(), placed_.clear();
   return mesh;

@@ -18,7 +18,8 @@ class Layout {
   /// vertices.
   void place(std::uint32_t part, const AffineMap& to_world, std::size_t first_material);
   /// The flat mesh. Its key frames are those of the part with most; parts with fewer get interpolated ones. Instances
-  /// are kept where `keep_instances` and nothing moves.
+  /// are kept where `keep_instances` and nothing moves, each part as a prototype, wherever its coordinates lie:
+  /// rescale() and sanitise() see to those.
   [[nodiscard]] TriangleMesh take(bool keep_instances);
 
  private:

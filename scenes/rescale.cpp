@@ -1,10 +1,12 @@
 #include "scenes/rescale.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -48,6 +50,10 @@ Span span_of(const TriangleMesh& mesh) {
   return span;
 }
 
+Vec3f scaled(Vec3f v, int exponent) {
+  return {std::ldexp(v.x, exponent), std::ldexp(v.y, exponent), std::ldexp(v.z, exponent)};
+}
+
 /// The power of two to multiply by, where that is called for and exact.
 std::optional<int> exponent_for(const Span& span) {
   if (!(span.largest > 0.0f)) return {};
@@ -60,28 +66,66 @@ std::optional<int> exponent_for(const Span& span) {
   return exponent;
 }
 
+bool is_in_range(const Span& span, int exponent) {
+  const float largest = std::ldexp(span.largest, exponent);
+  return largest >= std::ldexp(1.0f, -kExponent) && largest <= kMaxCoordinate;
+}
+
+bool stays_exact(const Span& span, int exponent) {
+  return exponent >= 0 || std::ilogb(span.smallest) + exponent >= kLeastNormalExponent;
+}
+
+/// A prototype that is then in range is scaled itself, and its maps stay what they are but for the translation;
+/// of the others the maps are scaled.
+std::shared_ptr<const Instancing> rescaled(const Instancing& instancing, int exponent) {
+  auto result = std::make_shared<Instancing>(instancing);
+  std::vector<bool> follows;
+  for (TriangleMesh& prototype : result->prototypes) {
+    const Span span = span_of(prototype);
+    follows.push_back(is_in_range(span, exponent) && stays_exact(span, exponent));
+    if (!follows.back()) continue;
+    for (Vec3f& v : prototype.vertices) v = scaled(v, exponent);
+  }
+  for (Instance& instance : result->instances) {
+    for (auto& row : instance.to_world.m)
+      for (int k = follows[instance.prototype] ? 3 : 0; k < 4; ++k) row[k] = std::ldexp(row[k], exponent);
+  }
+  return result;
+}
+
+/// Puts every corner where its instance's map has it, with the bits that subnormal numbers had lost.
+void lay_out_again(TriangleMesh& mesh) {
+  for (const Instance& instance : mesh.instancing->instances) {
+    const TriangleMesh& prototype = mesh.instancing->prototypes[instance.prototype];
+    const bool moved = !is_identity(instance.to_world);
+    for (std::size_t i = 0; i < prototype.size(); ++i) {
+      const std::array<Vec3f, 3> from = prototype.corners(i);
+      const Triangle& to = mesh.triangles[instance.first_primitive + i];
+      const std::uint32_t corners[3] = {to.a, to.b, to.c};
+      for (std::size_t k = 0; k < 3; ++k)
+        mesh.vertices[corners[k]] = moved ? transform_point(instance.to_world, from[k]) : from[k];
+    }
+  }
+}
+
 }  // namespace
 
 void rescale(Scene& scene, const std::string& source) {
   const Span span = span_of(scene.mesh);
   const std::optional<int> exponent = exponent_for(span);
   if (!exponent) return;
-  const auto scaled = [&](float x) { return std::ldexp(x, *exponent); };
-  const auto scale = [&](Vec3f& v) { v = {scaled(v.x), scaled(v.y), scaled(v.z)}; };
+  const auto scale = [&](Vec3f& v) { v = scaled(v, *exponent); };
   for (Vec3f& v : scene.mesh.vertices) scale(v);
   for (std::vector<Vec3f>& frame : scene.mesh.later_frames)
     for (Vec3f& v : frame) scale(v);
   if (scene.mesh.instancing) {
-    auto instancing = std::make_shared<Instancing>(*scene.mesh.instancing);
-    for (Instance& instance : instancing->instances)
-      for (auto& row : instance.to_world.m)
-        for (double& m : row) m = std::ldexp(m, *exponent);
-    scene.mesh.instancing = std::move(instancing);
+    scene.mesh.instancing = rescaled(*scene.mesh.instancing, *exponent);
+    if (*exponent > 0) lay_out_again(scene.mesh);
   }
   if (scene.camera) {
     scale(scene.camera->position), scale(scene.camera->look_at);
-    scene.camera->aperture_radius = scaled(scene.camera->aperture_radius),
-    scene.camera->focus_distance = scaled(scene.camera->focus_distance);
+    for (float* length : {&scene.camera->aperture_radius, &scene.camera->focus_distance})
+      *length = std::ldexp(*length, *exponent);
   }
   for (Light& light : scene.lights) {
     scale(light.position);

@@ -10,7 +10,8 @@ namespace arboretum {
 /// hundred of its triangles have one beyond kMaxCoordinate: what is larger is then below 1, or as much above as keeps
 /// every coordinate exact, none of them becoming subnormal. A scene that spans too much for that stays as it is, and so
 /// does one with a few stray triangles far out: sanitise() drops those. Camera, lights, key frames and instances
-/// follow; the power of two stands in `scene.report` and in a warning, led by `source`.
+/// follow, and what a Layout placed is laid out again where it grows; the power of two stands in `scene.report` and in
+/// a warning, led by `source`.
 void rescale(Scene& scene, const std::string& source);
 
 }  // namespace arboretum

@@ -56,7 +56,7 @@ void sanitise(Scene& scene, const std::string& source) {
       ++report.degenerate;
     }
   }
-  if (mesh.instancing && std::ranges::find(stays, false) != stays.end()) mesh.instancing = kept_instances(mesh, stays);
+  if (mesh.instancing) mesh.instancing = kept_instances(mesh, stays);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!stays[i]) continue;

@@ -6,7 +6,9 @@
 #include <fmt/format.h>
 
 #include "core/instances.h"
+#include "core/mesh_check.h"
 #include "core/random.h"
+#include "scenes/layout.h"
 #include "scenes/polygon.h"
 #include "scenes/rescale.h"
 #include "scenes/sanitise.h"
@@ -41,16 +43,12 @@ TEST_CASE("sanitising drops and counts, and keeps the order of the rest") {
 
 namespace {
 
-/// A triangle of `size` and one of about a thousandth of it, with camera, light, a second key frame and an instance.
+/// A triangle of `size` and one of about a thousandth of it, with camera, light and a second key frame.
 Scene scene_of_size(float size) {
   Scene scene;
   scene.mesh.vertices = {{0, 0, 0}, {size, 0, 0}, {0, 0.75f * size, 0}, {0, 0, 1e-3f * size}, {1e-3f * size, 0, 0}};
   scene.mesh.triangles = {{0, 1, 2}, {0, 3, 4}};
   scene.mesh.later_frames = {scene.mesh.vertices};
-  auto instancing = std::make_shared<Instancing>();
-  instancing->instances.resize(1);
-  instancing->instances[0].to_world.m[0][3] = size;
-  scene.mesh.instancing = instancing;
   scene.camera = Camera{.position = {0, 0, 2 * size}, .aperture_radius = 0.5f * size, .focus_distance = size};
   scene.lights = {Light{.position = {size, 0, 0}, .intensity = {size, size, size}}};
   return scene;
@@ -79,10 +77,59 @@ TEST_CASE("a scene out of range is multiplied by a power of two, exactly") {
     CHECK(scene.camera->focus_distance == 0.5f);
     CHECK(scene.lights[0].position.x == 0.5f);
     CHECK(double(scene.lights[0].intensity.x) == std::ldexp(double(before.lights[0].intensity.x), 2 * by));
-    CHECK(scene.mesh.instancing->instances[0].to_world.m[0][0] == std::ldexp(1.0, by));
-    CHECK(scene.mesh.instancing->instances[0].to_world.m[0][3] == 0.5);
     sanitise(scene, "test");
     CHECK(scene.mesh.size() == 2);
+  }
+}
+
+TEST_CASE("the instances of a scene out of range lie where its flat mesh does") {
+  const struct {
+    double object, scale, apart;  ///< the size in object space, what the maps scale by, how far apart they put it
+    std::size_t prototypes;       ///< that are left: one, or in world space one for each instance
+  } cases[] = {
+      {1e13, 1.0, 0.0, 1},    {1e13, 1.0, 3e13, 1},    {1.0, 1e13, 3e13, 1},    {1.0, 1e-13, 3e-13, 1},
+      {1.0, 1e-38, 0.0, 1},   {1.0, 1e-41, 3e-41, 1},  {1.0, 1e-44, 0.0, 1},    {1e-41, 1.0, 0.0, 1},
+      {1e-41, 1.0, 3e-41, 1}, {1e13, 1e-26, 3e-13, 3}, {1e13, 1e-54, 3e-41, 3}, {1e-13, 1e26, 3e13, 1},
+      {1e30, 1.0, 3e30, 1},   {0x1p-149, 1.0, 0.0, 1}, {1.0, 0x1p-149, 0.0, 1}, {1e13, 1.0, 1e17, 1},
+  };
+  for (const auto& c : cases) {
+    CAPTURE(c.object, c.scale, c.apart);
+    TriangleMesh pyramid;
+    for (const auto& v : kCorners)
+      pyramid.vertices.push_back({float(v[0] * c.object), float(v[1] * c.object), float(v[2] * c.object)});
+    for (const auto& f : kFaces)
+      pyramid.triangles.push_back({std::uint32_t(f[0]), std::uint32_t(f[1]), std::uint32_t(f[2])});
+    Layout layout;
+    const std::uint32_t part = layout.add_part(pyramid);
+    for (int i = 0; i < 3; ++i) {  // the first and the last unturned
+      const double cosine = i == 1 ? 0.6 : 1.0, sine = i == 1 ? 0.8 : 0.0, s = c.scale;
+      layout.place(part, {{{s * cosine, -s * sine, 0, i * c.apart}, {s * sine, s * cosine, 0, 0}, {0, 0, s, 0}}}, 0);
+    }
+    Scene scene;
+    scene.mesh = layout.take(true);
+    REQUIRE(scene.mesh.instancing);
+    const Instancing before = *scene.mesh.instancing;
+    rescale(scene, "test");
+    const int by = scene.report.scaled_by;
+    CHECK(by != 0);
+    sanitise(scene, "test");
+    REQUIRE(scene.mesh.size() == 12);
+    CHECK_NOTHROW(check_instances(scene.mesh));
+    const Instancing& after = *scene.mesh.instancing;
+    CHECK(after.prototypes.size() == c.prototypes);
+    REQUIRE(after.instances.size() == 3);
+    for (std::size_t i = 0; i < 12; ++i) {
+      AffineMap map = before.instances[i / 4].to_world;
+      for (auto& row : map.m)
+        for (double& m : row) m = std::ldexp(m, by);
+      const Instance& instance = after.instances[i / 4];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3f flat = scene.mesh.corners(i)[k];
+        // Where the scene is scaled up, nothing of what subnormal numbers lose.
+        CHECK(flat == transform_point(map, pyramid.corners(i % 4)[k]));
+        CHECK(flat == transform_point(instance.to_world, after.prototypes[instance.prototype].corners(i % 4)[k]));
+      }
+    }
   }
 }
 
@@ -104,7 +151,7 @@ TEST_CASE("a scene stays as it is where a power of two would not save it") {
   CHECK(unchanged(stray));
   // From 2^-120 to 2^100: the small coordinates would lose bits.
   Scene wide = scene_of_size(0x1p100f);
-  wide.mesh.later_frames.clear(), wide.mesh.instancing = nullptr;
+  wide.mesh.later_frames.clear();
   wide.mesh.vertices[4].x = 0x1p-120f;
   CHECK(unchanged(wide));
   Scene lost = wide;

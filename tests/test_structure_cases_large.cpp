@@ -3,6 +3,8 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "scenes/layout.h"
+#include "scenes/rescale.h"
 #include "scenes/sanitise.h"
 #include "scenes/scene.h"
 #include "tests/structure_cases.h"
@@ -250,5 +252,30 @@ TEST_CASE("B18: vertices of random bits: refused as they are; sanitised, the val
       }
       CHECK(compared > rays.size() / 2);
     }
+  }
+}
+
+TEST_CASE("instances of a scene that was out of range are answered as its flat mesh is") {
+  const struct {
+    float object;
+    double scale;
+  } sizes[] = {{1e13f, 1.0}, {1.0f, 1e-13}, {1.0f, 1e-41}, {1e-41f, 1.0}, {1e13f, 1e-26}};
+  for (const auto& [object, scale] : sizes) {
+    CAPTURE(object, scale);
+    Layout layout;
+    TriangleMesh ball = sphere(6);
+    for (Vec3f& v : ball.vertices) v = v * object;
+    const std::uint32_t part = layout.add_part(ball);
+    for (int i = 0; i < 3; ++i) {
+      const double c = scale * std::cos(i), s = scale * std::sin(i), apart = 1.5 * i * scale * double(object);
+      layout.place(part, {{{c, -s, 0, apart}, {s, c, 0, 0}, {0, 0, scale, 0}}}, 0);
+    }
+    Scene scene;
+    scene.mesh = layout.take(true);
+    rescale(scene, "test"), sanitise(scene, "test");
+    REQUIRE(scene.report.scaled_by != 0);
+    REQUIRE(scene.mesh.instancing);
+    CHECK(scene.mesh.instancing->instances.size() == 3);
+    for_each_combination(scene.mesh, generic_rays(scene.mesh, 200, 6));
   }
 }
