@@ -215,7 +215,10 @@ TEST_CASE("scenes as wide as floats go take no more cells than others, and lose 
   TriangleMesh many = random_triangles(300, 0.3f, 21);
   for (Vec3f& p : many.vertices)
     for (std::size_t a = 0; a < 3; ++a) p[a] = std::clamp(float(double(p[a]) * 2 * kMost), -kMost, kMost);
-  for (const TriangleMesh& mesh : {one, many}) {
+  // Of eight cells, the fewest that such a scene has, it touches seven.
+  TriangleMesh seven_cells;
+  add_triangle(seven_cells, {3e38f, -1.5e38f, -1.5e38f}, {-1.5e38f, 3e38f, -1.5e38f}, {-1.5e38f, -1.5e38f, 3e38f});
+  for (const TriangleMesh& mesh : {one, many, seven_cells}) {
     std::vector<Ray> rays;
     for (std::uint64_t i = 0; i < 200; ++i) {
       const auto c = mesh.corners(i % mesh.size());

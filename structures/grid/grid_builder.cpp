@@ -16,6 +16,8 @@ namespace arboretum::grid {
 namespace {
 
 constexpr std::size_t kChunk = 4096;
+constexpr std::uint64_t kMostInLists = 0xfffffff0u;
+constexpr std::uint64_t kFewestCells = 8;  ///< that no coarser grid goes below, two on each axis
 
 /// f(chunk number, begin, end) for chunks of fixed size: what each gives does not depend on the number of
 /// threads.
@@ -186,7 +188,7 @@ void add_inner_grids(const TriangleMesh& mesh, const BuilderParameters& paramete
   }
   for (std::size_t c = 0; c < outer; ++c) kept += cells.codes[c] == kEmptyLeaf ? cells.lists[c].size() : 0;
   const std::uint64_t all_cells = outer + places.back().cell, all_ids = kept + places.back().id;
-  if (all_cells > 0xfffffff0u || all_ids > 0xfffffff0u || places.back().level >= (1u << 28)) {
+  if (all_cells > kMostInLists || all_ids > kMostInLists || places.back().level >= (1u << 28)) {
     throw UserError("grid: " + std::to_string(all_cells) + " cells and " + std::to_string(all_ids) +
                     " references pass 2^32: use a smaller grid_density");
   }
@@ -242,14 +244,18 @@ void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, 
   }
   const Sizes sizes = sum_sizes(mesh, extent);
   const double n = double(mesh.size());
-  const std::uint64_t limit =
-      std::min<std::uint64_t>(std::uint64_t(two_level ? kOuterReferences : kMostReferences) * mesh.size(), 0xfffffff0u);
+  const std::uint64_t limit = std::min<std::uint64_t>(
+      std::uint64_t(two_level ? kOuterReferences : kMostReferences) * mesh.size(), kMostInLists);
   // The outer grid of two has cells for inner ones to refine; alone it has all of them.
   double wanted = std::max(1.0, wanted_cells(parameters, n, two_level ? kOuterShare : 1.0));
   for (;; wanted *= 0.5) {
     const Index3 counts = counts_within(sizes, extent, wanted, 2 * pad, double(limit));
     cells.levels.assign(1, make_level(lower, extent, counts));
-    if (fill_lists(mesh, cells.levels[0], pad, limit, cells.lists)) break;
+    // A scene wider than floats go has eight cells at least, and the coarsest level is taken as it is.
+    const bool coarsest = wanted <= 1.0;
+    const std::uint64_t most = coarsest ? std::min(std::max(limit, kFewestCells * mesh.size()), kMostInLists) : limit;
+    if (fill_lists(mesh, cells.levels[0], pad, most, cells.lists)) break;
+    if (coarsest) throw UserError("grid: the references of the fewest cells that can be pass 2^32: take a bvh8");
   }
   cells.codes.assign(cells.levels[0].size(), kEmptyLeaf);
   phase.ends("outer grid");
