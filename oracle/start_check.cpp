@@ -24,7 +24,7 @@ StartCheck check_closest_starts(std::span<const ExactHit> truth, std::span<const
       ++check.self_hits;
     } else if (given.primitive != exact.primitive) {  // kNoPrimitive: a miss
       const double tolerance = surface_tolerance(truth[i].t);
-      if (given.is_hit() && (!exact.is_hit() || given.t < truth[i].t - tolerance)) ++check.near_hits;
+      if (given.is_hit() && (!exact.is_hit() || !(given.t >= truth[i].t - tolerance))) ++check.near_hits;
       if (exact.is_hit() && (!given.is_hit() || given.t > truth[i].t + tolerance)) ++check.leaks;
     }
   }

@@ -14,8 +14,8 @@ struct StartCheck {
   std::uint64_t rays = 0;
   /// Closest hit: the primitive that the ray starts on. Any hit: something, where nothing is.
   std::uint64_t self_hits = 0;
-  /// Closest hit: another primitive, nearer by more than 2^-12 than the exact answer, or where nothing is: neighbours
-  /// mostly.
+  /// Closest hit: another primitive, nearer by more than 2^-12 than the exact answer, at a NaN, or where nothing is:
+  /// neighbours mostly.
   std::uint64_t near_hits = 0;
   /// Nothing, or another primitive farther by more than 2^-12, where something is: light leaks through it.
   std::uint64_t leaks = 0;

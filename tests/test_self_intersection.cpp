@@ -88,6 +88,7 @@ TEST_CASE("what is counted of starts: table") {
     return ExactHit{id == kNoPrimitive ? Hit{} : Hit{float(t), 0, 0, id}, t, false};
   };
   const auto given = [](float t, std::uint32_t id) { return Hit{t, 0, 0, id}; };
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   struct Case {
     ExactHit truth;
     Hit answer;
@@ -97,7 +98,8 @@ TEST_CASE("what is counted of starts: table") {
                         {exact(1, 5), given(1e-6f, 7), 1, 0, 0},  {exact(0, kNoPrimitive), given(1e-6f, 7), 1, 0, 0},
                         {exact(1, 5), given(0.5f, 6), 0, 1, 0},   {exact(0, kNoPrimitive), given(3, 6), 0, 1, 0},
                         {exact(1, 5), given(2, 6), 0, 0, 1},      {exact(1, 5), Hit{}, 0, 0, 1},
-                        {exact(0, kNoPrimitive), Hit{}, 0, 0, 0}, {exact(1, 5), given(1.0001f, 6), 0, 0, 0}};
+                        {exact(0, kNoPrimitive), Hit{}, 0, 0, 0}, {exact(1, 5), given(1.0001f, 6), 0, 0, 0},
+                        {exact(1, 5), given(nan, 6), 0, 1, 0},    {exact(0, kNoPrimitive), given(nan, 6), 0, 1, 0}};
   const std::uint32_t source = 7;
   for (const Case& c : cases) {
     INFO(c.truth.t << " " << c.truth.hit.primitive << " answered " << c.answer.t << " " << c.answer.primitive);
