@@ -56,6 +56,10 @@ Scene read_model(const std::filesystem::path& path) {
   return read_assimp(path);
 }
 
+std::string short_faces_warning(const std::filesystem::path& path, std::size_t faces) {
+  return fmt::format("{}: {} face{} of fewer than three corners left out", path.string(), faces, faces == 1 ? "" : "s");
+}
+
 std::string SceneSpec::name() const {
   if (!catalogue.empty()) return catalogue;
   if (!file.empty()) return one_line(file.stem().string());

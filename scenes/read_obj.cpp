@@ -281,8 +281,7 @@ Scene read_obj(const std::filesystem::path& path) {
   Scene& scene = reader.scene;
   if (!scene.texture_coordinates.empty()) scene.texture_coordinates.resize(scene.mesh.size());
   if (reader.short_faces > 0) {
-    scene.report.warnings.push_back(fmt::format("{}: {} face{} of fewer than three corners left out", path.string(),
-                                                reader.short_faces, reader.short_faces == 1 ? "" : "s"));
+    scene.report.warnings.push_back(short_faces_warning(path, reader.short_faces));
   }
   if (scene.mesh.triangles.empty()) {
     throw UserError(

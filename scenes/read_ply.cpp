@@ -163,7 +163,8 @@ void read_vertices(const Element& element, Cursor& cursor, TriangleMesh& mesh,
   }
 }
 
-void read_faces(const Element& element, Cursor& cursor, Scene& scene, const Failure& fail) {
+/// Returns how many have fewer than three corners; they are left out.
+std::size_t read_faces(const Element& element, Cursor& cursor, Scene& scene, const Failure& fail) {
   const std::size_t vertices = scene.mesh.vertices.size();
   const int list = element.find({"vertex_indices", "vertex_index"});
   if (list < 0 || !element.properties[std::size_t(list)].is_list) fail("the faces have no list 'vertex_indices'");
@@ -201,8 +202,7 @@ void read_faces(const Element& element, Cursor& cursor, Scene& scene, const Fail
     triangulate(corners, mesh.vertices, mesh.triangles);
     if (material >= 0) mesh.materials.resize(mesh.triangles.size(), std::uint16_t(id));
   }
-  if (short_faces > 0)
-    scene.report.warnings.push_back(fmt::format("{} faces of fewer than three corners left out", short_faces));
+  return short_faces;
 }
 
 void read_materials(const std::filesystem::path& path, Scene& scene, const Failure& fail) {
@@ -244,7 +244,8 @@ Scene read_ply(const std::filesystem::path& path) {
       has_vertices = true;
     } else if (element.name == "face" && !has_faces) {
       if (!has_vertices) fail("the faces come before the vertices; that order is not read");
-      read_faces(element, cursor, scene, fail);
+      if (const std::size_t short_faces = read_faces(element, cursor, scene, fail); short_faces > 0)
+        scene.report.warnings.push_back(short_faces_warning(path, short_faces));
       has_faces = true;
     } else if (element.name == "tristrips") {
       fail("holds triangle strips, which are not read; convert it to faces");

@@ -2,6 +2,7 @@
 // sanitising (non-finite, out of range, zero area) to scenes/sanitise.h.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -30,6 +31,9 @@ namespace arboretum {
 
 /// Any model by its extension, not sanitised.
 [[nodiscard]] Scene read_model(const std::filesystem::path& path);
+
+/// The warning that so many faces of a file are left out.
+[[nodiscard]] std::string short_faces_warning(const std::filesystem::path& path, std::size_t faces);
 
 /// A file that a model names, relative to the model's folder; a backslash parts folders as '/' does.
 [[nodiscard]] std::filesystem::path beside(const std::filesystem::path& file, std::string name);

@@ -166,14 +166,24 @@ TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
   }
 }
 
-TEST_CASE("OBJ: faces of too few corners are counted in words") {
+TEST_CASE("OBJ, PLY: faces of too few corners are counted in words") {
   const Folder folder;
-  const std::string text = obj_text();
-  for (const auto& [faces, says] : {std::pair{"f 1 2\n", ": 1 face of fewer than three corners left out"},
-                                    {"f 1 2\nf 3\n", ": 2 faces of fewer than three corners left out"}}) {
-    const std::vector<std::string> warnings = load_file(folder.write("a.obj", text + faces)).report.warnings;
-    REQUIRE(warnings.size() == 1);
-    CHECK_THAT(warnings[0], Catch::EndsWith(says));
+  const auto ply = [](const std::string& faces, std::size_t count) {
+    std::string text = ply_ascii();
+    return text.replace(text.find("face 4"), 6, "face " + std::to_string(4 + count)) + faces;
+  };
+  const struct {
+    std::string file, text, says;
+  } cases[] = {{"a.obj", obj_text() + "f 1 2\n", ": 1 face of fewer than three corners left out"},
+               {"a.obj", obj_text() + "f 1 2\nf 3\n", ": 2 faces of fewer than three corners left out"},
+               {"a.ply", ply("2 0 1\n", 1), ": 1 face of fewer than three corners left out"},
+               {"a.ply", ply("2 0 1\n1 2\n", 2), ": 2 faces of fewer than three corners left out"}};
+  for (const auto& c : cases) {
+    const fs::path path = folder.write(c.file, c.text);
+    const Scene scene = load_file(path);
+    check_pyramid(scene);
+    REQUIRE(scene.report.warnings.size() == 1);
+    CHECK(scene.report.warnings[0] == path.string() + c.says);
   }
 }
 
