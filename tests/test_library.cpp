@@ -324,7 +324,9 @@ TEST_CASE("more threads than there are do no harm") {
   settings.threads = 100000;
   const Tracer many(sphere(100), settings), one(sphere(100), with(&TracerSettings::isa, "scalar"));
   const Ray ray{{0, 0, -5}, 0, {0, 0, 1}, kInfinity};
-  CHECK(many.closest_hit(ray).primitive == one.closest_hit(ray).primitive);
+  const Hit hit = many.closest_hit(ray);
+  CHECK(hit.is_hit());
+  CHECK(hit.primitive == one.closest_hit(ray).primitive);
 }
 
 TEST_CASE("misuse is told in one line that names the mend") {
