@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <string_view>
 
+#include "core/utf8.h"
+
 namespace arboretum {
 namespace {
 
@@ -16,19 +18,17 @@ std::string escaped(char c) {
   return text;
 }
 
-/// Not the first byte of a UTF-8 character.
-bool continues(char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; }
-
 /// What was wrong stands at the beginning, the mend at the end.
 std::string without_middle(const std::string& text) {
   constexpr std::string_view kGap = " ... ";
   std::size_t head = UserError::kLongest / 2, tail = text.size() - (UserError::kLongest - head - kGap.size());
-  while (head > 0 && continues(text[head])) --head;
-  while (tail < text.size() && continues(text[tail])) ++tail;
+  while (head > 0 && continues_character(text[head])) --head;
+  while (tail < text.size() && continues_character(text[tail])) ++tail;
   return text.substr(0, head) + std::string(kGap) + text.substr(tail);
 }
 
-std::string one_line(const std::string& message) {
+/// Controls escaped, and no longer than kLongest.
+std::string shown(const std::string& message) {
   std::string line;
   line.reserve(message.size());
   for (const char c : message) {
@@ -43,6 +43,6 @@ std::string one_line(const std::string& message) {
 
 }  // namespace
 
-UserError::UserError(const std::string& message) : std::runtime_error(one_line(message)) {}
+UserError::UserError(const std::string& message) : std::runtime_error(shown(message)) {}
 
 }  // namespace arboretum

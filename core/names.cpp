@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/utf8.h"
 
 namespace arboretum {
 namespace {
@@ -14,7 +15,7 @@ constexpr std::size_t kLongestName = 100;
 std::string shortened(std::string_view name) {
   if (name.size() <= kLongestName) return std::string(name);
   std::size_t end = kLongestName;
-  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xc0) == 0x80) --end;  // within a UTF-8 character
+  while (end > 0 && continues_character(name[end])) --end;
   return std::string(name.substr(0, end)) + "... (" + std::to_string(name.size()) + " characters)";
 }
 

@@ -4,17 +4,15 @@
 #include <cmath>
 #include <limits>
 
+#include "core/exact/determinant.h"
+
 namespace arboretum {
 namespace {
 
-using Vec3d = std::array<double, 3>;
+using Vec3d = Triple<double>;
 
 Vec3d to_double(Vec3f p) noexcept { return {p.x, p.y, p.z}; }
 Vec3d difference(const Vec3d& a, const Vec3d& b) noexcept { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) noexcept {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double dot(const Vec3d& a, const Vec3d& b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// The corner 0, the edges from it, and their normal.
 struct Frame {

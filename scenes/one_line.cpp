@@ -1,4 +1,5 @@
 // Words of others, fit for one line: bytes of broken files are not UTF-8, and what is printed may end up in JSON.
+#include "core/utf8.h"
 #include "scenes/readers.h"
 
 namespace arboretum {
@@ -16,7 +17,7 @@ std::size_t character_length(std::string_view text) {
                              : lead < 0xf5 ? 4
                                            : 0;
   for (std::size_t i = 1; i < length; ++i)
-    if ((byte(i) & 0xc0) != 0x80) return 0;
+    if (i >= text.size() || !continues_character(text[i])) return 0;
   const bool is_too_long = (lead == 0xe0 && next < 0xa0) || (lead == 0xf0 && next < 0x90);
   const bool is_beyond = (lead == 0xed && next >= 0xa0) || (lead == 0xf4 && next >= 0x90);
   return is_too_long || is_beyond ? 0 : length;
