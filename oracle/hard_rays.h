@@ -77,7 +77,7 @@ class HardRayMaker {
 };
 
 /// Every vertex v becomes (v + offset * (1, -3/4, 1/2)) * 2^exponent, rounded after the addition. Instances are laid
-/// out.
+/// out, but for offset 0 and exponent 0, which give a copy of the mesh.
 [[nodiscard]] TriangleMesh moved_and_scaled(const TriangleMesh& mesh, double offset, int exponent);
 
 }  // namespace arboretum

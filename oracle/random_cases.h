@@ -16,7 +16,7 @@ struct RandomSubject {
 };
 
 /// Up to a hundred triangles: a soup, a closed bipyramid, a height field, a strip of slivers, a tangle over few
-/// vertices, shells one in the other; moved and scaled by powers of two within 2^-30 .. 2^30, so that all stays within
+/// vertices, shells one in the other; moved by up to 2^17 and scaled by 2^-30 .. 2^10, so that all stays within
 /// what intersectors promise.
 [[nodiscard]] RandomSubject random_subject(std::uint64_t seed, std::uint64_t index, std::size_t rays);
 
