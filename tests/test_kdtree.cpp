@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -190,6 +191,33 @@ TEST_CASE("leaves cover every triangle, cells tile, duplicates and depth are bou
         CHECK(seen.leaves == seen.nodes + 1);
       }
     }
+  }
+}
+
+TEST_CASE("a scene wider than floats go is split as a narrower one is") {
+  constexpr float kMost = std::numeric_limits<float>::max();
+  const auto scaled = [](float by) {
+    TriangleMesh mesh = random_triangles(3000, 0.02f, 5);
+    for (Vec3f& p : mesh.vertices) p = {p.x * by, p.y * by, p.z * by};
+    return mesh;
+  };
+  const TriangleMesh unit = scaled(1.0f);
+  const Bounds3f box = unit.bounds();
+  float reach = 0;
+  for (std::size_t k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
+  const TriangleMesh narrow = scaled(0.25f * kMost / reach), wide = scaled(kMost / reach * 0.999f);
+  for (std::size_t k = 0; k < 3; ++k) REQUIRE(std::isinf(wide.bounds().upper[k] - wide.bounds().lower[k]));
+  for (const char* builder : kBuilders) {
+    INFO(builder);
+    Recorder of_narrow(narrow), of_wide(wide);
+    REQUIRE(build(narrow, builder)->visit(of_narrow));
+    REQUIRE(build(wide, builder)->visit(of_wide));
+    CAPTURE(of_wide.leaves, of_narrow.leaves);
+    CHECK(of_narrow.leaves > 300);
+    CHECK(10 * of_wide.leaves > 8 * of_narrow.leaves);
+    CHECK(10 * of_wide.references < 12 * of_narrow.references);
+    CHECK(of_wide.cells_tile());
+    CHECK(of_wide.lost_points() == 0);
   }
 }
 

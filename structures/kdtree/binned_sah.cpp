@@ -33,10 +33,10 @@ struct BinMap {
 
   BinMap(const Bounds3f& bounds, unsigned n) : bins(int(n)) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const float extent = bounds.upper[k] - bounds.lower[k];
+      // Where that is more than a float holds the bins end before the bounds, and what lies beyond is in the last one.
+      const float extent = std::min(bounds.upper[k] - bounds.lower[k], std::numeric_limits<float>::max());
       lower[k] = bounds.lower[k];
-      const bool thick =
-          extent > std::numeric_limits<float>::min() * float(kMaxBins) && extent < std::numeric_limits<float>::max();
+      const bool thick = extent > std::numeric_limits<float>::min() * float(kMaxBins);
       scale[k] = thick ? float(n) / extent : 0.0f;
       width[k] = thick ? extent / float(n) : 0.0f;
     }
