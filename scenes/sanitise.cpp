@@ -1,7 +1,5 @@
 #include "scenes/sanitise.h"
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "core/coordinates.h"

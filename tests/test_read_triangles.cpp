@@ -1,6 +1,5 @@
 // What becomes of triangles that were read: what is dropped, a scene out of range, zero area, polygons in triangles.
 #include <cmath>
-#include <memory>
 #include <numeric>
 
 #include <fmt/format.h>
