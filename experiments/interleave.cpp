@@ -32,12 +32,24 @@ class SilentReporter final : public benchmark::BenchmarkReporter {
 }  // namespace
 
 void initialize_benchmark(const std::vector<std::string>& flags) {
-  // Its own warm-up would call a job like a repetition, with other iterations; cells are warmed up before. This goes
-  // before the environment's BENCHMARK_MIN_WARMUP_TIME.
-  std::vector<std::string> words{"arboretum", "--benchmark_enable_random_interleaving=true",
-                                 "--benchmark_min_warmup_time=0"};
+  // Google Benchmark's own warm-up would call a job like a repetition, with other iterations; cells are warmed up
+  // before. The rest goes before the environment's BENCHMARK_OUT, BENCHMARK_LIST_TESTS and the like: files, lists and
+  // formats are the command line's, and hardware counters would be read within what is timed. Our jobs have
+  // repetitions, iterations and units of their own.
+  std::vector<std::string> words{"--benchmark_enable_random_interleaving=true",
+                                 "--benchmark_min_warmup_time=0",
+                                 "--benchmark_list_tests=false",
+                                 "--benchmark_out=",
+                                 "--benchmark_out_format=json",
+                                 "--benchmark_format=console",
+                                 "--benchmark_color=auto",
+                                 "--benchmark_time_unit=",
+                                 "--benchmark_context=",
+                                 "--benchmark_perf_counters=",
+                                 "--v=0"};
   words.insert(words.end(), flags.begin(), flags.end());
-  std::vector<char*> arguments;
+  static char name[] = "arboretum";  // Google Benchmark keeps the pointer
+  std::vector<char*> arguments{name};
   for (std::string& word : words) arguments.push_back(word.data());
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());

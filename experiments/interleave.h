@@ -25,8 +25,9 @@ struct InterleavedJob {
   std::function<void(const Repetition&)> ended;   ///< called right after each
 };
 
-/// Hands Google Benchmark its own `--benchmark_*` flags, random interleaving on unless they say otherwise.
-/// Call once, before run_interleaved. Throws UserError for a flag that it does not know.
+/// Hands Google Benchmark its own `--benchmark_*` flags, random interleaving on unless they say otherwise; its
+/// environment variables (BENCHMARK_OUT, …) take no effect. Call once, before run_interleaved. Throws UserError for a
+/// flag that it does not know.
 void initialize_benchmark(const std::vector<std::string>& flags);
 
 /// Runs every repetition of every job. What a job throws ends the run and comes out here.

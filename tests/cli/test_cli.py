@@ -254,8 +254,30 @@ class CommandLine(CommandLineCase):
         self.assert_error(self.run_small(*few, "--benchmark_repetitions=3", "--repetitions", "3"), "keep one")
         self.assert_error(self.run_small(*few, "--benchmark_color=true"), "no effect")
         self.assertFalse((self.folder / "out").exists())
-        lasting = {**os.environ, "BENCHMARK_MIN_WARMUP_TIME": "0.1"}
-        self.assertEqual(self.run_small(*few, env=lasting).returncode, 0)
+
+    def test_the_environment_variables_of_google_benchmark_have_no_effect(self):
+        few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build", "--out", "out")
+        plain = self.run_small(*few)
+        self.assertEqual(plain.returncode, 0, plain.stderr)
+        cells = self.cells(*few[:-2])
+
+        def lines(run):
+            return len([line for line in run.stderr.splitlines() if not line.startswith("warning: noisy machine")])
+
+        for name, value in [("MIN_WARMUP_TIME", "0.1"), ("OUT", "/nonexistent/x.json"), ("OUT", "stray.json"), ("LIST_TESTS", "1"), ("FILTER", "nothing"),
+                            ("FORMAT", "xml"), ("OUT_FORMAT", "xml"), ("REPETITIONS", "2"), ("TIME_UNIT", "h"), ("PERF_COUNTERS", "CYCLES"), ("V", "3"), ("COLOR", "sometimes"),
+                            ("ENABLE_RANDOM_INTERLEAVING", "false"), ("REPORT_AGGREGATES_ONLY", "true")]:
+            with self.subTest(name=name, value=value):
+                shutil.rmtree(self.folder / "out")
+                result = self.run_small(*few, env={**os.environ, "BENCHMARK_" + name: value})
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertEqual(lines(result), lines(plain), result.stderr)
+                self.assertTrue(result.stdout.startswith("\nsphere_flake"), result.stdout)
+                self.assertTrue((self.folder / "out/results.json").exists())
+                measured = read_jsonl(self.folder / "out/cells.jsonl")
+                self.assertEqual(sorted(cell["name"] for cell in measured), sorted(cells))
+                self.assertTrue(all(len(cell["repetitions"]) == 3 for cell in measured))
+        self.assertFalse((self.folder / "stray.json").exists())
 
     def test_an_isa_that_is_lacking_is_skipped_by_name(self):
         result = self.run_small("isa=scalar,sse", "workload=primary", env={**os.environ, "ARBORETUM_ISA": "scalar"})
