@@ -45,6 +45,7 @@ class Planner {
         std::ranges::move(elsewhere_, std::back_inserter(plan_.elsewhere));
       }
     }
+    say_once();
     refuse_ineffective();
     return std::move(plan_);
   }
@@ -180,21 +181,19 @@ class Planner {
   void add(Cell cell, std::vector<Cell>& out) {
     const StructureEntry* entry = registry_.structure(cell.structure);
     resolve(cell, entry);
-    if (!experiment_.metrics.trace) cell.metric = Cell::Metric::build;
     for (std::size_t i = 0; i < experiment_.exclude.size(); ++i) {
       if (!matches(experiment_.exclude[i], cell)) continue;
       used_excludes_.insert(i);
       ++taken_away_;
       // Once, however many values of what it does not read there are
-      const std::string name = cell.name();
-      if (excluded_.insert(name).second) ++plan_.excluded;
+      const std::string name = listed_name(cell);
+      excluded_.insert(name);
       if (include_ && excluded_of_include_.emplace(include_, name).second)
-        plan_.excluded_includes.push_back(fmt::format("{}  excluded: {} takes away what {} adds", name,
-                                                      experiment_.exclude[i].where, include_->where));
+        excluded_includes_.emplace_back(name, fmt::format("{}  excluded: {} takes away what {} adds", name,
+                                                          experiment_.exclude[i].where, include_->where));
       return;
     }
-    std::string name = cell.name();
-    if (!names_.insert(name).second) return;
+    if (!names_.insert(cell.name()).second) return;
     ++added_;
     traversals_.insert(cell.traversal);
     for (const auto& [parameter, where] : experiment_.parameter_places)
@@ -202,15 +201,40 @@ class Planner {
         parameters_read_.insert(parameter);
     const std::string never = why_impossible(cell, experiment_.scenes[cell.scene_index].moves, registry_),
                       here = lacking(cell);
-    cell.metric = Cell::Metric::trace;
     if (never.empty() && here.empty()) {
       out.push_back(std::move(cell));
       return;
     }
     // Said first, whatever else is the matter
     const bool missing = !experiment_.scenes[cell.scene_index].missing.empty();
-    plan_.skipped.push_back({std::move(name), never.empty() || missing ? here : never});
+    skip({listed_name(cell), never.empty() || missing ? here : never}, never.empty());
     if (never.empty()) elsewhere_.push_back(std::move(cell));
+  }
+
+  /// What is left out of a sweep that traces nothing are builds, whatever would have had them traced.
+  std::string listed_name(const Cell& trace) const {
+    return experiment_.metrics.trace ? trace.name() : build_of(trace).name();
+  }
+
+  /// A name once; of several reasons the one that other machines do not have.
+  void skip(SkippedCell cell, bool elsewhere) {
+    const auto [place, is_new] = skipped_.try_emplace(cell.name, plan_.skipped.size());
+    if (is_new)
+      plan_.skipped.push_back(std::move(cell));
+    else if (elsewhere)
+      plan_.skipped[place->second] = std::move(cell);
+  }
+
+  /// A build may be planned for one trace, skipped for another and excluded for a third: the first of these holds.
+  void say_once() {
+    std::set<std::string> planned;
+    for (const Cell& cell : plan_.cells) planned.insert(cell.name());
+    std::erase_if(plan_.skipped, [&](const SkippedCell& cell) { return planned.contains(cell.name); });
+    const auto is_told = [&](const std::string& name) { return planned.contains(name) || skipped_.contains(name); };
+    std::erase_if(excluded_, is_told);
+    plan_.excluded = excluded_.size();
+    for (auto& [name, line] : excluded_includes_)
+      if (!is_told(name)) plan_.excluded_includes.push_back(std::move(line));
   }
 
   /// The structures that an include means. Where it names none they are those of the sweep that take a builder and a
@@ -325,8 +349,10 @@ class Planner {
   std::set<std::string> names_, traversals_, builds_, parameters_read_;
   std::map<std::array<std::string, 4>, bool> reads_;  ///< of parameter, structure, builder, below
   std::set<std::size_t> used_includes_, used_excludes_;
-  std::size_t added_ = 0, taken_away_ = 0;  ///< the latter: by excludes, a cell as often as it came up
-  std::set<std::string> excluded_;          ///< names
+  std::size_t added_ = 0, taken_away_ = 0;      ///< the latter: by excludes, a cell as often as it came up
+  std::set<std::string> excluded_;              ///< names
+  std::map<std::string, std::size_t> skipped_;  ///< names, and their places in the plan
+  std::vector<std::pair<std::string, std::string>> excluded_includes_;  ///< name and line
   std::set<std::pair<const CellChoice*, std::string>> excluded_of_include_;
   const CellChoice* include_ = nullptr;  ///< the one whose cells are being added
 };

@@ -17,15 +17,15 @@ struct Plan {
   std::size_t in_other_shards = 0;  ///< by --shard
   /// Cells of `include` that `exclude` takes away, a line for each: name, and which entries.
   std::vector<std::string> excluded_includes = {};
-  /// Cells that a machine with more instruction sets, or with the optional scenes, would measure. The trace cells of
-  /// them are among `skipped`.
+  /// Cells that a machine with more instruction sets, or with the optional scenes, would measure. Those of them that
+  /// trace are among `skipped`; the builds, too, where nothing is traced.
   std::vector<Cell> elsewhere;
 };
 
 /// The product of the axes, with `include`, without `exclude`. A combination that has no kernel, or whose ISA
-/// the machine lacks, is skipped with its reason. A parameter multiplies and names the cells whose builder, or way of
-/// traversal, reads it, and no others. Throws UserError for an include that adds nothing, an exclude that takes nothing
-/// away, and a parameter that no cell reads.
+/// the machine lacks, is skipped with its reason; where nothing is traced, the build that it would take. A parameter
+/// multiplies and names the cells whose builder, or way of traversal, reads it, and no others. Throws UserError for an
+/// include that adds nothing, an exclude that takes nothing away, and a parameter that no cell reads.
 [[nodiscard]] Plan make_plan(const Experiment& experiment, const Registry& registry);
 
 /// Keeps the cells (those of `elsewhere` and the skipped ones too) whose names a NameFilter takes. Throws UserError for

@@ -1,4 +1,8 @@
 // From a YAML file to the cells of a sweep: faults, the product, includes, filters, the effective configuration.
+#include <fmt/format.h>
+
+#include <map>
+
 #include "experiments/axis_words.h"
 #include "experiments/config.h"
 #include "experiments/effective.h"
@@ -184,6 +188,41 @@ axes:
   CHECK(reasons["list has no watertight"] == 2);
   CHECK(reasons["tree has no builder none (it takes binned_sah, morton)"] == 4);
   CHECK(reasons["this build has no embree: install libembree-dev and build again"] == 8);
+}
+
+TEST_CASE("of a sweep that traces nothing builds are skipped and excluded, each once, and none that is measured") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const fs::path file = folder.write("builds.yaml", R"(
+scenes: [{generate: sphere, triangles: 500}]
+axes:
+  structure: [tree, list]
+  builder: [binned_sah, none]
+  leaf: [triangle4]
+  intersector: [watertight, moller_trumbore]
+  isa: [sse, avx512]
+  workload: [primary, shadow]
+exclude: [{structure: tree, intersector: watertight}, {structure: list, builder: binned_sah, isa: sse}]
+metrics: [build]
+)");
+  const auto name = [](const char* structure, const char* builder, const char* isa) {
+    return fmt::format("build/sphere-500/{}/{}/triangle4/-/-/-/{}/-/threads:1", structure, builder, isa);
+  };
+  const Plan plan = make_plan(read_experiment(file, registry), registry);
+  CHECK(names(plan, Cell::Metric::build) ==
+        std::vector{name("tree", "binned_sah", "sse"), name("list", "none", "sse")});
+  std::map<std::string, std::string> skipped;
+  for (const SkippedCell& cell : plan.skipped) CHECK(skipped.emplace(cell.name, cell.reason).second);
+  const std::string tree_has_none = "tree has no builder none (it takes binned_sah, morton)";
+  CHECK(skipped == std::map<std::string, std::string>{
+                       {name("tree", "binned_sah", "avx512"), "no avx512"},
+                       {name("tree", "none", "sse"), tree_has_none},
+                       {name("tree", "none", "avx512"), tree_has_none},
+                       {name("list", "binned_sah", "avx512"), "list has no builder binned_sah (it takes none)"},
+                       {name("list", "none", "avx512"), "no avx512"}});
+  CHECK(plan.excluded == 1);  // binned_sah of the list by SSE; moller_trumbore takes what watertight does of the tree
+  CHECK(plan.elsewhere.size() == 2);
+  for (const Cell& cell : plan.elsewhere) CHECK(skipped[cell.name()] == "no avx512");
 }
 
 TEST_CASE("builder all is each that the structure takes, a named one not twice") {
