@@ -26,7 +26,7 @@ Json cell_json(const ComparedCell& c) {
   json["adjusted_p"] = c.is_tested() ? Json(c.adjusted_p) : Json();
   json["verdict"] = to_string(c.verdict), json["equal"] = c.equal, json["beyond"] = c.beyond;
   json["repetitions_a"] = c.a.repetitions.size(), json["repetitions_b"] = c.b.repetitions.size();
-  for (const char* fact : {"rays", "wrong_answers", "sah_cost", "bytes"}) {
+  for (const char* fact : {"rays", "checked_rays", "wrong_answers", "sah_cost", "bytes"}) {
     for (const auto& [letter, result] : {std::pair{"a", &c.a}, std::pair{"b", &c.b}})
       json[fmt::format("{}_{}", fact, letter)] = result->has_fact(fact) ? result->facts[fact] : Json();
   }

@@ -119,9 +119,7 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
     for (const std::string& axis : axes.varying) row.push_back(plain_text(values[i][axis]));
     if (row.empty()) row.push_back(c->a.cell.structure);
     const double triangles = c->a.fact("triangles");
-    const auto speed = [&](double rate) {
-      return trace ? fmt::format("{:.2f}", rate * 1e-6) : fmt::format("{:.2f}", 1e3 * triangles / rate);
-    };
+    const auto speed = [&](double rate) { return figure(trace ? rate * 1e-6 : 1e3 * triangles / rate, 2); };
     row.insert(row.end(), {speed(c->rate_a), speed(c->rate_b), fmt::format("{:.3f}", c->ratio.median),
                            c->is_tested() ? interval_text(c->ratio) : "-", c->is_tested() ? p_text(c->adjusted_p) : "-",
                            std::string(to_string(c->verdict))});
@@ -219,7 +217,7 @@ std::string wrong_table(const Comparison& comparison) {
     if (c.a.has_fact("wrong_answers") != c.b.has_fact("wrong_answers")) ++unchecked;
     if (c.more_wrong_answers().value_or(0.0) == 0.0) continue;
     rows.push_back({c.a.cell.name(), fmt::format("{:.0f}", c.a.fact("wrong_answers")),
-                    fmt::format("{:.0f}", c.b.fact("wrong_answers")), fmt::format("{:.0f}", c.a.fact("rays"))});
+                    fmt::format("{:.0f}", c.b.fact("wrong_answers")), fmt::format("{:.0f}", c.a.checked_rays())});
   }
   std::string text = rows.size() == 1 ? "" : "\n" + format_table(rows, 1);
   if (unchecked > 0)
@@ -231,14 +229,14 @@ std::string wrong_table(const Comparison& comparison) {
 std::string structure_table(const Comparison& comparison) {
   std::vector<TableRow> rows{{"structure changed", "SAH A", "SAH B", "B/A", "bytes A", "bytes B", "B/A"}};
   for (const StructureChange& s : comparison.structures) {
-    const auto figure = [](const std::optional<double>& v, const char* format) {
+    const auto text_of = [](const std::optional<double>& v, const char* format) {
       return v ? fmt::format(fmt::runtime(format), *v) : "-";
     };
     const auto ratio = [](const std::optional<double>& a, const std::optional<double>& b) {
       return a && b && *a > 0.0 ? fmt::format("{:.4f}", *b / *a) : "-";
     };
-    rows.push_back({s.structure, figure(s.sah_a, "{:.3f}"), figure(s.sah_b, "{:.3f}"), ratio(s.sah_a, s.sah_b),
-                    figure(s.bytes_a, "{:.0f}"), figure(s.bytes_b, "{:.0f}"), ratio(s.bytes_a, s.bytes_b)});
+    rows.push_back({s.structure, text_of(s.sah_a, "{:.3f}"), text_of(s.sah_b, "{:.3f}"), ratio(s.sah_a, s.sah_b),
+                    text_of(s.bytes_a, "{:.0f}"), text_of(s.bytes_b, "{:.0f}"), ratio(s.bytes_a, s.bytes_b)});
   }
   return rows.size() == 1 ? "" : "\n" + format_table(rows, 1);
 }

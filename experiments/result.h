@@ -53,6 +53,8 @@ struct CellResult {
   [[nodiscard]] std::vector<double> rates(bool cpu) const;
   /// A number among the facts, or `otherwise`.
   [[nodiscard]] double fact(const char* name, double otherwise = 0.0) const;
+  /// How many rays the cell's wrong answers are of: of renderers not those that were timed.
+  [[nodiscard]] double checked_rays() const { return fact("checked_rays", fact("rays")); }
   [[nodiscard]] bool has_fact(const char* name) const { return facts.contains(name); }
 };
 

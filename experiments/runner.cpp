@@ -20,6 +20,7 @@
 #include "experiments/scene_data.h"
 #include "experiments/structure_pool.h"
 #include "experiments/render_job.h"
+#include "experiments/table_text.h"
 #include "experiments/trace_job.h"
 
 namespace arboretum {
@@ -251,7 +252,8 @@ class Runner {
     journal_.finish(result);
     const std::string name = result.cell.name();
     const double rate = median(result.rates(result.is_trace() && cpu_));
-    std::string outcome = fmt::format("{:.1f} {}", rate * 1e-6, result.is_trace() ? rate_unit(cpu_) : "Mtriangle/s");
+    std::string outcome =
+        fmt::format("{} {}", figure(rate * 1e-6, 1), result.is_trace() ? rate_unit(cpu_) : "Mtriangle/s");
     if (result.has_fact("wrong_answers"))
       outcome += fmt::format(", {} wrong", result.facts["wrong_answers"].get<std::uint64_t>());
     progress_.cell_done(name, outcome);

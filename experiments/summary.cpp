@@ -58,7 +58,7 @@ std::string optional_figure(const CellResult& r, const char* fact, const char* f
 
 /// "-" of one repetition.
 std::string interval_text(const Interval& i, std::size_t repetitions) {
-  return repetitions < 2 ? "-" : fmt::format("[{:.2f}, {:.2f}]", i.low, i.high);
+  return repetitions < 2 ? "-" : fmt::format("[{}, {}]", figure(i.low, 2), figure(i.high, 2));
 }
 
 /// The fewest and the most repetitions of a cell.
@@ -86,6 +86,9 @@ std::string interval_words(const std::vector<const CellResult*>& results) {
                      100.0 * range_coverage(std::max<std::size_t>(least, 2)), kFewestOfInterval);
 }
 
+/// Of the rays whose answers were checked.
+double wrong_share(const CellResult& r) { return r.fact("wrong_answers") / std::max(r.checked_rays(), 1.0); }
+
 Row trace_row(const CellResult& r, const std::vector<CellResult>& all, bool cpu) {
   const Cell& c = r.cell;
   const Interval rate = median_interval(r.rates(cpu));
@@ -99,14 +102,12 @@ Row trace_row(const CellResult& r, const std::vector<CellResult>& all, bool cpu)
           c.traversal_name(),
           std::string(to_string(c.isa)),
           std::to_string(c.threads),
-          fmt::format("{:.2f}", rate.median * 1e-6),
+          figure(rate.median * 1e-6, 2),
           interval_text({rate.median * 1e-6, rate.low * 1e-6, rate.high * 1e-6}, r.repetitions.size()),
-          embree ? fmt::format("{:.2f}", rate_of(r, cpu) / std::max(rate_of(*embree, cpu), 1e-9)) : "-",
-          r.has_fact("wrong_answers")
-              ? fmt::format("{:.1f}", 1e6 * r.fact("wrong_answers") / std::max(r.fact("rays"), 1.0))
-              : "unchecked",
+          embree ? figure(rate_of(r, cpu) / std::max(rate_of(*embree, cpu), 1e-9), 2) : "-",
+          r.has_fact("wrong_answers") ? figure(1e6 * wrong_share(r), 1) : "unchecked",
           optional_figure(r, "sah_cost", "{:.1f}"),
-          build ? fmt::format("{:.1f}", *build) : "-"};
+          build ? figure(*build, 1) : "-"};
 }
 
 /// What became of rays that leave their surface in one of several ways.
@@ -132,16 +133,17 @@ std::string build_table(const std::vector<CellResult>& all) {
     const Interval time = median_interval(milliseconds(r));
     const Cell& c = r.cell;
     rows.push_back({c.scene, c.structure, c.builder_name(), c.leaf, std::string(to_string(c.isa)),
-                    std::to_string(c.threads), fmt::format("{:.2f}", time.median),
-                    interval_text(time, r.repetitions.size()), fmt::format("{:.2f}", median(r.rates(false)) * 1e-6),
-                    optional_figure(r, "bytes_per_triangle", "{:.0f}"), optional_figure(r, "sah_cost", "{:.1f}")});
+                    std::to_string(c.threads), figure(time.median, 2), interval_text(time, r.repetitions.size()),
+                    figure(median(r.rates(false)) * 1e-6, 2), optional_figure(r, "bytes_per_triangle", "{:.0f}"),
+                    optional_figure(r, "sah_cost", "{:.1f}")});
   }
   return "\nbuilds\n" + format_table(rows, 6) + fmt::format("\nbuild ms: {}.\n", interval_words(builds));
 }
 
-/// Comparable to a standard deviation and blind to single outliers; of too few repetitions for that their range.
-double relative_spread(const CellResult& r) {
-  const std::vector<double> rates = r.rates(r.cell.threads == 1);
+/// Comparable to a standard deviation and blind to single outliers; of too few repetitions for that their range. By the
+/// clock of the tables: `cpu` holds for traces, builds are by wall time.
+double relative_spread(const CellResult& r, bool cpu) {
+  const std::vector<double> rates = r.rates(cpu && r.is_trace());
   const double centre = median(rates);
   if (rates.size() < 2 || centre <= 0.0) return 0.0;
   if (rates.size() < kFewestOfInterval) {
@@ -151,6 +153,11 @@ double relative_spread(const CellResult& r) {
   std::vector<double> deviations;
   for (double v : rates) deviations.push_back(std::abs(v - centre));
   return 1.4826 * median(deviations) / centre;
+}
+
+/// The clock of all traces.
+bool by_cpu_time(const RunOutcome& outcome) {
+  return std::ranges::all_of(outcome.results, allows_cpu_time, &CellResult::cell);
 }
 
 /// Scenes that no primary ray hits, and how many there are: one is enough, of any cell.
@@ -179,7 +186,7 @@ std::string result_tables(const RunOutcome& outcome) {
   }
   std::string text;
   std::vector<const CellResult*> traces;
-  const bool cpu = std::ranges::all_of(outcome.results, allows_cpu_time, &CellResult::cell);
+  const bool cpu = by_cpu_time(outcome);
   for (const auto& [title, results] : groups) {
     traces.insert(traces.end(), results.begin(), results.end());
     std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads",
@@ -215,18 +222,19 @@ std::string skipped_lines(const Plan& plan, const RunOutcome& outcome) {
 std::vector<std::string> run_warnings(const RunOutcome& outcome, const Plan& plan, unsigned cores) {
   constexpr double kWide = 0.05;
   std::vector<std::string> warnings;
+  const bool cpu = by_cpu_time(outcome);
   std::size_t noisy = 0;
   const CellResult* worst = nullptr;
   for (const CellResult& r : outcome.results) {
-    if (relative_spread(r) <= kWide) continue;
+    if (relative_spread(r, cpu) <= kWide) continue;
     ++noisy;
-    if (!worst || relative_spread(r) > relative_spread(*worst)) worst = &r;
+    if (!worst || relative_spread(r, cpu) > relative_spread(*worst, cpu)) worst = &r;
   }
   if (worst) {
     warnings.push_back(
         fmt::format("noisy machine: the repetitions of {} of {} spread by more than {:.0f} % (most: {:.0f} % in "
                     "{}); raise min_time or repetitions, or free the machine",
-                    noisy, counted(outcome.results.size(), "cell"), kWide * 100, relative_spread(*worst) * 100,
+                    noisy, counted(outcome.results.size(), "cell"), kWide * 100, relative_spread(*worst, cpu) * 100,
                     worst->cell.name()));
   }
   for (const auto& [scene, rays] : views_of_nothing(outcome))
@@ -259,8 +267,7 @@ std::pair<ExitStatus, std::string> verdict(const RunOutcome& outcome) {
     if (r.fact("wrong_answers") == 0.0) continue;
     ++wrong;
     ++by_test[r.cell.intersector + "+" + r.cell.box];
-    if (!worst || r.fact("wrong_answers") / r.fact("rays") > worst->fact("wrong_answers") / worst->fact("rays"))
-      worst = &r;
+    if (!worst || wrong_share(r) > wrong_share(*worst)) worst = &r;
   }
   if (wrong == 0) {
     const std::string measured = counted(outcome.results.size(), "cell");
@@ -272,7 +279,7 @@ std::pair<ExitStatus, std::string> verdict(const RunOutcome& outcome) {
   return {ExitStatus::kWrongAnswers,
           fmt::format("wrong answers in {} of {} ({}); most: {:.0f} of {:.0f} rays in {}; exit status 1", wrong,
                       counted(checked, "checked cell"), fmt::join(tests, ", "), worst->fact("wrong_answers"),
-                      worst->fact("rays"), worst->cell.name())};
+                      worst->checked_rays(), worst->cell.name())};
 }
 
 }  // namespace arboretum

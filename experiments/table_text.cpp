@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace arboretum {
 
@@ -20,6 +21,14 @@ std::string format_table(const std::vector<TableRow>& rows, std::size_t figures)
     text += line + "\n";
   }
   return text;
+}
+
+std::string figure(double value, int decimals) {
+  constexpr double kLeastFixed = 1e-6;
+  const double size = std::abs(value);
+  if (size > 0.0 && size < kLeastFixed) return fmt::format("{:.2e}", value);
+  if (size > 0.0 && size < 1.0) decimals = std::max(decimals, 2 - static_cast<int>(std::floor(std::log10(size))));
+  return fmt::format("{:.{}f}", value, decimals);
 }
 
 std::string counted(std::size_t number, std::string_view noun) {

@@ -295,6 +295,73 @@ TEST_CASE("warnings: repetitions that lie apart, however few; a camera that look
   CHECK(!warned({1.0}, 1, "looks past it"));
 }
 
+TEST_CASE(
+    "the warning of noise is by the clock of the tables: wall time of builds, and beside cells of several threads") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  const auto warned = [&](const Cell& cell, bool wall_spreads, unsigned threads_beside) {
+    RunOutcome outcome;
+    CellResult& result = outcome.results.emplace_back(result_of(cell));
+    for (Repetition& r : result.repetitions) {
+      const double spread = 1.0 + 0.2 * r.index;
+      r.wall_seconds = wall_spreads ? spread : 1.0, r.cpu_seconds = wall_spreads ? 1.0 : spread;
+    }
+    CellResult beside = result_of(plan.cells[1]);
+    for (Repetition& r : beside.repetitions) r.wall_seconds = r.cpu_seconds = 1.0;
+    beside.cell.threads = threads_beside;
+    outcome.results.push_back(beside);
+    const std::vector<std::string> warnings = run_warnings(outcome, plan, 4);
+    return std::ranges::any_of(warnings,
+                               [](const std::string& w) { return w.find("1 of 2 cells") != std::string::npos; });
+  };
+  const Cell &build = plan.cells[0], &trace = plan.cells[1];
+  REQUIRE((build.metric == Cell::Metric::build && trace.metric == Cell::Metric::trace));
+  for (unsigned threads : {1u, 2u}) {
+    CHECK(warned(build, true, threads));
+    CHECK_FALSE(warned(build, false, threads));
+    CHECK(warned(trace, true, threads) == (threads == 2));
+    CHECK(warned(trace, false, threads) == (threads == 1));
+  }
+}
+
+TEST_CASE("wrong answers are of the rays that were checked, which of renderers are not those that were timed") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  RunOutcome outcome;
+  for (const char* workload : {"path", "primary"})
+    outcome.results.push_back(result_of(plan.cells[1])), outcome.results.back().cell.workload = workload;
+  outcome.results[0].facts["checked_rays"] = 100, outcome.results[0].facts["wrong_answers"] = 1;
+  outcome.results[1].facts["wrong_answers"] = 4;  // of 1000
+  const std::string text = result_tables(outcome);
+  INFO(text);
+  CHECK(text.find(" 10000.0 ") != std::string::npos);
+  CHECK(text.find(" 4000.0 ") != std::string::npos);
+  const std::string why = verdict(outcome).second;
+  INFO(why);
+  CHECK(why.find("most: 1 of 100 rays in " + outcome.results[0].cell.name()) != std::string::npos);
+}
+
+TEST_CASE("what is slow or small is not 0 in a table") {
+  CHECK(figure(1234.567, 2) == "1234.57");
+  CHECK(figure(1.0, 2) == "1.00");
+  CHECK(figure(0.1234, 2) == "0.123");
+  CHECK(figure(0.00123456, 2) == "0.00123");
+  CHECK(figure(-0.00123456, 2) == "-0.00123");
+  CHECK(figure(0.0, 1) == "0.0");
+  CHECK(figure(0.04, 1) == "0.0400");
+  CHECK(figure(1e-30, 2) == "1.00e-30");
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  RunOutcome outcome;
+  outcome.results.push_back(result_of(plan.cells[1]));
+  const std::string text = result_tables(outcome);  // 1000 rays in 0.125, 0.1875 and 0.25 s
+  INFO(text);
+  CHECK(text.find(" 0.00533  [0.00400, 0.00800] ") != std::string::npos);
+}
+
 TEST_CASE("one of a thing is one") {
   CHECK(counted(1, "cell") == "1 cell");
   CHECK(counted(0, "cell") == "0 cells");
