@@ -20,7 +20,7 @@
 namespace arboretum {
 namespace {
 
-constexpr const char* kEmbree = "machine";  // the group that is no axis of the table
+constexpr const char* kMachine = "machine";  // the group of embree's cells, which is no axis of the table
 
 /// CPU time is what ratios on a shared machine are made of, as long as one thread does the work.
 std::vector<double> rates(const CellResult& r) { return r.rates(r.cell.threads == 1); }
@@ -141,7 +141,7 @@ class Comparer {
 
   void add_mean(const Group& group, Replicates sums) {
     MeanRatio mean = mean_of(group, std::move(sums));
-    if (group.axis == kEmbree)
+    if (group.axis == kMachine)
       out_.embree = std::move(mean);
     else
       out_.means.push_back(std::move(mean));
@@ -160,7 +160,7 @@ class Comparer {
       any = true;
       Replicates sum(kResamples, 0.0);
       for (std::size_t i : cells) add(sum, replicates(i));
-      if (trace) out_.control = mean_of({"control", out_.options.control, cells}, sum);
+      (trace ? out_.control_of_rays : out_.control_of_builds) = mean_of({"control", out_.options.control, cells}, sum);
       const double centre = mean_centre(cells);
       for (std::size_t i : places([&](const ComparedCell& c) { return c.is_trace() == trace; })) centres_[i] -= centre;
       for (double& v : sum) v /= static_cast<double>(cells.size());
@@ -240,7 +240,7 @@ class Comparer {
     }
     add_group("", "builds", places([](const ComparedCell& c) { return !c.is_trace(); }));
     if (out_.options.control.empty())
-      add_group(kEmbree, "embree",
+      add_group(kMachine, "embree",
                 places([](const ComparedCell& c) { return c.is_trace() && c.a.cell.structure == "embree"; }));
     return groups;
   }

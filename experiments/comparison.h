@@ -22,7 +22,8 @@ namespace arboretum {
 struct CompareOptions {
   double min_difference = 3.0;  ///< per cent
   double significance = 0.05;   ///< of the adjusted p-values
-  /// regular expression: cells whose geometric mean all speeds are taken relative to; empty: none
+  /// regular expression: cells whose geometric mean speeds are taken relative to, those of rays to its traces' and
+  /// those of builds to its builds'; empty: none
   std::string control = {};
   std::set<std::string> other_scenes = {};  ///< names of scenes that hold something else in B than in A
   bool strict = false;  ///< an undecided cell whose whole interval is beyond the limit on the slow side is a regression
@@ -73,7 +74,10 @@ struct Comparison {
   std::vector<StructureChange> structures;
   /// What left nothing to compare: "--filter 'zzz' leaves none of A's 12 cells nor of B's 12 cells".
   std::string left_nothing = {};
-  std::optional<MeanRatio> control, embree;  ///< trace cells: those of `control`; embree's where there is no control
+  /// What the speeds of rays and of builds are relative to: the cells of each that `control` finds; none of one kind is
+  /// possible.
+  std::optional<MeanRatio> control_of_rays, control_of_builds;
+  std::optional<MeanRatio> embree;  ///< of its trace cells, where there is no control
 
   [[nodiscard]] std::size_t count(Verdict verdict) const;
   /// Cells with more wrong answers in B.

@@ -70,8 +70,9 @@ std::string comparison_json(const Comparison& comparison, const ResultFolder& a,
   for (const ComparedCell& c : comparison.cells) cells.push_back(cell_json(c));
   Json& means = json["geometric_means"] = Json::array();
   for (const MeanRatio& m : comparison.means) means.push_back(mean_json(m));
-  if (comparison.control)
-    json["control"] = {{"cells", comparison.control->cells}, {"ratio", interval_json(comparison.control->ratio)}};
+  for (const auto& [kind, control] :
+       {std::pair{"rays", &comparison.control_of_rays}, std::pair{"builds", &comparison.control_of_builds}})
+    if (*control) json["control"][kind] = {{"cells", (*control)->cells}, {"ratio", interval_json((*control)->ratio)}};
   Json& incomparable = json["incomparable"] = Json::array();
   for (const auto& [name, reason] : comparison.incomparable)
     incomparable.push_back({{"name", name}, {"reason", reason}});

@@ -163,6 +163,22 @@ std::string tests_text(const Comparison& comparison) {
   return by_ranks == 0 ? few : fmt::format("Mann-Whitney test (of {} cells {})", by_logs, few);
 }
 
+/// Whose speeds hold what the machine did between the two runs.
+std::string drift_text(const Comparison& comparison) {
+  constexpr const char* kDrift = "Drift of the machine between the two runs is in neither the interval nor p";
+  if (comparison.options.control.empty())
+    return fmt::format("{}; --control REGEX (cells whose code did not change) takes it out.\n", kDrift);
+  std::string text;
+  for (bool trace : {true, false}) {
+    const bool any =
+        std::ranges::any_of(comparison.cells, [&](const ComparedCell& c) { return c.is_trace() == trace; });
+    if (any && !(trace ? comparison.control_of_rays : comparison.control_of_builds))
+      text += fmt::format("{} of {}: --control '{}' finds none of them.\n", kDrift, trace ? "rays" : "builds",
+                          comparison.options.control);
+  }
+  return text;
+}
+
 std::string legend(const Comparison& comparison) {
   const CompareOptions& o = comparison.options;
   std::string text = fmt::format(
@@ -172,10 +188,7 @@ std::string legend(const Comparison& comparison) {
       "most {:g}.\n",
       interval_words(fewest_repetitions(pointers(comparison))), tests_text(comparison), o.min_difference,
       o.significance);
-  if (!comparison.control)
-    text +=
-        "Drift of the machine between the two runs is in neither the interval nor p; --control REGEX (cells whose code "
-        "did not change) takes it out.\n";
+  text += drift_text(comparison);
   if (const std::size_t n = comparison.count(Verdict::indistinguishable); n > 0) {
     text += fmt::format(
         "Of the {} indistinguishable cells {} are known to be equal: their whole interval is within {:g} %.\n", n,
@@ -195,18 +208,22 @@ std::string legend(const Comparison& comparison) {
 
 /// What speaks for a machine that was itself faster or slower.
 std::string machine_text(const Comparison& comparison) {
-  if (comparison.control) {
-    const MeanRatio& c = *comparison.control;
-    return fmt::format(
-        "\nAll speeds are relative to the {} of --control '{}', whose geometric mean B/A is {:.3f} {}.\n",
-        counted(c.cells, "cell"), c.value, c.ratio.median, interval_text(c.ratio));
+  std::string relative;
+  for (bool trace : {true, false}) {
+    const std::optional<MeanRatio>& c = trace ? comparison.control_of_rays : comparison.control_of_builds;
+    if (c)
+      relative +=
+          fmt::format("\nSpeeds of {} are relative to the {} of --control '{}', whose geometric mean B/A is {:.3f} {}.",
+                      trace ? "rays" : "builds", counted(c->cells, trace ? "trace" : "build"), c->value,
+                      c->ratio.median, interval_text(c->ratio));
   }
+  if (!relative.empty()) return relative + "\n";
   if (!comparison.embree) return {};
   const Interval& r = comparison.embree->ratio;
   if ((r.low <= 1.0 && r.high >= 1.0) || std::abs(r.median - 1.0) < 0.01) return {};
   return fmt::format(
       "\nnote: embree's {} ran at {:.3f} {} of A's speed: if nothing of Embree changed, the machine did. "
-      "--control /embree/ takes that out of all ratios.\n",
+      "--control /embree/ takes that out of the ratios.\n",
       counted(comparison.embree->cells, "cell"), r.median, interval_text(r));
 }
 

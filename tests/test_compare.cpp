@@ -1,5 +1,7 @@
 // The rank test against known values; two runs compared: nothing where nothing changed, a regression where there is
 // one.
+#include <fmt/format.h>
+
 #include <tuple>
 
 #include "experiments/comparison.h"
@@ -326,8 +328,8 @@ TEST_CASE("a machine that was slower as a whole: a control takes it out, and emb
   CHECK(plain.count(Verdict::slower) == plain.cells.size());
   CHECK(comparison_text(plain, false).find("the machine did") != std::string::npos);
   const Comparison relative = compare_results(a, b, {.control = "^trace/.*/embree/"});
-  REQUIRE(relative.control.has_value());
-  CHECK(relative.control->ratio.median == Approx(1.0 / 1.2).epsilon(0.03));
+  REQUIRE(relative.control_of_rays.has_value());
+  CHECK(relative.control_of_rays->ratio.median == Approx(1.0 / 1.2).epsilon(0.03));
   CHECK(find(relative, "bvh2").verdict == Verdict::indistinguishable);
   CHECK(find(relative, "bvh8").verdict == Verdict::slower);
   CHECK(find(relative, "bvh8").ratio.median == Approx(1.0 / 1.2).epsilon(0.04));
@@ -335,6 +337,33 @@ TEST_CASE("a machine that was slower as a whole: a control takes it out, and emb
         std::string::npos);
   CHECK(error_of([&] { (void)compare_results(a, b, {.control = "("}); }).find("regular expression") !=
         std::string::npos);
+}
+
+TEST_CASE("a control is said to be of what it corrects: rays, builds or both") {
+  const std::vector<CellResult> a = run(1);
+  std::vector<CellResult> b = run(900);
+  for (CellResult& r : b) slow_down(r, 1.2);
+  for (const auto& [control, rays, builds] :
+       {std::tuple{"^trace/.*/kdtree/", true, false}, {"^build/.*/kdtree/", false, true}, {"/kdtree/", true, true}}) {
+    const Comparison c = compare_results(a, b, {.control = control});
+    const std::string text = comparison_text(c, false);
+    const auto says = [&](const std::string& part) { return text.find(part) != std::string::npos; };
+    const Json json = Json::parse(comparison_json(c, {}, {}));
+    INFO(text);
+    for (const auto& [kind, trace, corrected] : {std::tuple{"rays", true, rays}, {"builds", false, builds}}) {
+      CHECK(find(c, "bvh2", trace).verdict == (corrected ? Verdict::indistinguishable : Verdict::slower));
+      CHECK(says(fmt::format("Speeds of {} are relative to the 1 {} of", kind, trace ? "trace" : "build")) ==
+            corrected);
+      CHECK(says(fmt::format("neither the interval nor p of {}: --control '{}' finds none", kind, control)) ==
+            !corrected);
+      CHECK(json["control"].contains(kind) == corrected);
+      if (!corrected) continue;
+      CHECK(json["control"][kind]["cells"] == 1);
+      CHECK(json["control"][kind]["ratio"]["median"].get<double>() == Approx(1.0 / 1.2).epsilon(0.03));
+    }
+    CHECK_FALSE(says("All speeds"));
+    CHECK_FALSE(says("takes it out"));
+  }
 }
 
 TEST_CASE("what speaks for a busy machine is told: loads that differ, a warning of noise, drift") {
