@@ -225,7 +225,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   initialize_benchmark(command.benchmark.others);
   Json context = machine_context(experiment, hash, command.command_line);
   add_custom_context(context, command.benchmark);
-  if (!command.no_plots && command.benchmark.format == "console") require_chosen_python();
+  if (!command.no_plots) require_chosen_python();
   Json scenes = Json::object();
   LoadedScene loaded = require_scenes(experiment, plan, record.geometry, scenes);
   require_structure_cache(experiment);
@@ -285,7 +285,10 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
 
   if (command.benchmark.format != "console") {
     print_warnings(outcome.warnings);
-    return verdict(outcome).first;
+    flush_output();
+    const ExitStatus status = verdict(outcome).first;
+    if (!command.no_plots && status != ExitStatus::kNothingMeasured) draw_figures(folder);
+    return status;
   }
   return conclude(folder, outcome, plan, !command.no_plots);
 }

@@ -14,6 +14,11 @@ void print_warnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
 }
 
+void draw_figures(const std::filesystem::path& folder) {
+  if (const std::string problem = draw_plots(folder, {}, true); !problem.empty())
+    fmt::print(stderr, "warning: {}\n", problem);
+}
+
 ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outcome, const Plan& plan, bool draw) {
   print_warnings(outcome.warnings);
   const auto [status, why] = verdict(outcome);
@@ -23,10 +28,7 @@ ExitStatus conclude(const std::filesystem::path& folder, const RunOutcome& outco
     fmt::print(stderr, "arboretum: {}\n", why);
     return status;
   }
-  if (draw) {
-    const std::string problem = draw_plots(folder, {}, true);
-    if (!problem.empty()) fmt::print(stderr, "warning: {}\n", problem);
-  }
+  if (draw) draw_figures(folder);
   std::error_code ignored;
   const bool report = draw && std::filesystem::exists(folder / "report.html", ignored);
   fmt::print("{}: {}\n", report ? "report" : "results", (folder / (report ? "report.html" : "results.json")).string());

@@ -249,6 +249,12 @@ class CommandLine(CommandLineCase):
         rows = list(csv.DictReader(shown.stdout.splitlines()))
         self.assertEqual({row["aggregate_name"] for row in rows}, {"mean", "median", "stddev", "cv"})
 
+        drawn = self.call("run", self.config, *few, "--benchmark_format=json")  # of stdout alone: figures and report are drawn all the same
+        self.assertEqual({b["name"] for b in json.loads(drawn.stdout)["benchmarks"]}, {b["name"] for b in document["benchmarks"]})
+        if "no python3 here has matplotlib" not in drawn.stderr:
+            self.assertTrue((self.folder / "out/report.html").exists(), drawn.stderr)
+            self.assertTrue((self.folder / "out/rays_per_second.png").exists(), drawn.stderr)
+
         (self.folder / "out").rename(self.folder / "kept")
         self.assert_error(self.run_small(*few, "--benchmark_context=cpu=mine"), "has a 'cpu' of its own")
         self.assert_error(self.run_small(*few, "--benchmark_repetitions=3", "--repetitions", "3"), "keep one")
