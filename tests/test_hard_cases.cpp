@@ -1,6 +1,5 @@
 // tests/hard_cases.json on every row of the kernel table: each gives the exact answer, or the case stands in
 // the table of known limits with its reason.
-#include <iostream>
 #include <set>
 
 #include "tests/catch.h"
@@ -174,12 +173,6 @@ TEST_CASE("every kernel gives the exact answer of the hard cases, but for the kn
     CHECK(met.count(std::string(limit.id)) == 1);
     CHECK_FALSE(limit.reason.empty());
   }
-}
-
-TEST_CASE("what fails on the hard cases, one line each", "[.survey]") {
-  for_each_answer([](const HardCase& c, const KernelRow& row, const std::string& f) {
-    if (!f.empty()) std::cout << c.id << " " << f << " " << name_of(row) << "\n";
-  });
 }
 
 TEST_CASE("a ray through the diagonal of a quad hits it, in every watertight and Pluecker kernel") {

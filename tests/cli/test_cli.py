@@ -418,12 +418,17 @@ class CommandLine(CommandLineCase):
         self.assertIn("none.png: no such file", text)
 
     def test_fail_fast_stops_at_the_first_wrong_answer(self):
-        result = self.run_small("--fail-fast", "--skip", "^build")
-        if result.returncode == 0:
-            self.skipTest("no cell has a wrong answer here")
-        document = json.loads((self.folder / "results/small/results.json").read_text())
-        names = {b["run_name"] for b in document["benchmarks"] if b["run_type"] == "iteration" and b["wrong_answers"]}
-        self.assertEqual(len(names), 1)
+        words = ("workload=hard_edge", "intersector=moller_trumbore", "isa=scalar", "--skip", "^build")
+        wrong = []
+        for stops in (False, True):
+            result = self.run_small(*words, *["--fail-fast"] * stops)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertEqual("stopped at the first wrong answer" in result.stdout, stops)
+            document = json.loads((self.folder / "results/small/results.json").read_text())
+            wrong.append({b["run_name"] for b in document["benchmarks"] if b["run_type"] == "iteration" and b["wrong_answers"]})
+        self.assertGreater(len(wrong[0]), 1)
+        self.assertEqual(len(wrong[1]), 1)
+        self.assertLess(wrong[1], wrong[0])
 
 
 if __name__ == "__main__":
