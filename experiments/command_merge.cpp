@@ -14,13 +14,12 @@
 #include "experiments/plotting.h"
 #include "experiments/results_writer.h"
 #include "experiments/shell_words.h"
+#include "experiments/table_text.h"
 
 namespace arboretum {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kMostNamed = 10;
 
 void refuse_results_there(const fs::path& out) {
   for (const char* file : {"cells.jsonl", "results.json"})
@@ -57,13 +56,12 @@ void write_beside(const fs::path& out, const std::vector<ResultFolder>& parts, c
   std::string effective;
   for (std::size_t i = 0; i < parts.size() && effective.empty(); ++i)
     for (const std::string& line : read_lines(parts[i].path / "effective.yaml"))
-      if (!line.starts_with("# shard: ")) effective += line + "\n";
+      if (!line.starts_with(kShardHead)) effective += line + "\n";
   if (!effective.empty()) write_whole(out / "effective.yaml", effective);
   for (const ResultFolder& part : parts) {
     for (const fs::directory_entry& entry : fs::directory_iterator(part.path)) {
       const std::string name = entry.path().filename().string();
-      if (name.starts_with("camera_edges-") && name.ends_with(".json"))
-        write_whole(out / name, whole_file(entry.path()));
+      if (is_seen_points_file(name)) write_whole(out / name, whole_file(entry.path()));
     }
   }
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <numeric>
@@ -36,8 +35,6 @@
 
 namespace arboretum {
 namespace {
-
-constexpr std::size_t kMostNamed = 10;
 
 /// Of the cells that are not done. `started`: repetitions of the others that are.
 double seconds_left(const Experiment& experiment, const Plan& plan,
@@ -111,16 +108,10 @@ void require_structure_cache(const Experiment& experiment) {
   }
 }
 
-void refuse_other_configuration(const std::filesystem::path& folder, const std::string& hash) {
-  std::ifstream stream(folder / "effective.yaml");
-  std::string line;
-  if (!stream || !std::getline(stream, line)) return;
-  constexpr std::string_view kHead = "# configuration hash: ";
-  if (line.starts_with(kHead) && line.substr(kHead.size()) == hash) return;
-  throw UserError(
-      fmt::format("{}: holds the results of another configuration; resume with the command that began it, or "
-                  "choose another folder with --out",
-                  folder.string()));
+/// A folder that was begun and holds no cell yet is told by effective.yaml.
+void expect_configuration(const std::filesystem::path& folder, const std::string& hash) {
+  if (const std::string there = hash_of_configuration(folder); !there.empty())
+    refuse_other_configuration(folder, there, hash);
 }
 
 std::filesystem::path default_folder(const Experiment& experiment, const Shard& shard) {
@@ -169,7 +160,7 @@ std::vector<std::string> files_of_run(const std::filesystem::path& folder) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with("camera_edges-") && name.ends_with(".json")) names.push_back(name);
+    if (is_seen_points_file(name)) names.push_back(name);
   }
   return present(folder, std::move(names));
 }
@@ -207,7 +198,7 @@ std::set<std::string> done_before(const Experiment& experiment, const Plan& plan
   const std::filesystem::path folder = command.out.empty() ? default_folder(experiment, shard) : command.out;
   std::error_code ignored;
   if (!std::filesystem::exists(folder / "cells.jsonl", ignored)) return {};
-  refuse_other_configuration(folder, configuration_hash(experiment));
+  expect_configuration(folder, configuration_hash(experiment));
   EarlierRun(folder).refuse_other_shard(shard);
   std::set<std::string> held, names;
   for (const CellResult& cell : read_result_folder(folder).cells) held.insert(cell.cell.name());
@@ -231,7 +222,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   require_structure_cache(experiment);
   make_output_folder(folder);
   const FolderLock lock(folder, "give another --out");
-  if (command.resume) refuse_other_configuration(folder, hash);
+  if (command.resume) expect_configuration(folder, hash);
   const EarlierRun before = command.resume ? EarlierRun(folder) : EarlierRun();
   before.refuse_other_shard(shard);
   before.refuse_other_geometry(experiment, record.geometry);
@@ -245,8 +236,8 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
       experiment, plan, [&](const std::string& name) { return journal.done().contains(name); },
       [&](const Cell& cell) { return journal.started(cell.name()).size(); });
   write_whole(folder / "effective.yaml",
-              fmt::format("# configuration hash: {}\n{}{}", hash,
-                          shard.is_whole() ? "" : "# shard: " + shard.text() + "\n", effective_yaml(experiment)),
+              fmt::format("{}{}\n{}{}", kConfigurationHashHead, hash,
+                          shard.is_whole() ? "" : kShardHead + shard.text() + "\n", effective_yaml(experiment)),
               kGoesOn);
   if (!shard.is_whole()) context["shard"] = shard.text();
   if (const Json parts = before.merged_from(); !parts.is_null()) context["merged_from"] = parts;

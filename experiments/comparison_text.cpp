@@ -18,7 +18,7 @@ namespace arboretum {
 namespace {
 
 constexpr double kLoadDifference = 0.5;  // half a core
-constexpr std::size_t kMostRows = 60, kMostNames = 10, kMostBeyond = 3;
+constexpr std::size_t kMostRows = 60, kMostBeyond = 3;
 
 /// "7", "3 to 7" repetitions.
 std::string repetitions(const std::vector<CellResult>& cells) {
@@ -261,9 +261,9 @@ std::string structure_table(const Comparison& comparison) {
 std::string name_list(const std::vector<std::string>& names, const std::string& title) {
   if (names.empty()) return {};
   std::string text = fmt::format("\n{} {}\n", counted(names.size(), "cell"), title);
-  for (std::size_t i = 0; i < std::min(names.size(), kMostNames); ++i) text += "  " + names[i] + "\n";
-  if (names.size() > kMostNames)
-    text += fmt::format("  and {} more (--json FILE has them)\n", names.size() - kMostNames);
+  for (std::size_t i = 0; i < std::min(names.size(), kMostNamed); ++i) text += "  " + names[i] + "\n";
+  if (names.size() > kMostNamed)
+    text += fmt::format("  and {} more (--json FILE has them)\n", names.size() - kMostNamed);
   return text;
 }
 

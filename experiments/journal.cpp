@@ -21,6 +21,15 @@ void refuse_damaged(const Json& line, const std::filesystem::path& file, std::si
 
 }  // namespace
 
+void refuse_other_configuration(const std::filesystem::path& folder, const std::string& there,
+                                const std::string& here) {
+  if (there == here) return;
+  throw UserError(
+      fmt::format("{}: holds another configuration (hash {}, this one is {}); resume with the command that began it, "
+                  "or choose another folder with --out",
+                  folder.string(), there, here));
+}
+
 Journal::Journal(std::filesystem::path folder, std::string configuration_hash, const Plan& plan, bool resume)
     : folder_(std::move(folder)), hash_(std::move(configuration_hash)) {
   const std::filesystem::path cells = folder_ / "cells.jsonl", repetitions = folder_ / "repetitions.jsonl";
@@ -35,13 +44,7 @@ Journal::Journal(std::filesystem::path folder, std::string configuration_hash, c
         ++number;
         if (!line.is_object()) continue;  // torn by a kill
         refuse_damaged(line, path, number);
-        const std::string hash = line.at("configuration_hash");
-        if (hash != hash_) {
-          throw UserError(
-              fmt::format("{}: holds another configuration (hash {}, this one is {}); resume with the "
-                          "command that began it, or choose another folder with --out",
-                          folder_.string(), hash, hash_));
-        }
+        refuse_other_configuration(folder_, line.at("configuration_hash"), hash_);
         const auto found = wanted.find(line.at("name").get<std::string>());
         if (found == wanted.end()) continue;
         if (path == cells) {

@@ -13,6 +13,9 @@
 
 namespace arboretum {
 
+/// Throws UserError where `folder` holds results of the configuration of hash `there`, and `here` is another.
+void refuse_other_configuration(const std::filesystem::path& folder, const std::string& there, const std::string& here);
+
 class Journal {
  public:
   /// Opens the files in `folder`. With `resume`, takes up what they hold of `plan`, cells of `elsewhere` too; without,

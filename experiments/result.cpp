@@ -189,7 +189,19 @@ Json picture_points(std::span<const std::array<float, 2>> points, std::size_t mo
   return list;
 }
 
-std::string seen_points_file(const std::string& scene) { return fmt::format("camera_edges-{}.json", scene); }
+namespace {
+
+constexpr std::string_view kSeenPointsHead = "camera_edges-", kSeenPointsEnd = ".json";
+
+}  // namespace
+
+std::string seen_points_file(const std::string& scene) {
+  return fmt::format("{}{}{}", kSeenPointsHead, scene, kSeenPointsEnd);
+}
+
+bool is_seen_points_file(std::string_view name) {
+  return name.starts_with(kSeenPointsHead) && name.ends_with(kSeenPointsEnd);
+}
 
 void add_axes(Json& json, const Cell& cell) {
   json["metric"] = to_string(cell.metric), json["scene"] = cell.scene, json["structure"] = cell.structure;

@@ -73,6 +73,7 @@ void add_facts(Json& facts, const StartCheck& check, bool closest_hit);
 /// The fact that only a cell's first repetition repeats, and the file of a scene that it belongs to.
 inline constexpr const char* kLeakPoints = "leak_points";
 [[nodiscard]] std::string seen_points_file(const std::string& scene);
+[[nodiscard]] bool is_seen_points_file(std::string_view name);
 /// The cell's name as fields of their own; `threads` as a number.
 void add_axes(Json& json, const Cell& cell);
 

@@ -141,14 +141,6 @@ void sort_as_planned(ResultFolder& folder, const Json& document) {
   folder.cells = std::move(cells), folder.lines = std::move(lines);
 }
 
-/// The head of effective.yaml.
-std::string hash_of_configuration(const fs::path& folder) {
-  std::ifstream stream(folder / "effective.yaml");
-  std::string line;
-  constexpr std::string_view kHead = "# configuration hash: ";
-  return std::getline(stream, line) && line.starts_with(kHead) ? line.substr(kHead.size()) : "";
-}
-
 /// A value of a context as a line shows it.
 std::string text_of(const Json& context, const char* key) {
   const auto found = context.find(key);
@@ -184,6 +176,13 @@ constexpr std::string_view kBetween = " | ";  // values of a merged context that
 }  // namespace
 
 std::string ResultFolder::context_text(const char* key) const { return text_of(context, key); }
+
+std::string hash_of_configuration(const fs::path& folder) {
+  std::ifstream stream(folder / "effective.yaml");
+  std::string line;
+  constexpr std::string_view kHead = kConfigurationHashHead;
+  return std::getline(stream, line) && line.starts_with(kHead) ? line.substr(kHead.size()) : "";
+}
 
 Cell cell_of(const Json& entry) {
   const auto text = [&](const char* key) { return entry.at(key).get<std::string>(); };

@@ -31,6 +31,11 @@ struct ResultFolder {
 /// Throws UserError, naming the nearest folder that is one, when `path` is no result folder or cannot be read.
 [[nodiscard]] ResultFolder read_result_folder(const std::filesystem::path& path);
 
+/// What the first lines of a folder's effective.yaml begin with; the second only of a shard.
+inline constexpr const char *kConfigurationHashHead = "# configuration hash: ", *kShardHead = "# shard: ";
+/// Of a folder's effective.yaml; empty where there is none, or it does not say.
+[[nodiscard]] std::string hash_of_configuration(const std::filesystem::path& folder);
+
 /// The cell that an entry of a result file is of, as far as its fields tell; `kernel` and parameters are left out.
 /// Throws nlohmann::json::exception where a field is missing.
 [[nodiscard]] Cell cell_of(const Json& entry);

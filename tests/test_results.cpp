@@ -12,6 +12,7 @@
 #include "experiments/config.h"
 #include "experiments/interleave.h"
 #include "experiments/journal.h"
+#include "experiments/result_folder.h"
 #include "experiments/results_writer.h"
 #include "experiments/shell_words.h"
 #include "experiments/runner.h"
@@ -163,6 +164,18 @@ TEST_CASE("the journal gives back what it was told, and refuses another configur
   CHECK(error_of([&] { Journal(folder.path(), "other", plan, true); }).find("another configuration") !=
         std::string::npos);
   CHECK(Journal(folder.path(), "other", plan, false).done().empty());
+}
+
+TEST_CASE("the configuration of a folder and its files of points are told by what they were written with") {
+  const Folder folder;
+  CHECK(hash_of_configuration(folder.path()).empty());
+  folder.write("effective.yaml", std::string(kConfigurationHashHead) + "0123456789abcdef\n# shard: 1/2\n");
+  CHECK(hash_of_configuration(folder.path()) == "0123456789abcdef");
+  folder.write("effective.yaml", "experiment: small\n");
+  CHECK(hash_of_configuration(folder.path()).empty());
+  CHECK(is_seen_points_file(seen_points_file("bunny:size=100")));
+  CHECK_FALSE(is_seen_points_file("camera_edges-bunny.json.part"));
+  CHECK_FALSE(is_seen_points_file("results.json"));
 }
 
 TEST_CASE("a damaged line of a journal is named by file and line") {

@@ -184,7 +184,8 @@ class ResultFolders(CommandLineCase):
         # Of the plan that is shown, and refused where the run would be
         self.assertNotIn("done before", self.run_small(*FEW, "--resume", "--dry-run", "--filter", "bvh2").stdout)
         self.assert_error(self.run_small(*FEW, "--resume", "--dry-run", "--shard", "1/2", "--out", "results/small"), "results of the whole plan")
-        self.assert_error(self.run_small("--repetitions", "2", "--resume", "--dry-run"), "another configuration")
+        self.assert_error(self.run_small("--repetitions", "2", "--resume", "--dry-run"), "holds another configuration (hash ")
+        self.assert_error(self.run_small("--repetitions", "2", "--resume"), "holds another configuration (hash ")
         again = self.run_small(*FEW, "--resume", "--filter", "bvh2/.*/sse/")
         self.assertIn(f"({len(first)} done before)", again.stderr)
         both = [name for name in every if "bvh4" in name or "bvh2" in name and "/sse/" in name]
