@@ -6,9 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <set>
 #include <thread>
-#include <utility>
 
 #include "core/instances.h"
 #include "core/names.h"
@@ -20,8 +18,8 @@
 #include "experiments/config_scenes.h"
 #include "experiments/progress.h"
 #include "experiments/summary.h"
+#include "experiments/verify_breaches.h"
 #include "experiments/verify_plan.h"
-#include "experiments/verify_reduce.h"
 #include "experiments/verify_report.h"
 #include "oracle/random_cases.h"
 
@@ -32,20 +30,15 @@ constexpr std::size_t kBatch = std::size_t{1} << 17;  // rays made, answered and
 constexpr std::size_t kSpreadBatch = std::size_t{1} << 14, kLeastSpreadBatch = 256;
 constexpr std::size_t kSubjectRays = 64;            // of one random mesh
 constexpr std::size_t kBruteForceTriangles = 2000;  // left out above it, unless it is asked for
-constexpr std::size_t kMostCases = 20;              // breaches that are told
-constexpr unsigned kMostTries = 16;                 // at a case of one cell
 constexpr std::size_t kCompany = 64;                // rays that a case is traced among: the largest packets'
 
 enum class Subject { scene, cases, random };
-
-/// Variant and ray: each variant counts from 0.
-using RayNumber = std::pair<std::size_t, std::uint64_t>;
 
 class Verify {
  public:
   Verify(const VerifyCommand& command, const Registry& registry)
       : command_(command), registry_(registry),
-        threads_(command.threads.value_or(std::max(1u, std::thread::hardware_concurrency()))) {
+        threads_(command.threads.value_or(std::max(1u, std::thread::hardware_concurrency()))), breaches_(registry) {
     if (command.subject == "random")
       subject_ = Subject::random;
     else if (std::filesystem::path(command.subject).extension() == ".json")
@@ -178,7 +171,7 @@ class Verify {
       } else {
         verify_all(cells_, variant, shelf, batch);
       }
-      keep_breaches(mesh, variant, name);
+      breaches_.keep(cells_, mesh, variant, name);
       progress.step(name, count);
     }
   }
@@ -247,54 +240,7 @@ class Verify {
       StructureShelf shelf(mesh, registry_, 1);
       verify_all(cells_, 0, shelf, {mesh, oracle, rays, oracle.closest_hit(rays.batch()), first}, company);
     });
-    keep_breaches(mesh, 0, name);
-  }
-
-  // What was found.
-
-  /// What is kept of a cell's breaches.
-  struct Kept {
-    bool has_case = false;
-    unsigned tries = 0;
-    RayNumber ray{};    ///< the first that no case could be made of
-    std::string words;  ///< of that ray; empty: none
-  };
-
-  /// Of the rays of the last batch: a case for each cell that breaks its promise and has none yet. `mesh` is what they
-  /// were traced on.
-  void keep_breaches(const TriangleMesh& mesh, std::size_t variant, const std::string& name) {
-    kept_.resize(cells_.size());
-    for (std::size_t i = 0; i < cells_.size(); ++i) {
-      const Breach breach = std::exchange(cells_[i].newest, {});
-      Kept& kept = kept_[i];
-      if (breach.what.empty() || kept.has_case || kept.tries == kMostTries || cases_.size() >= kMostCases) continue;
-      const RayNumber ray{variant, breach.ray};
-      // One case for a ray, however many cells it defeats.
-      if (case_rays_.contains(ray)) {
-        kept.has_case = true;
-        continue;
-      }
-      ++kept.tries;
-      const std::string id = fmt::format("{}-ray{}", name, breach.ray),
-                        why = fmt::format("{}: {}", cell_label(cells_[i].cell), breach.what);
-      if (const auto part = reduce(cells_[i], registry_, mesh, breach)) {
-        cases_.push_back(case_json(id, why, *part, breach.given));
-        case_rays_.insert(ray), kept.has_case = true;
-      } else if (kept.words.empty()) {
-        kept.ray = ray, kept.words = ray_json(id, why, breach.given, breach.time);
-      }
-    }
-  }
-
-  /// Of cells that have no case; one for a ray.
-  std::vector<std::string> unreduced() const {
-    std::vector<std::string> lines;
-    std::set<RayNumber> told;
-    for (const Kept& kept : kept_)
-      if (!kept.has_case && !kept.words.empty() && lines.size() < kMostCases && !case_rays_.contains(kept.ray) &&
-          told.insert(kept.ray).second)
-        lines.push_back(kept.words);
-    return lines;
+    breaches_.keep(cells_, mesh, 0, name);
   }
 
   ExitStatus report() {
@@ -303,29 +249,14 @@ class Verify {
     fmt::print("{}, {} rays{}, {} cells\n{}", title_, rays, command_.spread ? " in all" : "", cells_.size(),
                verify_tables(cells_, subject_ != Subject::cases || command_.rays));
     fmt::print("{}", skipped_lines(plan_, {}));
-    std::size_t broken = 0, promising = 0, untested = 0;
-    std::string lines;
-    for (const VerifiedCell& cell : cells_) {
-      const VerifyTally sum = cell.sum();
-      if (sum.rays == 0) {
-        ++untested;
-        continue;
-      }
-      promising += cell.promise.any();
-      if (sum.broken == 0) continue;
-      if (++broken <= kMostCases) lines += describe_breach(cell, sum) + "\n";
-    }
+    const auto [broken, promising, untested, lines] = promises_kept(cells_);
     if (!lines.empty()) fmt::print("\n{}", lines);
-    const std::vector<std::string> rest = unreduced();
-    std::string document = fmt::format("{{\"cases\": [\n{}\n]", fmt::join(cases_, ",\n"));
-    if (!rest.empty()) document += fmt::format(", \"unreduced\": [\n{}\n]", fmt::join(rest, ",\n"));
-    document += "}\n";
-    const bool found = !cases_.empty() || !rest.empty();
-    if (found) fmt::print("\n{}", document);
+    const std::string document = breaches_.document();
+    if (!document.empty()) fmt::print("\n{}", document);
     if (!command_.out.empty()) {
       write_whole(command_.out / "verify.csv", verify_csv(cells_, variants_));
       std::error_code ignored;
-      if (found)
+      if (!document.empty())
         write_whole(command_.out / "cases.json", document);
       else
         std::filesystem::remove(command_.out / "cases.json", ignored);  // of a run before
@@ -353,9 +284,7 @@ class Verify {
   std::string title_;
   std::size_t next_cell_ = 0;
   std::uint64_t total_rays_ = 0;
-  std::vector<Kept> kept_;
-  std::set<RayNumber> case_rays_;
-  std::vector<std::string> cases_;
+  KeptBreaches breaches_;
 };
 
 }  // namespace
