@@ -17,6 +17,7 @@ AXES = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversa
 STRUCTURE_AXES = ("scene", "structure", "builder", "leaf", "isa", "threads")  # what a build depends on at most
 ISA_ORDER = ("scalar", "sse", "avx2", "avx512")
 HARD_PREFIX = "hard"  # workloads of hard rays: hard, hard_edge, ...
+CAMERA_EDGES = "camera_edges"  # that of rays from the camera at edges and vertices
 WORKLOAD_ORDER = ("primary", "shadow", "ambient_occlusion", "reflection", "diffuse", "random", "whitted", "path")
 METRICS = ("trace", "build", "quality", "accuracy")
 FEWEST_OF_INTERVAL = 6  # repetitions: fewer have no interval that covers their median in 95 of 100 cases
@@ -108,6 +109,10 @@ class Results:
             return "rays_per_cpu_second", "Mray/s, thread CPU time"
         return "rays_per_second", "Mray/s, wall time"
 
+    def clock(self):
+        """What throughput() is measured by: "thread CPU time" or "wall time"."""
+        return self.throughput()[1].partition(", ")[2]
+
     def repetitions(self):
         """How many repetitions each timed cell has."""
         metric, _ = self.throughput()
@@ -131,6 +136,11 @@ class Results:
         keys = [cell[a] for a in STRUCTURE_AXES]
         found = (self._structure_index[name].get(tuple(keys[:length])) for length in range(len(keys), 3, -1))
         return next((value for value in found if value is not None), None)
+
+
+def is_aimed(workload):
+    """Whether the workload's rays are aimed at what goes wrong, and their time so says little."""
+    return workload.startswith(HARD_PREFIX) or workload == CAMERA_EDGES
 
 
 def is_number(value):

@@ -4,8 +4,7 @@ instruction set. A panel that would show no point is left out."""
 
 from textwrap import fill
 
-from figures.names import label
-from figures.trade_offs import step_front
+from figures.trade_offs import of_one_number_of_threads, step_front
 from results import HARD_PREFIX, NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_legend, marker_map, panel_grid
 
@@ -22,9 +21,9 @@ COMBINATION = ("scene", "structure", "builder", "leaf", "intersector", "box", "t
 
 
 def draw(results):
-    metric, unit = results.throughput()
+    metric, _ = results.throughput()
     traces, threads = of_one_number_of_threads(results.traces)
-    timed = f"({unit.partition(', ')[2]}{', ' + threads if threads else ''})"
+    timed = f"({results.clock()}{threads})"
     paired = hard_points(traces, metric)
     if paired:
         return draw_hard(paired, timed)
@@ -32,14 +31,6 @@ def draw(results):
     if not points:
         raise NoData("no cell has both a throughput and checked answers")
     return draw_workloads(points, timed)
-
-
-def of_one_number_of_threads(cells):
-    """Those cells that have the fewest threads, as the others' answers are the same; and, where there are others, how many these are and how many the others have."""
-    numbers = ordered((c["threads"] for c in cells), "threads")
-    if len(numbers) < 2:
-        return cells, ""
-    return [c for c in cells if c["threads"] == numbers[0]], f"{label('threads', numbers[0])}; not shown: {', '.join(numbers[1:])}"
 
 
 def hard_points(traces, metric):

@@ -14,7 +14,7 @@ POWERS = ((1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k"), (1, ""))
 
 
 def draw(results):
-    metric, unit = results.throughput()
+    metric, _ = results.throughput()
     builds = {tuple(c[a] for a in STRUCTURE_AXES): c for c in results.structures}
 
     def seconds(cell):  # with the threads of the rays alone: another number of them would make another trade
@@ -23,9 +23,9 @@ def draw(results):
         return found if found and found.low > 0 else None
 
     def rays_are_of(threads):
-        return "thread CPU time" if "CPU" in unit else wall(threads)
+        return results.clock() if "CPU" in results.clock() else wall(threads)
 
-    points = [p.scaled(1e3) for p in fastest_points(results, metric, seconds)]
+    points = [p.scaled(1e3) for p in fastest_points(results.traces, metric, seconds)]
     return draw_panels(of_places(points), lambda threads: f"build time, ms ({wall(threads)})", lambda threads: f"time, ns a ray\n({rays_are_of(threads)})", labelled)
 
 

@@ -4,7 +4,7 @@ import json
 
 from matplotlib.lines import Line2D
 
-from results import NoData, axis_sort_key, ordered
+from results import CAMERA_EDGES, NoData, axis_sort_key, ordered
 from style import legends_right, panels, short
 
 TITLE = "Where the leaks are"
@@ -12,12 +12,11 @@ CAPTION = ("Rays from the camera at points of edges and at vertices (workload ca
            "in colour where a ray passes through the surface unnoticed. What leaks with padded boxes too, the triangle test loses; what "
            "leaks with fast boxes alone, the boxes lose. The first two scenes are shown. A panel shows at most 4000 leaks a box test; the numbers count all, per million rays.")
 BOXES = (("fast", "#3377CC", 5.0), ("padded", "#CC2222", 2.2))  # the second above the first
-WORKLOAD = "camera_edges"
 MOST_SCENES = 2
 
 
 def draw(results):
-    cells = [c for c in results.traces if c["workload"] == WORKLOAD and leak_points(c) is not None]
+    cells = [c for c in results.traces if c["workload"] == CAMERA_EDGES and leak_points(c) is not None]
     scenes = [s for s in ordered((c["scene"] for c in cells), "scene") if seen_points(results.folder, s)][:MOST_SCENES]
     if not scenes:
         raise NoData("no cell of the workload camera_edges tells where its leaks are")
@@ -70,7 +69,7 @@ def leak_points(cell):
 
 def seen_points(folder, scene):
     try:
-        seen = json.loads((folder / f"{WORKLOAD}-{scene}.json").read_text(encoding="utf-8"))
+        seen = json.loads((folder / f"{CAMERA_EDGES}-{scene}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return seen if isinstance(seen, dict) and seen.get("points") else None

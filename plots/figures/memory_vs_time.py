@@ -12,15 +12,14 @@ WORTH = 0.9  # of the time of the number before
 
 
 def draw(results):
-    metric, unit = results.throughput()
+    metric, _ = results.throughput()
 
     def size(cell):
         found = results.structure_value(cell, "bytes_per_triangle")
         return estimate([found]) if found else None
 
-    timed = unit.partition(", ")[2]
-    points = fastest_points(results, metric, size)
-    return draw_panels(of_places(points), lambda _: "memory, bytes a triangle", lambda _: f"time, ns a ray\n({timed})",
+    points = fastest_points(results.traces, metric, size)
+    return draw_panels(of_places(points), lambda _: "memory, bytes a triangle", lambda _: f"time, ns a ray\n({results.clock()})",
                        lambda here: [(p, f"{digits(p.x.median)} B, {digits(p.y.median)} ns") for p in worth_a_name(here)])
 
 

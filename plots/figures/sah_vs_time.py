@@ -1,51 +1,73 @@
-"""How well the SAH cost foretells the measured time: a panel a scene, workload and instruction set; scenes share panels where there
-would be many of them and costs are near each other."""
+"""How well the SAH cost foretells the measured time: a panel a scene, workload and instruction set, where there are three structures as built or more; scenes
+share panels where there would be many of them and costs are near each other."""
 
 import numpy as np
 
 from figures import trade_offs
-from results import NoData, estimate, ordered
+from results import NoData, estimate, is_aimed, ordered
 from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panel_grid, panels, structure_legend,
                    wrong_legend, wrong_marker)
 from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
-CAPTION = ("A point is a structure on a scene, traced in its fastest mode. A line is the least-squares fit through the points of one scene "
+CAPTION = ("A point is a structure as built, by one builder, on a scene, with its fastest leaf traced in its fastest mode; of several numbers of threads the figure shows the fewest. A line is the least-squares fit through the points of one scene "
            "in a panel, R² its share of the variance explained (where scenes share a panel, in the legend's order; of more than three the least and the most); with EPO: that of the plane "
-           "through SAH cost and end-point overlap, which never explains less, so small differences say nothing. A red edge: the mode has wrong answers. "
+           "through SAH cost and end-point overlap, which never explains less, so small differences say nothing. brute_force, which has no tree and whose cost and time are many times those of all others, is left out: it alone would decide the fit. "
+           "So are rays that are aimed at edges and vertices (hard ones, camera_edges). A red edge: the mode has wrong answers. "
            + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
 
 MOST_PANELS = 24  # of scenes apart
 FAR_APART = 4.0  # scenes whose costs differ by more never share panels
+NO_TREE = "brute_force"
+BUILT = ("scene", "structure", "builder", "isa", "workload")
 
 
 def draw(results):
-    metric, _ = results.throughput()
-    points = fastest_points(results, metric)
+    points, threads = fastest_points(results)
     if not points:
         raise NoData("no traced cell has a SAH cost")
+    points = fitted(points)
+    if not points:
+        raise NoData("nowhere are three structures as built, brute_force apart, of different SAH costs to fit a line through")
+    y_label = f"time, ns a ray\n({results.clock()}{threads})".replace("; ", ";\n")
     workloads = ordered((c["workload"] for c, *_ in points), "workload")
     isas = ordered((c["isa"] for c, *_ in points), "isa")
     scenes = ordered((c["scene"] for c, *_ in points), "scene")
     structures = ordered((c["structure"] for c, *_ in points), "structure")
-    markers = marker_map(scenes)
 
-    if len({(c["scene"], c["workload"], c["isa"]) for c, *_ in points}) <= MOST_PANELS or far_apart(points):
-        figure = panels_by_scene(points, {(w, i): f"{w}, {i}" for w in workloads for i in isas}, markers)
+    if len({place_of(c) for c, *_ in points}) <= MOST_PANELS or far_apart(points):
+        markers = {}
+        figure = panels_by_scene(points, {(w, i): f"{w}, {i}" for w in workloads for i in isas}, y_label)
     else:
-        figure = panels_of_all(points, workloads, isas, markers)
+        markers = marker_map(scenes)
+        figure = panels_of_all(points, workloads, isas, markers, y_label)
     answers = wrong_legend([c for c, *_ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, *_ in points])} per million"))
-    legends_right(figure, [("structure", structure_legend(structures)), ("scene", marker_legend(markers)), *answers])
+    legends_right(figure, [("structure", structure_legend(structures)), *([("scene", marker_legend(markers))] if markers else []), *answers])
     return figure
 
 
-def fastest_points(results, metric):
-    """(cell, SAH cost, ns a ray, EPO or None) of the fastest mode of each structure as built, scene, workload and ISA."""
+def place_of(cell):
+    return tuple(cell[a] for a in ("scene", "workload", "isa"))
+
+
+def fastest_points(results):
+    """[(cell, SAH cost, ns a ray, EPO or None)] of the fastest leaf and mode of each structure, builder, scene, workload and ISA, with one number of threads; and what is said of that number."""
+    metric, _ = results.throughput()
+
     def cost(cell):
         found = results.structure_value(cell, "sah_cost")
         return None if found is None else estimate([found])
 
-    return [(p.cell, p.x.median, p.y.median, results.structure_value(p.cell, "epo")) for p in trade_offs.fastest_points(results, metric, cost)]
+    cells, threads = trade_offs.of_one_number_of_threads([c for c in results.traces if c["structure"] != NO_TREE and not is_aimed(c["workload"]) and cost(c)])
+    return [(p.cell, p.x.median, p.y.median, results.structure_value(p.cell, "epo")) for p in trade_offs.fastest_points(cells, metric, cost, BUILT)], threads
+
+
+def fitted(points):
+    """Those on whose scene, workload and instruction set there is a line to fit."""
+    places = {}
+    for point in points:
+        places.setdefault(place_of(point[0]), []).append(point)
+    return [p for p in points if linear_fit(*zip(*((cost, time) for _, cost, time, _ in places[place_of(p[0])])))]
 
 
 def far_apart(points):
@@ -56,27 +78,27 @@ def far_apart(points):
     return max(largest.values()) > FAR_APART * min(largest.values())
 
 
-def panels_by_scene(points, kinds, markers):
+def panels_by_scene(points, kinds, y_label):
     shown = {}  # (scene, (workload, isa)) -> points
     for point in points:
         shown.setdefault((point[0]["scene"], (point[0]["workload"], point[0]["isa"])), []).append(point)
     figure, axes = panel_grid(shown, kinds, 3.3, 3.05, 4)
     for place, axis in axes.items():
-        panel(axis, shown[place], markers, axis.get_title())
+        panel(axis, shown[place], {place[0]: "o"}, axis.get_title())
         axis.set_xlim(0, 1.08 * max(p[1] for p in shown[place]))
         axis.set_ylim(0, 1.08 * max(p[2] for p in shown[place]))
         axis.set_xlabel("SAH cost")
-        axis.set_ylabel("time, ns a ray")
+        axis.set_ylabel(y_label)
     return figure
 
 
-def panels_of_all(points, workloads, isas, markers):
+def panels_of_all(points, workloads, isas, markers, y_label):
     figure, axes = panels(len(workloads), len(isas), 3.3, 3.05, sharex=True, sharey="row")
     for row, workload in enumerate(workloads):
         for column, isa in enumerate(isas):
             here = [p for p in points if p[0]["workload"] == workload and p[0]["isa"] == isa]
-            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}", shared=True)
-        axes[row][0].set_ylabel("time, ns a ray")
+            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}")
+        axes[row][0].set_ylabel(y_label)
         axes[row][0].set_ylim(0, 1.08 * max(p[2] for p in points if p[0]["workload"] == workload))
     axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))
     for axis in axes[-1]:
@@ -84,13 +106,13 @@ def panels_of_all(points, workloads, isas, markers):
     return figure
 
 
-def panel(axis, points, markers, title, shared=False):
-    """`shared`: the panel is that of all scenes of `markers`."""
+def panel(axis, points, markers, title):
+    """`markers`: of the scenes that share the panel."""
     for cell, cost, nanoseconds, _ in points:
         axis.plot(cost, nanoseconds, markers[cell["scene"]], color=colour(cell["structure"]), markersize=7,
                   markeredgecolor=WRONG if is_wrong(cell) else "white", markeredgewidth=1.2 if is_wrong(cell) else 0.7)
     explained_by = []  # (R², R² with EPO) of each scene, None where there is none
-    for scene in markers if shared else {p[0]["scene"] for p in points}:
+    for scene in markers:
         here = [p for p in points if p[0]["scene"] == scene]
         x, y = [p[1] for p in here], [p[2] for p in here]
         if fit := linear_fit(x, y):
@@ -114,8 +136,6 @@ def fits_text(explained_by):
         return f"{min(known):.2f} to {max(known):.2f}"
 
     alone, both = zip(*explained_by)
-    if not any(value is not None for value in alone):
-        return "no fit"
     return f"R² = {said(alone)}" + (f"{', ' if len(both) == 1 else chr(10)}with EPO {said(both)}" if any(value is not None for value in both) else "")
 
 

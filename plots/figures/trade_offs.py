@@ -33,14 +33,22 @@ class Point:
         return Point(self.cell, Estimate(factor * self.x.median, factor * self.x.low, factor * self.x.high, self.x.samples), self.y)
 
 
-def fastest_points(results, metric, x_of):
+def of_one_number_of_threads(cells):
+    """Those cells that have the fewest threads, as the others show the same; and, where there are others, what an axis of time says of it behind the clock."""
+    numbers = ordered((c["threads"] for c in cells), "threads")
+    if len(numbers) < 2:
+        return cells, ""
+    return [c for c in cells if c["threads"] == numbers[0]], f", {label('threads', numbers[0])}; not shown: {', '.join(numbers[1:])}"
+
+
+def fastest_points(cells, metric, x_of, told_apart_by=TRACED):
     """A point for each structure as built, traced in its fastest mode, of those cells of which `x_of` is known, on each scene, workload, instruction set and number of threads."""
     best = {}
-    for cell in results.traces:
+    for cell in cells:
         rate, x = cell.estimate(metric), x_of(cell)
         if rate is None or rate.low <= 0 or x is None:
             continue
-        key, time = tuple(cell[a] for a in TRACED), Estimate(1e9 / rate.median, 1e9 / rate.high, 1e9 / rate.low, rate.samples)
+        key, time = tuple(cell[a] for a in told_apart_by), Estimate(1e9 / rate.median, 1e9 / rate.high, 1e9 / rate.low, rate.samples)
         if key not in best or time.median < best[key].y.median:
             best[key] = Point(cell, x, time)
     return list(best.values())

@@ -19,7 +19,7 @@ import tables  # noqa: E402
 from figures import build_time, rays_by_builder, rays_per_second, sah_cost, sah_vs_time, squares, traversal_ratios  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import fits_text, linear_fit, plane_fit  # noqa: E402
-from results import Cell, Results, TooMuch, axes_of, estimate, interval_name, interval_words, load, ordered, swept_axes, undetermined_axes  # noqa: E402
+from results import Cell, NoData, Results, TooMuch, axes_of, estimate, interval_name, interval_words, load, ordered, swept_axes, undetermined_axes  # noqa: E402
 
 
 class Numbers(Drawn):
@@ -184,11 +184,34 @@ class Numbers(Drawn):
         points = [(Cell({"scene": s, "structure": "bvh8", "workload": "primary", "isa": "avx2"}, []), x, y * (1 + x), None) for s, y in (("bunny", 1.0), ("city", -3.0)) for x in (1.0, 2.0, 3.0)]
         figure, axis = style.plt.subplots()
         self.addCleanup(style.plt.close, figure)
-        sah_vs_time.panel(axis, points, {"bunny": "o", "city": "s"}, "primary", shared=True)
+        sah_vs_time.panel(axis, points, {"bunny": "o", "city": "s"}, "primary")
         self.assertEqual(axis.get_title(), "primary\nR² = 1.00, 1.00 (n = 6)")
         self.assertEqual(sorted(round(float(line.get_ydata()[-1])) for line in axis.lines if len(line.get_xdata()) == 2), [-12, 4])
-        self.assertEqual([fits_text(of) for of in ([(0.5, 0.75)], [(0.5, None), (None, None)], [(0.5, 0.6)] * 2, [(0.1, 0.2), (0.3, 0.4), (None, None), (0.2, 0.9)], [(None, None)])],
-                         ["R² = 0.50, with EPO 0.75", "R² = 0.50, –", "R² = 0.50, 0.50\nwith EPO 0.60, 0.60", "R² = 0.10 to 0.30\nwith EPO 0.20 to 0.90", "no fit"])
+        self.assertEqual([fits_text(of) for of in ([(0.5, 0.75)], [(0.5, None), (None, None)], [(0.5, 0.6)] * 2, [(0.1, 0.2), (0.3, 0.4), (None, None), (0.2, 0.9)])],
+                         ["R² = 0.50, with EPO 0.75", "R² = 0.50, –", "R² = 0.50, 0.50\nwith EPO 0.60, 0.60", "R² = 0.10 to 0.30\nwith EPO 0.20 to 0.90"])
+
+    def test_a_point_of_a_fit_is_a_structure_as_built(self):
+        def traced(structure, cost, nanoseconds, **more):
+            axes = {"scene": "bunny", "builder": "binned_sah", "leaf": "triangle8", "intersector": "watertight", "workload": "primary", "isa": "avx2", "threads": "1", **more}
+            return Cell({"structure": structure, **axes}, [{"sah_cost": cost, "rays_per_second": 1e9 / nanoseconds, "rays_per_cpu_second": 1e9 / nanoseconds}])
+
+        def points(cells):
+            figure = self.draw(sah_vs_time, results_of(cells))
+            return [(axis.get_title(), sorted((round(line.get_xdata()[0]), round(line.get_ydata()[0])) for line in axis.lines if len(line.get_xdata()) == 1), axis.get_ylabel())
+                    for axis in figure.axes if axis.get_visible()]
+
+        trees = [traced("bvh8", 10, 100), traced("bvh4", 20, 210), traced("bvh2", 30, 290), traced("bvh2", 40, 300, builder="morton")]
+        told = [("bunny, primary, avx2\nR² = 0.90 (n = 4)", [(10, 100), (20, 210), (30, 290), (40, 300)], "time, ns a ray\n(thread CPU time)")]
+        self.assertEqual(points(trees), told)
+        slower = [traced("bvh8", 11, 130, leaf="triangle4"), traced("bvh8", 10, 140, intersector="pluecker")]
+        aimed = [traced(c["structure"], 10 * k, 50 * k, workload=w) for k, c in enumerate(trees, 1) for w in ("hard", "hard_edge", "camera_edges")]
+        alone = [traced("bvh8", 10, 70, scene="city"), traced("bvh4", 20, 80, scene="city")]  # two have no fit
+        self.assertEqual(points([*trees, *slower, *aimed, *alone, traced("brute_force", 900, 9000)]), told)
+        threads = [traced(c["structure"], c.value("sah_cost"), 44, builder=c["builder"], threads=t) for c in trees for t in ("2", "4")]
+        self.assertEqual(points([*threads, *trees]), [(*told[0][:2], "time, ns a ray\n(wall time, 1 thread;\nnot shown: 2, 4)")])
+        for few in (trees[:2], alone, aimed, [trees[0], trees[1], traced("brute_force", 900, 9000)], [traced(f"bvh{n}", 10, 100 * n) for n in (2, 4, 8)]):
+            with self.assertRaises(NoData):
+                sah_vs_time.draw(results_of(few))
 
     def test_dots_of_many_modes_are_in_the_legend(self):
         for modes, said in ((3, ["single0", "single1", "single2"]), (11, ["each of 11"])):

@@ -103,7 +103,7 @@ class TradeOffs(Drawn):
 
     def test_the_fastest_mode_stands_for_a_structure_as_built(self):
         cells = [traced("bvh8", "ploc", ns, traversal=t) for ns, t in ((80.0, "single"), (50.0, "packet8"))] + [traced("bvh2", "ploc", 70.0, bytes_per_triangle=40.0)]
-        points = trade_offs.fastest_points(results_of(cells), "rays_per_second", lambda c: exactly(1.0))
+        points = trade_offs.fastest_points(cells, "rays_per_second", lambda c: exactly(1.0))
         self.assertEqual([(p.cell["structure"], round(p.y.median)) for p in points], [("bvh8", 50), ("bvh2", 70)])
         (axis,) = self.draw(memory_vs_time, results_of(cells)).axes
         self.assertEqual(self.words(axis), [("bvh2", "40.0 B, 70.0 ns"), ("bvh8", "50.0 B, 50.0 ns")])
