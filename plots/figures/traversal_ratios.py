@@ -12,7 +12,7 @@ from results import NoData, ordered
 from style import panels, short
 
 TITLE = "Ways of traversal"
-CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set (where the sweep has no Embree: of the structure's "
+CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set with as many threads (where the sweep has no Embree: of the structure's "
            "own single rays: below a workload's name stands which). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes. "
            "Framed red: ways with wrong answers. Where an instruction set would have more than 60 rows, a row is a structure and way of traversal, on each scene by its fastest builder, leaf and tests.")
 MOST_ROWS = 60
@@ -71,18 +71,22 @@ def fastest_cells(cells, modes, metric):
     return fastest
 
 
+def compared_at(cell):
+    """Where cells of one instruction set have to be alike to be compared."""
+    return tuple(cell[a] for a in ("workload", "scene", "threads"))
+
+
 def ratios(cells, modes, metric):
     """{(structure, mode): {(workload, scene): ratio}} of one instruction set."""
     base = {}
     for cell in cells:
-        rate = cell.estimate(metric).median
-        place = (cell["workload"], cell["scene"])
+        rate, place = cell.estimate(metric).median, compared_at(cell)
         for owner, wanted in (("embree", cell["structure"] == "embree"), (cell["structure"], cell["traversal"] == "single")):
             if wanted:
                 base[owner, place] = max(base.get((owner, place), 0.0), rate)
     table = {}
     for (structure, mode), row in fastest_cells(cells, modes, metric).items():
-        compared = {p: c.estimate(metric).median / b for p, c in row.items() if (b := base.get(("embree", p)) or base.get((structure, p)))}
+        compared = {p: c.estimate(metric).median / b for p, c in row.items() if (b := base.get(("embree", compared_at(c))) or base.get((structure, compared_at(c))))}
         if compared:
             table[structure, mode] = compared
     return table
@@ -110,9 +114,9 @@ def headings_of(columns, cells, wide):
     """What stands above a workload's columns, each `wide` inches: its name, and what its ratios are to, broken into lines that stay above them."""
     found = []
     for workload, count in spans_of(columns):
-        scenes = {c["scene"] for c in cells if c["workload"] == workload}
-        with_embree = {c["scene"] for c in cells if c["workload"] == workload and c["structure"] == "embree"}
-        to = "" if not scenes else "… Embree's fastest" if with_embree == scenes else "… Embree's fastest, or own single rays" if with_embree else "… own single rays"
+        places = {compared_at(c) for c in cells if c["workload"] == workload}
+        with_embree = {compared_at(c) for c in cells if c["workload"] == workload and c["structure"] == "embree"}
+        to = "" if not places else "… Embree's fastest" if with_embree == places else "… Embree's fastest, or own single rays" if with_embree else "… own single rays"
         most = max(4, int(count * wide / (CHARACTER * (SMALL if count == 1 else 1.0))))
         found.append("\n".join(wrap(" ".join(words_of(workload)), most, break_long_words=False) + wrap(to, most, break_long_words=False)).replace("= ", "="))
     return found

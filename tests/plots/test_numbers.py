@@ -84,6 +84,18 @@ class Numbers(Drawn):
         self.assertIsNone(traversal_ratios.value_at(table["embree", "single"], "primary", traversal_ratios.MEAN))
         self.assertEqual(traversal_ratios.columns_of(cells), [("diffuse", "bunny"), ("diffuse", "city"), ("diffuse", "mean")])
 
+    def test_ratios_of_traversals_are_of_as_many_threads(self):
+        rates = {("single", "1"): 2e6, ("packet8", "1"): 3e6, ("single", "4"): 6e6, ("packet8", "4"): 12e6}
+        axes = {"structure": "bvh8", "scene": "bunny", "workload": "diffuse", "isa": "avx2", "builder": "b", "leaf": "l", "intersector": "i", "box": "fast"}
+        cells = [Cell({**axes, "traversal": t, "threads": n}, [{"rays_per_second": rate}]) for (t, n), rate in rates.items()]
+        place = ("diffuse", "bunny")
+        told = lambda some: {mode: row[place] for (structure, mode), row in traversal_ratios.ratios(some, Modes(some), "rays_per_second").items() if structure == "bvh8"}
+        self.assertEqual(told(cells), {"single, 1 thread": 1.0, "packet8, 1 thread": 1.5, "single, 4 threads": 1.0, "packet8, 4 threads": 2.0})
+        embree = Cell({**axes, "structure": "embree", "traversal": "single", "threads": "1"}, [{"rays_per_second": 4e6}])
+        self.assertEqual(told([*cells, embree]), {"single, 1 thread": 0.5, "packet8, 1 thread": 0.75, "single, 4 threads": 1.0, "packet8, 4 threads": 2.0})
+        self.assertEqual(traversal_ratios.headings_of([place], [*cells, embree], 5.0), ["diffuse\n… Embree's fastest, or own single rays"])
+        self.assertEqual(traversal_ratios.headings_of([place], [c for c in [*cells, embree] if c["threads"] == "1"], 5.0), ["diffuse\n… Embree's fastest"])
+
     def test_squares_for_many_bars(self):
         import matplotlib.pyplot as plt
 
