@@ -77,10 +77,14 @@ class Cell:
         return self._estimates[name]
 
     def per_million(self, name):
-        """A count of answers per million rays; None where the cell was not checked."""
-        rates = [1e6 * row[name] / row["rays"] for row in self.rows
-                 if is_number(row.get(name)) and is_number(row.get("rays")) and row["rays"] > 0]
+        """A count of answers per million of the rays that were checked; None where none were."""
+        rates = [1e6 * row[name] / rays for row in self.rows if is_number(row.get(name)) and (rays := answered(row))]
         return max(rates) if rates else None
+
+    def hit_share(self):
+        """Per cent of the rays that hit something; None where they were not counted."""
+        shares = [100 * row["hits"] / rays for row in self.rows if is_number(row.get("hits")) and (rays := answered(row))]
+        return float(np.median(shares)) if shares else None
 
     def __getitem__(self, axis):
         return self.axes.get(axis, "")
@@ -136,6 +140,12 @@ class Results:
         keys = [cell[a] for a in STRUCTURE_AXES]
         found = (self._structure_index[name].get(tuple(keys[:length])) for length in range(len(keys), 3, -1))
         return next((value for value in found if value is not None), None)
+
+
+def answered(row):
+    """How many rays the counts of answers of `row` are of: of a workload that is a picture, those that its renderer sends where exact answers lead it, else all; 0 where that is unknown."""
+    rays = next((row[name] for name in ("checked_rays", "rays") if is_number(row.get(name))), 0)
+    return max(rays, 0)
 
 
 def is_aimed(workload):

@@ -142,7 +142,7 @@ def throughput_table(results):
             out.append(number(rate.median / base if base else None, "{:.2f}"))
         out.append(number(1e9 / rate.median, "{:.1f}"))
         out += [per_million(cell.per_million(name)) for name, _ in counts if name != "wrong_answers"]
-        out += [number(hit_share(cell) if name == "hits" else cell.value(name)) for name, _ in extra]
+        out += [number(cell.hit_share() if name == "hits" else cell.value(name)) for name, _ in extra]
         if children:
             out.append(text(" ".join(f"{100 * share:.0f}" for share in cell.series("children_hit"))))
         rows.append((out, "best" if rate.median == best[beside(cell)] else ""))
@@ -151,12 +151,6 @@ def throughput_table(results):
             f"hits and wrong surfaces against exact arithmetic; “wrong primitive” counts apart. The fastest "
             f"structure of a scene, workload and ISA is green. {escape('Same for all: ' + note + '.' if note else '')}</p>"
             + table("throughput", heads, rows))
-
-
-def hit_share(cell):
-    """Per cent of the rays; None where they were not counted."""
-    hits, rays = cell.value("hits"), cell.value("rays")
-    return None if hits is None or not rays else 100 * hits / rays
 
 
 STRUCTURE_COLUMNS = (("build_seconds", "build, ms", 1e3), ("triangles_per_second", "Mtri/s", 1e-6), ("refit_seconds", "refit, ms", 1e3), ("sah_cost", "SAH cost", 1),

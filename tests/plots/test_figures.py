@@ -388,6 +388,16 @@ class Drawing(unittest.TestCase):
         self.assertIn("rays that hit, %", none)
         self.assertIn('data-v="25.0"', none)
 
+    def test_answers_of_pictures_are_of_the_rays_that_were_checked(self):
+        picture = other("whitted", rays=4000, checked_rays=1000, wrong_answers=5, hits=250)
+        results = load(Folder([picture, other("primary", rays=4000, wrong_answers=4, hits=0)]).path)
+        whitted, primary = results.traces
+        self.assertEqual((whitted.per_million("wrong_answers"), primary.per_million("wrong_answers")), (5000, 1000))
+        self.assertEqual((whitted.hit_share(), primary.hit_share()), (25, 0))
+        table = tables.throughput_table(results)
+        self.assertIn(">5,000</td>", table)
+        self.assertIn('data-v="25.0"', table)
+
     def test_one_thread_is_one(self):
         cells = load(Folder([trace(), trace(threads=2, run_name="trace/two")]).path).traces
         self.assertEqual(Modes(cells).labels, ["1 thread", "2 threads"])
