@@ -1,5 +1,6 @@
 """The tables of the report as HTML: every text is escaped, every throughput stands beside its wrong answers."""
 
+import math
 from html import escape
 
 from results import STRUCTURE_AXES, axis_sort_key, interval_name, interval_words, ordered
@@ -11,11 +12,19 @@ SAH_STEP = ("A visit of a node counts as one step whatever the number of its chi
             "a lower cost of wider nodes or blocks is not less work by as much.")
 
 
-def number(value, form="{:.3g}"):
+def number(value, form="{:.3g}".format):
     """A table cell that sorts by the value itself; empty where there is none."""
     if value is None:
         return '<td class="number"></td>'
-    return f'<td class="number" data-v="{value!r}">{escape(form.format(value))}</td>'
+    return f'<td class="number" data-v="{value!r}">{escape(form(value))}</td>'
+
+
+def digits(value):
+    """Three digits or all before the point, without an exponent."""
+    if value == 0:
+        return "0"
+    before = math.floor(math.log10(abs(float(f"{value:.3g}"))))  # of the rounded value: 9.999 is 10.0
+    return f"{value:.{max(0, 2 - before)}f}"
 
 
 def per_million_text(rate):
@@ -31,7 +40,7 @@ def per_million(rate):
 def figure(value):
     """Four digits for what is measured, all of them for what is counted."""
     whole = value is not None and (abs(value) >= 1000 or value == int(value))
-    return number(value, "{:,.0f}" if whole else "{:#.4g}")
+    return number(value, ("{:,.0f}" if whole else "{:#.4g}").format)
 
 
 def text(value, key=False):
@@ -134,13 +143,13 @@ def throughput_table(results):
     for cell in cells:
         rate = cell.estimate(metric)
         out = [text(cell[a], key=a == "structure") for a in axes]
-        out += [number(rate.median / 1e6, "{:.2f}"), text(f"{rate.low / 1e6:.2f} – {rate.high / 1e6:.2f}" if rate.samples > 1 else "-")]
+        out += [number(rate.median / 1e6, digits), text(f"{digits(rate.low / 1e6)} – {digits(rate.high / 1e6)}" if rate.samples > 1 else "-")]
         out.append(per_million(cell.per_million("wrong_answers"))
                    if cell.per_million("wrong_answers") is not None else text("not checked"))
         if reference:
             base = reference.get(beside(cell))
-            out.append(number(rate.median / base if base else None, "{:.2f}"))
-        out.append(number(1e9 / rate.median, "{:.1f}"))
+            out.append(number(rate.median / base if base else None, digits))
+        out.append(number(1e9 / rate.median, digits))
         out += [per_million(cell.per_million(name)) for name, _ in counts if name != "wrong_answers"]
         out += [number(cell.hit_share() if name == "hits" else cell.value(name)) for name, _ in extra]
         if children:
@@ -195,10 +204,10 @@ def best_table(results):
         cell = best[key]
         wrong = cell.per_million("wrong_answers")
         out = [text(v) for v in key] + [text(cell["structure"])]
-        out.append(number(cell.value(metric) / 1e6, "{:.2f}"))
+        out.append(number(cell.value(metric) / 1e6, digits))
         out.append(per_million(wrong) if wrong is not None else text("not checked"))
         if reference:
-            out.append(number(cell.value(metric) / reference[key] if reference.get(key) else None, "{:.2f}"))
+            out.append(number(cell.value(metric) / reference[key] if reference.get(key) else None, digits))
         out.append(text(" / ".join(cell[a] for a in ("builder", "leaf", "intersector", "box", "traversal") if cell[a])))
         rows.append((out, ""))
     return table("fastest", heads, rows)

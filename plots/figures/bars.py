@@ -4,6 +4,7 @@ from figures import squares
 from figures.names import bar_label
 from results import Cell, NoData, axis_sort_key, ordered, telling_axes
 from style import REST_COLOUR, colour, hatch, interval_legend, legends_right, panels, part_colour, part_legend, short, structure_legend
+from tables import digits
 
 
 # Inches: of a panel at least; of its bars; of a character beside them.
@@ -119,11 +120,6 @@ def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
     axis.set_ylim(len(cells) - 0.4, -0.6)
     axis.set_xlim(0, 1.02 * max(value_of(c)[2] for c in cells) or 1.0)
     axis.grid(axis="y", visible=False)
-
-
-def digits(value):
-    """Three digits or all before the point, without an exponent for what a build takes."""
-    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:#.3g}"
 
 
 def look(cell, parts):

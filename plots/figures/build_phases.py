@@ -1,9 +1,10 @@
 """What builds spend their time on: a row a structure and builder, a column a scene."""
 
-from figures.bars import digits, distinct
+from figures.bars import distinct
 from figures.build_time import phases
 from figures.rows import bar_rows, groups_of
 from results import ordered
+from tables import digits
 
 TITLE = "Build phases"
 CAPTION = ("Each phase's share of the build's wall time, in the order of the build; grey is what none of them covers. Beside it, the time of the whole build, "

@@ -1,8 +1,9 @@
 """Build time, from mesh to a structure ready for rays: one panel a scene."""
 
 from figures import squares
-from figures.bars import bar_panels, digits
+from figures.bars import bar_panels
 from results import is_number
+from tables import digits
 
 TITLE = "Build time"
 CAPTION = ("Wall time from mesh to a structure ready for rays, with {interval}; "

@@ -1,8 +1,9 @@
 """Memory of what was built, by part: one panel a scene."""
 
-from figures.bars import bar_panels, digits, distinct
+from figures.bars import bar_panels, distinct
 from figures.rows import bar_rows, groups_of, rows_are_due
 from results import ordered
+from tables import digits
 
 TITLE = "Bytes per triangle"
 CAPTION = ("What tracing needs besides the mesh, a triangle of the mesh: nodes, leaves (references that are shared count as often as "

@@ -1,7 +1,8 @@
 """End-point overlap of what was built: one panel a scene."""
 
 from figures import squares
-from figures.bars import bar_panels, digits
+from figures.bars import bar_panels
+from tables import digits
 
 TITLE = "End-point overlap (EPO)"
 CAPTION = ("Surface that lies in boxes of other subtrees, weighed by the cost of visiting them (Aila, Karras, Laine 2013): the work of "

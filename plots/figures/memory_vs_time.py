@@ -1,8 +1,8 @@
 """Memory against speed: what tracing needs besides the mesh against the time of a ray."""
 
-from figures.bars import digits
 from figures.trade_offs import MOST_NAMES, draw_panels, fastest_points, of_places, pareto_front
 from results import estimate
+from tables import digits
 
 TITLE = "Memory against time"
 CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. Memory is what tracing needs besides the mesh, a triangle of the mesh. "

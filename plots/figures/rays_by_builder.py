@@ -1,10 +1,11 @@
 """Throughput by structure and builder: one panel a scene, workload and instruction set, a bar for each structure as built."""
 
 from figures import squares
-from figures.bars import digits, draw_panel, scene_bars
+from figures.bars import draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
 from style import MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short, wrong_legend, wrong_marker, wrong_text
+from tables import digits
 
 TITLE = "Rays per second by structure and builder"
 CAPTION = ("A bar reaches the fastest mode of a structure as built, with {interval}; markers "

@@ -38,11 +38,22 @@ class Numbers(Drawn):
             covered = sum(e.low <= 0 <= e.high for e in (estimate([chance.gauss(0, 1) for _ in range(n)]) for _ in range(4000)))
             self.assertTrue(0.93 * 4000 <= covered <= 0.97 * 4000, f"{n}: {covered}")
 
+    def test_three_digits(self):
+        self.assertEqual([tables.digits(v) for v in (0, 1234.5, 99.96, 9.999, 1, 0.0123, 0.000321, 4.56e-6)], ["0", "1234", "100", "10.0", "1.00", "0.0123", "0.000321", "0.00000456"])
+
+    def test_slow_cells_are_not_written_as_nothing(self):
+        results = load(Folder([trace("brute_force", rate=r, repetition=k) for k, r in enumerate((320.0, 321.0, 322.0))] + [trace("embree", rate=2e6)]).path)
+        for table in (tables.throughput_table(results), tables.best_table(results)):
+            self.assertIn(">0.000321</td>", table)
+            self.assertIn(">0.000160</td>", table)  # × embree
+            self.assertNotIn("0.00<", table)
+        self.assertIn(">0.000320 – 0.000322</td>", tables.throughput_table(results))
+
     def test_what_intervals_are_called(self):
         self.assertEqual([interval_name(n) for n in ([1, 1], [2, 5], [6], [5, 6], [])], ["interval", "range", "95 % interval", "95 % interval or range", "interval"])
         self.assertEqual(interval_words([3, 3]), "the range of the 3 repetitions, which covers the median 75 times in 100 (95 take 6 repetitions)")
         self.assertIn("no interval", interval_words([1]))
-        for repetitions, name, interval in ((1, "interval", None), (3, "range", "10.00 – 12.00"), (7, "95 % interval", "10.73 – 15.27")):
+        for repetitions, name, interval in ((1, "interval", None), (3, "range", "10.0 – 12.0"), (7, "95 % interval", "10.7 – 15.3")):
             folder = Folder([trace(rate=(10 + r) * 1e6, repetition=r) for r in range(repetitions)])
             self.assertEqual(folder.plot("--only", "rays_per_second").returncode, 0)
             self.assertEqual(f"<!-- {name} -->" in (folder.path / "rays_per_second.svg").read_text(), repetitions > 1)
