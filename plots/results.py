@@ -199,16 +199,16 @@ def interval_words(counts):
 
 
 def axis_sort_key(axis):
-    """Orders an axis's keys: ISAs by age, workloads as the manual lists them, others by their text with numbers as
+    """Orders an axis's keys: ISAs by age, workloads as the manual lists them (a variant, behind a colon, after its own), others by their text with numbers as
     numbers (bvh4 before bvh16)."""
     fixed = {"isa": ISA_ORDER, "workload": WORKLOAD_ORDER}.get(axis, ())
 
     def key(value):
-        text = str(value)
-        if text in fixed:
-            return [(0, fixed.index(text), "")]
-        parts = re.split(r"(\d+)", text)
-        return [(1, int(p), "") if p.isdigit() else (2, 0, p) for p in parts if p]
+        text, first = str(value), []
+        name, _, variant = text.partition(":")
+        if name in fixed:
+            first, text = [(0, fixed.index(name), "")], variant
+        return first + [(1, int(p), "") if p.isdigit() else (2, 0, p) for p in re.split(r"(\d+)", text) if p]
     return key
 
 

@@ -298,6 +298,7 @@ class Numbers(Drawn):
         self.assertEqual(ordered(["bvh16", "embree", "bvh4", "octree"], "structure"), ["bvh4", "bvh16", "octree", "embree"])
         self.assertEqual(ordered(["avx512", "sse", "scalar", "avx2"], "isa"), ["scalar", "sse", "avx2", "avx512"])
         self.assertEqual(ordered(["diffuse", "primary"], "workload"), ["primary", "diffuse"])
+        self.assertEqual(ordered(["hard", "path", "diffuse:way=b", "shadow:way=b", "diffuse", "diffuse:way=a"], "workload"), ["shadow:way=b", "diffuse", "diffuse:way=a", "diffuse:way=b", "path", "hard"])
 
     def test_axes_from_the_name(self):
         axes = axes_of({"name": "trace/bunny/bvh8/binned_sah/triangle8/watertight/padded/single/avx2/diffuse/threads:2"})
