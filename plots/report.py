@@ -18,6 +18,7 @@ def write(results, drawn):
     parts = [f"<h1>{escape(results.name)}</h1>", f'<p class="soft">{escape(subtitle(results))}</p>']
     parts.append('<nav><a href="#fastest-structures">Fastest</a><a href="#figures">Figures</a>'
                  '<a href="#all-cells">All cells</a><a href="#built">Structures</a><a href="#skipped">Skipped</a>'
+                 + ('<a href="#scenes">Scenes</a>' if results.context.get("scenes") else "") +
                  '<a href="#machine">Machine</a><a href="#again">Reproduce</a></nav>')
     if not results.complete:
         parts.append('<p class="bad">The run was cut off: these are the cells that had ended. '

@@ -135,9 +135,9 @@ def throughput_table(results):
     for cell in cells:
         best[beside(cell)] = max(best.get(beside(cell), 0.0), cell.value(metric))
 
-    heads = [(a, False) for a in axes] + [("Mray/s", True), (interval_name(c.estimate(metric).samples for c in cells), False), ("wrong per million", True)]
+    heads = [(a, False) for a in axes] + [(unit, True), (interval_name(c.estimate(metric).samples for c in cells), False), ("wrong per million", True)]
     heads += [("× embree", True)] if reference else []
-    heads += [("ns/ray", True)] + [(f"{label} per million", True) for name, label in counts if name != "wrong_answers"]
+    heads += [(f"ns/ray, {results.clock()}", True)] + [(f"{label} per million", True) for name, label in counts if name != "wrong_answers"]
     heads += [(label, True) for _, label in extra] + ([("children hit: 0, 1, 2, 3, 4+, %", False)] if children else [])
     rows = []
     for cell in cells:
@@ -187,16 +187,16 @@ def structure_table(results):
 
 def best_table(results):
     """One row a scene, workload and ISA: the fastest structure of ours, and how it stands to embree."""
-    metric, _ = results.throughput()
+    metric, unit = results.throughput()
     reference, best = embree_rates(results, metric), {}
     for cell in results.traces:
         rate = cell.value(metric)
         if rate and cell["structure"] != "embree" and (beside(cell) not in best or rate > best[beside(cell)].value(metric)):
             best[beside(cell)] = cell
     if not best:
-        return "<p>No cell has a throughput.</p>"
+        return f"<p>{'No structure of ours was traced' if reference else 'No cell has a throughput'}.</p>"
     heads = [("scene", False), ("workload", False), ("ISA", False), ("threads", False), ("fastest structure", False),
-             ("Mray/s", True), ("wrong per million", True)]
+             (unit, True), ("wrong per million", True)]
     heads += ([("× embree", True)] if reference else []) + [("how", False)]
     rows = []
     order = [axis_sort_key(a) for a in ("scene", "workload", "isa", "threads")]

@@ -10,7 +10,7 @@ from style import MARKERS, intersector_colour, intersector_legend, legends_right
 TITLE = "Leaving a surface"
 CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass through what "
            "they should meet, against the exact answer of the ray that starts at the hit point itself, its own primitive left out. "
-           "Time is of thread CPU where the run has one thread; a ray that meets its own surface ends there, and is quick. Zero stands on the left line.")
+           "A ray that meets its own surface ends there, and is quick. Zero stands on the left line.")
 WAYS = ("none", "epsilon", "integer_offset", "error_bound", "exclusion")
 FAULTS = (("self_hits_per_million", "own surface met,\nper million"), ("near_hits_per_million", "neighbour met too early,\nper million"),
           ("leaks_per_million", "passed through,\nper million"))
@@ -25,7 +25,7 @@ def draw(results):
     workloads = ordered({base(c) for c in cells}, "workload")
     intersectors = sorted({c["intersector"] for c in cells})
     markers = {w: MARKERS[i % len(MARKERS)] for i, w in enumerate(workloads)}
-    columns = [f for f in FAULTS if any(c.value(f[0]) is not None for c in cells)] + [(None, "time,\nns a ray")]
+    columns = [f for f in FAULTS if any(c.value(f[0]) is not None for c in cells)] + [(None, f"time, ns a ray\n({results.clock()})")]
     figure, axes = panels(len(scenes), len(columns), 2.7, 0.9 + 0.4 * len(ways), sharey=True, sharex="col")
     slots = [(i, w) for i in intersectors for w in workloads]
     for row, scene in enumerate(scenes):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import sys
 import unittest
 from html.parser import HTMLParser
@@ -144,7 +145,7 @@ class Hard(Drawn):
         self.assertEqual([plain(v) for v in (0, 0.01, 1, 1000, 1e5, 2e5, 1e-12)], ["0", "0.01", "1", "1000", "10⁵", "2·10⁵", "10⁻¹²"])
 
 
-class Drawing(unittest.TestCase):
+class Drawing(Drawn):
     def test_every_figure_of_whole_results(self):
         whole_folder = Folder(everything(), {"experiment": PUBLISHED, "plots": [n for n in ALL if n not in HARD]}, files={"effective.yaml": "experiment: quick\n"})
         hard_folder = Folder(hard() + [trace(intersector="watertight", rate=4e6)], {"plots": ["accuracy_vs_time", *HARD]}, files=SEEN)
@@ -397,6 +398,26 @@ class Drawing(unittest.TestCase):
         table = tables.throughput_table(results)
         self.assertIn(">5,000</td>", table)
         self.assertIn('data-v="25.0"', table)
+
+    def test_the_clock_stands_in_the_heads_of_columns_and_at_axes(self):
+        for threads, clock in ((1, "thread CPU time"), (2, "wall time")):
+            ways = [other(f"diffuse:self_intersection={way}", threads=threads, self_intersection=way, self_hits_per_million=1.0) for way in ("none", "exclusion")]
+            results = load(Folder(ways).path)
+            self.assertIn(f">Mray/s, {clock}</button>", tables.best_table(results))
+            self.assertIn(f">Mray/s, {clock}</button>", tables.throughput_table(results))
+            self.assertIn(f">ns/ray, {clock}</button>", tables.throughput_table(results))
+            self.assertEqual(self.draw(self_intersection, results).axes[-1].get_xlabel(), f"time, ns a ray\n({clock})")
+
+    def test_that_nothing_of_ours_was_traced_is_said(self):
+        for rows, said in (([trace("embree")], "No structure of ours was traced."), ([build()], "No cell has a throughput."), ([trace("embree", rate=0.0)], "No cell has a throughput.")):
+            self.assertEqual(tables.best_table(load(Folder(rows).path)), f"<p>{said}</p>")
+
+    def test_the_report_leads_to_all_of_its_parts(self):
+        for context, parts in (({}, 7), ({"scenes": {"bunny": {"triangles": 1}}}, 8)):
+            page = report.write(load(Folder(whole(), context).path), []).read_text()
+            targets = re.findall(r'<a href="#([\w-]+)">', page)
+            self.assertEqual(targets, re.findall(r'<h2 id="([\w-]+)"', page))
+            self.assertEqual(len(targets), parts)
 
     def test_one_thread_is_one(self):
         cells = load(Folder([trace(), trace(threads=2, run_name="trace/two")]).path).traces
