@@ -8,6 +8,7 @@ import json
 import math
 import sys
 from pathlib import Path
+from textwrap import fill
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -18,6 +19,7 @@ COLOURS = {"faster": "#117733", "slower": "#CC3355", "indistinguishable": "#7777
 MOST_CELLS = 80
 SAME = 1e-6  # of the logarithm of a ratio: no difference
 LETTER = 0.075  # inches that a letter of a label takes
+WIDTH, TITLE_LETTER = 6.5, 0.09  # inches: of what is beside the labels; that a letter of a title takes
 
 
 def labels(cells):
@@ -61,15 +63,15 @@ def draw(comparison):
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
     parts = [(title, *rows_of(comparison, metric)) for metric, title in METRICS]
-    parts = [part for part in parts if part[1]]
-    heights = [len(rows) + 2.5 for _, rows, _ in parts]
-    widest = max(len(row[0]) for _, rows, _ in parts for row in rows)
-    figure, axes = style.plt.subplots(len(parts), 1, figsize=(6.5 + LETTER * widest, 0.19 * sum(heights) + 0.8), squeeze=False, layout="constrained",
+    parts = [(fill(title + (f": {shared}" if shared else ""), int(WIDTH / TITLE_LETTER)), rows) for title, rows, shared in parts if rows]
+    heights = [len(rows) + 2.5 + title.count("\n") for title, rows in parts]
+    widest = max(len(row[0]) for _, rows in parts for row in rows)
+    figure, axes = style.plt.subplots(len(parts), 1, figsize=(WIDTH + LETTER * widest, 0.19 * sum(heights) + 0.8), squeeze=False, layout="constrained",
                                       gridspec_kw={"height_ratios": heights})
     limit = 1 + comparison["options"]["min_difference_percent"] / 100
-    drawn = [row for _, rows, _ in parts for row in rows]  # one scale for all panels
+    drawn = [row for _, rows in parts for row in rows]  # one scale for all panels
     low, high = min(1 / limit, *(row[2] for row in drawn)) / 1.02, max(limit, *(row[3] for row in drawn)) * 1.02
-    for axis, (title, rows, shared) in zip(axes[:, 0], parts):
+    for axis, (title, rows) in zip(axes[:, 0], parts):
         axis.axvspan(1 / limit, limit, color="#EEEEEE", zorder=0)
         axis.axvline(1, color="#333333", linewidth=0.8, zorder=1)
         for place, (_, ratio, least, most, kind) in enumerate(rows):
@@ -86,9 +88,9 @@ def draw(comparison):
         else:
             axis.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
         axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_title(title + (f": {shared}" if shared else ""), loc="left")
+        axis.set_title(title, loc="left")
         axis.set_xlabel("B over A: right of 1, B is faster; grey: too little to count")
-    present = [kind for kind in COLOURS if any(row[4] == kind for _, rows, _ in parts for row in rows)]
+    present = [kind for kind in COLOURS if any(row[4] == kind for _, rows in parts for row in rows)]
     style.legends_right(figure, [("B against A", [Line2D([], [], linestyle="", marker="D" if kind == "mean" else "o", color=COLOURS[kind], label=kind)
                                                   for kind in present])])
     return figure

@@ -337,6 +337,21 @@ class Ratios(Drawn):
             self.assertEqual([row[4] for row in rows], ["mean"])
             self.assertIn(said, shared)
 
+    def test_a_title_stays_above_its_panel(self):
+        for name in ("sphere_flake-20000", "a_scene_with_a_name_that_is_long:stretch=100:offset=1e4"):
+            both = comparison([1.1, 1.2])
+            for cell in both["cells"]:
+                cell.update(scene=name, builder="binned_sah:bins=16:max_leaf_blocks=4", leaf="triangle8v", intersector="watertight", box="padded", traversal="single", isa="avx2", workload="primary")
+            figure = ratios.draw(both)
+            self.addCleanup(style.plt.close, figure)
+            figure.draw_without_rendering()
+            title, legend = figure.axes[0]._left_title, figure.legends[0]
+            self.assertTrue(title.get_text().endswith("primary"))
+            self.assertIn("\n", title.get_text())
+            self.assertFalse(title.get_window_extent().overlaps(legend.get_window_extent()))
+            self.assertLessEqual(title.get_window_extent().x1, figure.bbox.x1)
+            self.assertLessEqual(title.get_window_extent().y1, figure.bbox.y1)
+
     def test_panels_have_one_scale_and_one_repetition_has_no_interval(self):
         both = comparison([0.5, 1.2], low=None, high=None)
         builds = comparison([1.01, 1.02], "build")
