@@ -82,6 +82,15 @@ INTERSECTOR_COLOURS = {  # families near each other: crack-free ones green and b
 intersector_colour = Palette(INTERSECTOR_COLOURS, SPARE_COLOURS)
 
 
+BOX_COLOURS = {"fast": "#3377CC", "ize": "#E69F00", "padded": "#CC2222"}  # box tests, in the order in which they are drawn: each on those before
+box_colour = Palette(BOX_COLOURS, SPARE_COLOURS)
+
+
+def boxes_in_order(boxes):
+    """Distinct box tests in the order of BOX_COLOURS, new ones last."""
+    return [b for b in BOX_COLOURS if b in set(boxes)] + sorted(set(boxes) - set(BOX_COLOURS))
+
+
 def intersector_legend(intersectors):
     return [Patch(facecolor=intersector_colour(i), edgecolor="white", label=i) for i in intersectors]
 

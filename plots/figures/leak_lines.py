@@ -6,11 +6,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from results import HARD_PREFIX, NoData, ordered
-from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, panels, plain, short
+from style import Palette, boxes_in_order, intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, panels, plain, short
 
 CAPTION = (" Lines in the shaded band are at zero, side by side so that all can be seen; above it the scale is logarithmic. Where lines lie on each "
            "other, those beneath are wider.")
-BOX_LINES = {"fast": (0, (2, 1.2)), "ize": "-."}  # others: drawn through
+box_line = Palette({"fast": (0, (2, 1.2)), "ize": "-.", "padded": "-"}, (":",))
 
 
 def draw_lines(results, key, value_of, label, why_none):
@@ -28,7 +28,7 @@ def draw_lines(results, key, value_of, label, why_none):
     families = list(dict.fromkeys(family for family, _ in points))
     workloads = ordered({workload for _, workload in points}, "workload")
     figure, axes = panels(len(families), len(workloads), 4.8, 3.4, sharey="row")
-    intersectors, embree = set(), False
+    intersectors, own_boxes, embree = set(), set(), False
     for row, family in enumerate(families):
         scale = LeakScale([leaks for (f, _), lines in points.items() if f == family for line in lines.values() for leaks in line.values()])
         for column, workload in enumerate(workloads):
@@ -38,9 +38,11 @@ def draw_lines(results, key, value_of, label, why_none):
             for ((intersector, box, is_embree), line), zero, beneath in zip(drawn, zeros, wider([line for _, line in drawn])):
                 intersectors.add(intersector)
                 embree = embree or is_embree
+                if not is_embree:
+                    own_boxes.add(box)
                 fast = box == "fast" and not is_embree
                 axis.plot(list(sorted(line)), [scale(line[x], zero) for x in sorted(line)], color=intersector_colour(intersector), linewidth=(2.4 if fast else 1.3) + min(1.1 * beneath, 3.3),
-                          alpha=0.55 if fast else 1.0, linestyle=BOX_LINES.get(box, "-"),
+                          alpha=0.55 if fast else 1.0, linestyle=box_line(box),
                           marker="D" if is_embree else "o", markersize=5 if is_embree else 3.5, markerfacecolor="white" if is_embree else None, clip_on=False)
             xs = sorted({x for line in lines.values() for x in line})
             (log_with_zero if xs and xs[0] == 0 else log_axis)(axis, "x", xs)
@@ -52,7 +54,8 @@ def draw_lines(results, key, value_of, label, why_none):
             axis.set_title(f"{short(family)}, {workload.replace('_', ' ')}")
             axis.set_xlabel(label(family, results))
         axes[row][0].set_ylabel("leaks per million rays")
-    boxes = [Line2D([], [], color="#333333", linestyle=BOX_LINES["fast"], linewidth=2.4, alpha=0.55, label="fast"), Line2D([], [], color="#333333", linewidth=1.3, label="padded")]
+    boxes = [Line2D([], [], color="#333333", linestyle=box_line(box), linewidth=2.4 if box == "fast" else 1.3, alpha=0.55 if box == "fast" else 1.0, label=box)
+             for box in boxes_in_order(own_boxes)]
     who = [Line2D([], [], color="#333333", linestyle="", marker="D", markerfacecolor="white", markersize=5, label="of embree")] if embree else []
     legends_right(figure, [("intersector", intersector_legend(sorted(intersectors))), ("boxes", boxes + who)])
     return figure

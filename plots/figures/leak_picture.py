@@ -5,13 +5,13 @@ import json
 from matplotlib.lines import Line2D
 
 from results import CAMERA_EDGES, NoData, axis_sort_key, ordered
-from style import legends_right, panels, short
+from style import box_colour, boxes_in_order, legends_right, panels, short
 
 TITLE = "Where the leaks are"
 CAPTION = ("Rays from the camera at points of edges and at vertices (workload camera_edges): grey where they are aimed, as far as the camera sees it, "
            "in colour where a ray passes through the surface unnoticed. What leaks with padded boxes too, the triangle test loses; what "
            "leaks with fast boxes alone, the boxes lose. The first two scenes are shown. A panel shows at most 4000 leaks a box test; the numbers count all, per million rays.")
-BOXES = (("fast", "#3377CC", 5.0), ("padded", "#CC2222", 2.2))  # the second above the first
+LARGEST, SMALLEST = 5.0, 2.2  # points: a leak of the box test that is drawn first, and last, above the others
 MOST_SCENES = 2
 
 
@@ -21,6 +21,7 @@ def draw(results):
     if not scenes:
         raise NoData("no cell of the workload camera_edges tells where its leaks are")
     found = {scene: by_test([c for c in cells if c["scene"] == scene]) for scene in scenes}
+    boxes = sizes([c["box"] for c in cells if c["scene"] in scenes])
     columns = min(4, max(len(f) for f in found.values()))
     rows = [(scene, keys[i:i + columns]) for scene, f in found.items() for keys in [list(f)] for i in range(0, len(keys), columns)]
     figure, axes = panels(len(rows), columns, 2.9, 3.05)
@@ -29,10 +30,17 @@ def draw(results):
     for row, (scene, keys) in zip(axes, rows):
         seen = seen_points(results.folder, scene)
         for axis, key in zip(row, keys):
-            panel(axis, seen, scene, key, found[scene][key], len(scenes) > 1)
-    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=tint, label=f"{box} boxes")
-                                           for box, tint, size in BOXES])])
+            panel(axis, seen, scene, key, found[scene][key], boxes, len(scenes) > 1)
+    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=box_colour(box), label=f"{box} boxes")
+                                           for box, size in boxes.items()])])
     return figure
+
+
+def sizes(boxes):
+    """{box: size of a leak}: smaller for what is drawn later, so that leaks at one place are all seen."""
+    names = boxes_in_order(boxes)
+    step = (LARGEST - SMALLEST) / max(1, len(names) - 1)
+    return {box: LARGEST - step * i for i, box in enumerate(names)}
 
 
 def by_test(cells):
@@ -44,17 +52,18 @@ def by_test(cells):
     return dict(sorted(found.items()))
 
 
-def panel(axis, seen, scene, key, boxes, name_scene):
+def panel(axis, seen, scene, key, cells, boxes, name_scene):
+    """`cells`: {box: cell}; `boxes`: {box: size}, of all panels."""
     points = seen["points"]
     # Dots as pixels: thousands of them would make a drawing of megabytes.
     axis.plot([p[0] for p in points], [p[1] for p in points], ",", color="#AAAAAA", rasterized=True, zorder=1)
     counts = []
-    for box, tint, size in BOXES:
-        if box not in boxes:
+    for box, size in boxes.items():
+        if box not in cells:
             continue
-        leaks = leak_points(boxes[box])
-        counts.append(f"{box} {boxes[box].per_million('cracks') or 0:,.0f}".replace(",", " "))
-        axis.plot([p[0] for p in leaks], [p[1] for p in leaks], "o", color=tint, markersize=size, markeredgewidth=0, rasterized=True, zorder=2)
+        leaks = leak_points(cells[box])
+        counts.append(f"{box} {cells[box].per_million('cracks') or 0:,.0f}".replace(",", " "))
+        axis.plot([p[0] for p in leaks], [p[1] for p in leaks], "o", color=box_colour(box), markersize=size, markeredgewidth=0, rasterized=True, zorder=2)
     xs, ys = [p[0] for p in points], [p[1] for p in points]
     axis.set_xlim(min(xs) - 6, max(xs) + 6)
     axis.set_ylim(max(ys) + 6, min(ys) - 6)

@@ -15,10 +15,10 @@ import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
 import warned  # noqa: E402
-from figures import ALL, accuracy_vs_time, leaks_vs_aspect, leaks_vs_distance, published_ratios, rays_per_second, self_intersection  # noqa: E402
+from figures import ALL, accuracy_vs_time, leak_picture, leaks_vs_aspect, leaks_vs_distance, published_ratios, rays_per_second, self_intersection  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
 from figures.leak_lines import slots, wider, without  # noqa: E402
-from figures.leak_picture import by_test  # noqa: E402
+from figures.leak_picture import by_test, sizes  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from results import load  # noqa: E402
 
@@ -127,6 +127,22 @@ class Hard(Drawn):
         self.assertEqual(list(panels), sorted(panels))
         self.assertEqual({k: list(v) for k, v in panels.items() if k[0] == ""}, {("", "a_new_one"): ["padded"], ("", "moller_trumbore"): ["fast"],
                                                                                ("", "watertight"): ["padded"]})
+
+    def test_every_box_test_of_a_leak_is_drawn_and_in_the_legend(self):
+        for boxes in (["fast", "ize", "padded"], ["ize"], ["fast", "padded"], ["ize", "padded", "a_new_one"]):
+            rows = [other("hard_edge", f"ball:offset={x}", box=b, cracks=3 * x, offset=x, radius=1.0) for b in boxes for x in (1, 100)]
+            figure = self.draw(leaks_vs_distance, load(Folder(rows).path))
+            legend = [t for each in figure.legends for t in each.get_texts()][1:]
+            self.assertEqual([t.get_text() for t in legend], [b for b in ("fast", "ize", "padded", "a_new_one") if b in boxes])
+            handles = [h.get_linestyle() for h in figure.legends[1].get_lines()]
+            self.assertEqual(len(set(handles)), len(boxes))
+            self.assertEqual(set(handles), {line.get_linestyle() for line in figure.axes[0].lines if len(line.get_xdata()) == 2 and line.get_marker() == "o"})
+            rows = [other("camera_edges", "ball", box=b, cracks=k, rays=1000000, leak_points=[[3.5, 4]]) for k, b in enumerate(boxes)]
+            figure = self.draw(leak_picture, load(Folder(rows, files=SEEN).path))
+            drawn = [(line.get_color(), line.get_markersize()) for line in figure.axes[0].lines[1:]]
+            self.assertEqual((len(drawn), len(set(drawn))), (len(boxes), len(boxes)))
+            self.assertEqual([t.get_text() for t in figure.legends[0].get_texts()], [f"{b} boxes" for b in sizes(boxes)])
+            self.assertTrue(all(f"{b} {k}" in figure.axes[0].get_title() for k, b in enumerate(boxes)))
 
     def test_a_scale_with_a_place_for_zero(self):
         import matplotlib.pyplot as plt
