@@ -244,15 +244,17 @@ def panel_title(scene, workload, width):
     return f"{scene},\n" + (workload if len(workload) <= most else workload.replace(":", ":\n", 1))
 
 
-def panel_grid(shown, places, width, height, most_columns):
+def panel_grid(shown, places, width, height, most_columns, least_width=None):
     """A panel for each (scene, place) of `shown`, titled; `places`, {place: words of the title}, gives their order. A scene begins a row, or stands beside the one
-    before where all panels of both fit. Gives the figure and {(scene, place): axis}."""
+    before where all panels of both fit. A figure that would be too tall has more columns than `most_columns`, up to WIDEST, of panels that are as narrow as `least_width`
+    where that is given. Gives the figure and {(scene, place): axis}."""
     shown = dict.fromkeys(shown)  # in order, each once
     own = {scene: [place for place in places if (scene, place) in shown] for scene in dict.fromkeys(scene for scene, _ in shown)}
-    most = max(map(len, own.values()))
-    columns = min(most, most_columns)
-    lines = [(scene, line[i:i + columns]) for scene, line in own.items() for i in range(0, len(line), columns)]
-    beside = max(1, min(most_columns // columns, int(WIDEST / (columns * width)), len(lines))) if most == columns else 1
+    lines, columns, beside = lines_of(own, width, most_columns)
+    while not fits(height * -(-len(lines) // beside)) and (most_columns + 1) * (least_width or width) <= WIDEST:
+        most_columns += 1
+        width = min(width, WIDEST / most_columns)
+        lines, columns, beside = lines_of(own, width, most_columns)
     figure, axes = panels(-(-len(lines) // beside), beside * columns, width, height)
     found = {}
     for i, (scene, line) in enumerate(lines):
@@ -262,6 +264,14 @@ def panel_grid(shown, places, width, height, most_columns):
     for axis in set(axes.flat) - set(found.values()):
         axis.set_visible(False)
     return figure, found
+
+
+def lines_of(own, width, most_columns):
+    """[(scene, places of a line)] of `own`, {scene: places}, of how many columns a line is, and how many lines stand beside each other."""
+    most = max(map(len, own.values()))
+    columns = min(most, most_columns)
+    lines = [(scene, line[i:i + columns]) for scene, line in own.items() for i in range(0, len(line), columns)]
+    return lines, columns, max(1, min(most_columns // columns, int(WIDEST / (columns * width)), len(lines))) if most == columns else 1
 
 
 def legends_right(figure, legends):

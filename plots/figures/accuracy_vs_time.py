@@ -17,6 +17,7 @@ CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hi
            "the figure shows the fewest.")
 
 MEASURES = (("wrong_answers", "wrong answers per million"), ("t_error_ulp_p99", "error of t, 99th percentile, ulp"))
+PANEL, LEAST_WIDTH = (4.2, 3.1), 2.8  # inches; of a panel where there would be more of them than a figure can hold
 COMBINATION = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads")
 
 
@@ -51,7 +52,7 @@ def draw_hard(points, timed):
         for measure in MEASURES:
             if (value := value_of(hard, measure[0])) is not None:
                 shown.setdefault((cell["scene"], (measure, cell["isa"])), []).append((cell, time, value))
-    figure, axes = panel_grid(shown, {(measure, isa): isa for measure in MEASURES for isa in isas}, 4.2, 3.1, columns_of(isas))
+    figure, axes = panel_grid(shown, {(measure, isa): isa for measure in MEASURES for isa in isas}, *PANEL, columns_of(isas), LEAST_WIDTH)
     for (scene, ((name, quantity), isa)), axis in axes.items():
         of_scene = [(t, value_of(h, name)) for c, t, h in points if c["scene"] == scene]
         panel(axis, shown[scene, ((name, quantity), isa)], [v for _, v in of_scene], [t for t, _ in of_scene], markers)
@@ -103,7 +104,7 @@ def draw_workloads(points, timed):
     for cell, time in points:
         if (value := value_of(cell, name)) is not None:
             shown.setdefault((cell["scene"], (cell["workload"], cell["isa"])), []).append((cell, time, value))
-    figure, axes = panel_grid(shown, places, 4.2, 3.1, columns_of(isas))
+    figure, axes = panel_grid(shown, places, *PANEL, columns_of(isas), LEAST_WIDTH)
     values = [v for here in shown.values() for *_, v in here]
     for place, axis in axes.items():
         panel(axis, shown[place], values, [t for _, t, _ in shown[place]], markers)

@@ -299,6 +299,22 @@ class Drawing(Drawn):
         self.assertFalse([(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)])
         style.plt.close(figure)
 
+    def test_a_figure_that_would_be_too_tall_is_wider(self):
+        workloads = ("primary", "shadow", "ambient_occlusion", "reflection", "diffuse", "random", "whitted", "path")
+        results = load(Folder([other(w, f"a_scene_of_a_long_name_{k}", structure=s, isa=i, wrong_answers=0, **({} if w in ("shadow", "ambient_occlusion") else {"t_error_ulp_p99": 1.5})) for k in range(7) for w in workloads
+                               for s in ("bvh8", "bvh4_motion") for i in ("avx2", "avx512") if (w, i) != ("random", "avx512")]).path)
+        few = load(Folder([other(w, f"scene{k}", wrong_answers=0) for k in range(3) for w in workloads]).path)
+        for module, held, columns in ((rays_per_second, results, 4), (accuracy_vs_time, results, 6), (rays_per_second, few, 3)):
+            figure = self.draw(module, held)
+            figure.draw_without_rendering()
+            panels = [axis for axis in figure.axes if axis.get_visible()]
+            self.assertEqual(len(panels), {(rays_per_second, 7): 56, (accuracy_vs_time, 7): 77, (rays_per_second, 3): 24}[module, 7 if held is results else 3])
+            self.assertLessEqual(figure.get_size_inches()[0], style.WIDEST)
+            self.assertTrue(style.fits(figure.get_size_inches()[1]))
+            self.assertEqual(len({round(axis.get_subplotspec().colspan.start, 3) for axis in panels}), columns)
+            boxes = [axis.title.get_window_extent() for axis in panels]
+            self.assertFalse([(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)])
+
     def test_leaks_of_zero_are_drawn_in_a_band_of_their_own_each_line_apart(self):
         rows = [other("hard_edge", f"ball:offset={x:g}", cracks=cracks if x > 1 else 0, offset=x, radius=1.0, intersector=i)
                 for i, cracks in (("watertight", 0), ("exact", 0), ("pluecker", 3)) for x in (1, 10, 1e4)]
