@@ -26,6 +26,7 @@ COLOURS = {  # structures
 }
 SPARE_COLOURS = ("#77AADD", "#BBCC33", "#EE3377", "#99DDFF", "#663333", "#009988")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
+MORE_MARKERS = (*MARKERS, "p", "d", "h", (4, 1, 0), (6, 1, 0))  # of larger signs: as many as structures; the last two cannot be half filled
 DPI = 160
 TALLEST = 8000  # pixels of a figure
 WIDEST = 17.0  # inches of scenes beside each other
@@ -217,9 +218,11 @@ def interval_legend(estimates):
     return [("", [Line2D([], [], color="#222222", linewidth=0.9, label=interval_name(counts))])] if max(counts, default=1) > 1 else []
 
 
-def marker_map(keys):
-    """A marker for each key, in the order given; they repeat after the tenth."""
-    return {key: MARKERS[i % len(MARKERS)] for i, key in enumerate(keys)}
+def marker_map(keys, what):
+    """A marker of its own for each key, in the order given; TooMuch, of `what`, where there are none left."""
+    if len(keys) > len(MORE_MARKERS):
+        raise TooMuch(f"{len(keys)} {what} are too many to tell apart; choose some with --filter")
+    return dict(zip(keys, MORE_MARKERS))
 
 
 def marker_legend(markers):

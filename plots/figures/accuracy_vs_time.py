@@ -18,6 +18,7 @@ CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hi
 
 MEASURES = (("wrong_answers", "wrong answers per million"), ("t_error_ulp_p99", "error of t, 99th percentile, ulp"))
 PANEL, LEAST_WIDTH = (4.2, 3.1), 2.8  # inches; of a panel where there would be more of them than a figure can hold
+BOXES = (("fast", "fast boxes: hollow", "none", "full"), ("padded", "padded boxes: filled", "#333333", "full"), ("ize", "Ize's boxes: half", "#333333", "left"))
 COMBINATION = ("scene", "structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads")
 
 
@@ -46,7 +47,7 @@ def hard_points(traces, metric):
 
 def draw_hard(points, timed):
     isas = ordered((c["isa"] for c, _, _ in points), "isa")
-    markers = marker_map(ordered((c["structure"] for c, _, _ in points), "structure"))
+    markers = marker_map(ordered((c["structure"] for c, _, _ in points), "structure"), "structures")
     shown = {}  # (scene, (measure, isa)) -> [(cell, ns a ray, how wrong)]
     for cell, time, hard in points:
         for measure in MEASURES:
@@ -71,7 +72,7 @@ def panel(axis, points, values, times, markers):
     """`points`: (cell, ns a ray, how wrong); `values` and `times`: what the axes must hold."""
     for cell, time, value in sorted(points, key=lambda p: p[0]["box"] == "padded"):  # filled ones above
         own = intersector_colour(cell["intersector"])
-        axis.plot(time, value, markers[cell["structure"]], markersize=6.5, color=own, markeredgewidth=1.3,
+        axis.plot(time, value, linestyle="", marker=markers[cell["structure"]], markersize=6.5, color=own, markeredgewidth=1.3,
                   fillstyle="left" if cell["box"] == "ize" else "full", markerfacecoloralt="white",
                   markerfacecolor="white" if cell["box"] == "fast" else own, markeredgecolor=own, clip_on=False)
     step_front(axis, [(t, v) for _, t, v in points])
@@ -80,12 +81,11 @@ def panel(axis, points, values, times, markers):
 
 
 def add_legends(figure, cells, markers):
-    boxes = marker_legend({"fast boxes: hollow": "o", "padded boxes: filled": "o"})
-    boxes[1].set_markerfacecolor("#333333")
-    if any(c["box"] == "ize" for c in cells):
-        boxes += marker_legend({"Ize's boxes: half": "o"})
-        boxes[2].set_fillstyle("left")
-        boxes[2].set_markerfacecolor("#333333")
+    boxes = []
+    for box, words, face, fill_style in BOXES:
+        if any(c["box"] == box for c in cells):
+            boxes += marker_legend({words: "o"})
+            boxes[-1].set(markerfacecolor=face, fillstyle=fill_style)
     intersectors = sorted({c["intersector"] for c in cells})
     legends_right(figure, [("intersector", intersector_legend(intersectors)), ("structure", marker_legend(markers)), ("", boxes)])
 
@@ -98,7 +98,7 @@ def draw_workloads(points, timed):
     """`points`: (cell, ns a ray); `timed`: by which clock, with how many threads. What is drawn is the first measure that is not 0 everywhere."""
     isas = ordered((c["isa"] for c, _ in points), "isa")
     places = {(w, i): f"{w}, {i}" for w in ordered((c["workload"] for c, _ in points), "workload") for i in isas}
-    markers = marker_map(ordered((c["structure"] for c, _ in points), "structure"))
+    markers = marker_map(ordered((c["structure"] for c, _ in points), "structure"), "structures")
     name, quantity, said = measure_of([c for c, _ in points])
     shown = {}  # (scene, place) -> [(cell, ns a ray, how wrong)]
     for cell, time in points:

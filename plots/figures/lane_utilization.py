@@ -20,7 +20,7 @@ def draw(results):
     labels = sorted({label(modes, c, isas) for c in cells})
     if len(labels) > len(MARKERS):
         raise TooMuch(f"{len(labels)} modes are too many to tell apart; choose some with --filter")
-    markers = marker_map(labels)
+    markers = marker_map(labels, "modes")
     workloads = ordered((c["workload"] for c in cells), "workload")
     figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, 4.6, 2.9, 2)
     for (scene, workload), axis in axes.items():

@@ -28,7 +28,7 @@ def draw(results):
     best = [max(group, key=lambda c: c.estimate(metric).median) for group in groups.values()]
     varied = [a for a in undetermined_axes(best, BUILT) if a in ("builder", "threads")]
     modes = Modes([c for c in cells], without=("builder", "leaf"))
-    markers = marker_map(modes.labels) if 1 < len(modes.labels) <= len(MARKERS) else {}
+    markers = marker_map(modes.labels, "modes") if 1 < len(modes.labels) <= len(MARKERS) else {}
 
     keys = [(s, w, i) for s in ordered((c["scene"] for c in cells), "scene")
             for w in ordered((c["workload"] for c in cells), "workload") for i in ordered((c["isa"] for c in cells), "isa")

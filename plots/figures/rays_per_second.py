@@ -22,7 +22,7 @@ def draw(results):
     workloads = ordered((c["workload"] for c in cells), "workload")
     isas, structures = ordered((c["isa"] for c in cells), "isa"), ordered((c["structure"] for c in cells), "structure")
     modes = Modes(cells)
-    markers = marker_map(modes.labels) if len(modes.labels) <= len(MARKERS) else {}
+    markers = marker_map(modes.labels, "modes") if len(modes.labels) <= len(MARKERS) else {}
 
     width = min(7.0, max(3.2, 0.2 * len(isas) * (len(structures) + 1) + 0.8))
     figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, width, 2.9, 3 if width < 4.2 else 2)

@@ -39,7 +39,7 @@ def draw(results):
         markers = {}
         figure = panels_by_scene(points, {(w, i): f"{w}, {i}" for w in workloads for i in isas}, y_label)
     else:
-        markers = marker_map(scenes)
+        markers = marker_map(scenes, "scenes")
         figure = panels_of_all(points, workloads, isas, markers, y_label)
     answers = wrong_legend([c for c, *_ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, *_ in points])} per million"))
     legends_right(figure, [("structure", structure_legend(structures)), *([("scene", marker_legend(markers))] if markers else []), *answers])
@@ -109,7 +109,7 @@ def panels_of_all(points, workloads, isas, markers, y_label):
 def panel(axis, points, markers, title):
     """`markers`: of the scenes that share the panel."""
     for cell, cost, nanoseconds, _ in points:
-        axis.plot(cost, nanoseconds, markers[cell["scene"]], color=colour(cell["structure"]), markersize=7,
+        axis.plot(cost, nanoseconds, linestyle="", marker=markers[cell["scene"]], color=colour(cell["structure"]), markersize=7,
                   markeredgecolor=WRONG if is_wrong(cell) else "white", markeredgewidth=1.2 if is_wrong(cell) else 0.7)
     explained_by = []  # (R², R² with EPO) of each scene, None where there is none
     for scene in markers:

@@ -5,7 +5,7 @@ from textwrap import fill
 from matplotlib.lines import Line2D
 
 from results import NoData, ordered
-from style import MARKERS, intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, panels, plain, short
+from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_map, panels, plain, short
 
 TITLE = "Leaving a surface"
 CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass through what "
@@ -24,7 +24,7 @@ def draw(results):
     scenes, ways = ordered((c["scene"] for c in cells), "scene"), [w for w in WAYS if any(way_of(c) == w for c in cells)]
     workloads = ordered({base(c) for c in cells}, "workload")
     intersectors = sorted({c["intersector"] for c in cells})
-    markers = {w: MARKERS[i % len(MARKERS)] for i, w in enumerate(workloads)}
+    markers = marker_map(workloads, "workloads")
     columns = [f for f in FAULTS if any(c.value(f[0]) is not None for c in cells)] + [(None, f"time, ns a ray\n({results.clock()})")]
     figure, axes = panels(len(scenes), len(columns), 2.7, 0.9 + 0.4 * len(ways), sharey=True, sharex="col")
     slots = [(i, w) for i in intersectors for w in workloads]
@@ -37,7 +37,7 @@ def draw(results):
                     continue
                 own = intersector_colour(cell["intersector"])
                 place = ways.index(way_of(cell)) + 0.7 * ((slots.index((cell["intersector"], base(cell))) + 0.5) / len(slots) - 0.5)
-                axis.plot(value, place, markers[base(cell)], color=own, markersize=4.5, markerfacecolor="white", markeredgewidth=1.1, clip_on=False)
+                axis.plot(value, place, linestyle="", marker=markers[base(cell)], color=own, markersize=4.5, markerfacecolor="white", markeredgewidth=1.1, clip_on=False)
             if row == len(scenes) - 1:
                 axis.set_xlabel(label)
             if column == 0:

@@ -10,8 +10,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import ScaledTranslation
 
 from figures.names import bar_label, label
-from results import STRUCTURE_AXES, Estimate, NoData, axis_sort_key, ordered, telling_axes
-from style import MARKERS, WRONG, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend, wrong_marker
+from results import STRUCTURE_AXES, Estimate, NoData, TooMuch, axis_sort_key, ordered, telling_axes
+from style import MORE_MARKERS, WRONG, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend, wrong_marker
 
 TRACED = (*STRUCTURE_AXES, "workload")
 PLACE = ("scene", "workload", "isa", "threads")
@@ -121,14 +121,17 @@ def draw_panels(places, x_label, y_label, named_of):
 
 
 def builder_markers(builders):
-    """{builder: marker}: the same for a builder and its reinserted kin, and for Embree's of our trees and of its own; variants of parameters have their own while there are enough."""
+    """{builder: marker}: the same for a builder and its reinserted kin, and for Embree's of our trees and of its own; variants of parameters
+    have their own, or, where they are more than there are, that of their builder. TooMuch where builders are."""
     kinds = list(dict.fromkeys(kind(b) for b in ordered(builders, "builder")))
     families = list(dict.fromkeys(map(family, kinds)))
     own = {f: builder_marker(f) for f in families}
-    spare = [m for m in MARKERS if m not in own.values()] or list(MARKERS)
+    if len(set(own.values())) < len(own):
+        raise TooMuch(f"{len(own)} builders are too many to tell apart; choose some with --filter")
+    spare = [m for m in MORE_MARKERS if m not in own.values()]
     found = {next(k for k in kinds if family(k) == f): own[f] for f in families}
     variants = [k for k in kinds if k not in found]
-    found.update({k: spare[i % len(spare)] for i, k in enumerate(variants)})
+    found.update(zip(variants, spare) if len(variants) <= len(spare) else {k: own[family(k)] for k in variants})
     return {b: found[kind(b)] for b in ordered(builders, "builder")}
 
 
@@ -148,19 +151,24 @@ def reinserted(builder):
 def mark(axis, x, y, cell, markers, size=6.0, **more):
     """A point; a white dot in its middle where nodes were reinserted."""
     wrong = is_wrong(cell)
-    axis.plot(x, y, markers[cell["builder"]], color=colour(cell["structure"]), markersize=size, markeredgecolor=WRONG if wrong else "white",
+    axis.plot(x, y, linestyle="", marker=markers[cell["builder"]], color=colour(cell["structure"]), markersize=size, markeredgecolor=WRONG if wrong else "white",
               markeredgewidth=0.8 if wrong else 0.5, **more)
     if reinserted(cell["builder"]):
         axis.plot(x, y, "o", color="white", markersize=0.32 * size, markeredgewidth=0, **more)
 
 
 def builder_legend(markers):
-    """Handles, one a marker, named by what shares it, or by the builder where only a reinserted one or Embree's of our trees has it; and what the white dot is."""
+    """Handles, one a marker, named by what shares it: the variants of a builder, a builder and its kin, or the builder where only a reinserted one or Embree's of our trees has it; and what the white dot is."""
     names = {}
     for builder, marker in markers.items():
-        names.setdefault((marker, kind(builder)), builder)
-    handles = [Line2D([], [], linestyle="", marker=marker, color="#444444", markeredgewidth=0, markersize=6, label=name if name in markers else builder)
-               for (marker, name), builder in names.items()]
+        names.setdefault(marker, {}).setdefault(kind(builder), builder)
+
+    def said(kinds):
+        (name, builder), *others = kinds.items()
+        return f"{family(name)}: {len(kinds)} variants" if others else name if name in markers else builder
+
+    handles = [Line2D([], [], linestyle="", marker=marker, color="#444444", markeredgewidth=0, markersize=6, label=said(kinds))
+               for marker, kinds in names.items()]
     if any(map(reinserted, markers)):
         handles.append(Line2D([], [], linestyle="", marker="o", markersize=4.5, color="white", markeredgecolor="#444444", markeredgewidth=2, label="…_reinsertion: white dot"))
     return handles

@@ -20,7 +20,7 @@ from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # 
 from figures.leak_lines import slots, wider, without  # noqa: E402
 from figures.leak_picture import by_test, sizes  # noqa: E402
 from figures.modes import Modes  # noqa: E402
-from results import load  # noqa: E402
+from results import TooMuch, load  # noqa: E402
 
 
 class Strict(HTMLParser):
@@ -82,6 +82,15 @@ class Hard(Drawn):
                 axes = [a for a in figure.axes if a.get_visible()]
                 self.assertEqual({a.get_xlabel() for a in axes}, {f"{words}\n{clock}"})
                 self.assertEqual(sum(line.get_marker() != "None" for line in axes[0].lines), 1)
+
+    def test_every_structure_has_a_sign_of_its_own(self):
+        for more in ((), [other("hard", structure=s) for s in style.COLOURS]):
+            figure = self.draw(accuracy_vs_time, load(Folder([other("primary", structure=s) for s in style.COLOURS] + list(more)).path))
+            signs = [line.get_marker() for line in figure.axes[0].lines if line.get_marker() != "None"]
+            self.assertEqual((len(signs), len(set(signs))), (15, 15))
+            self.assertEqual([t.get_text() for t in figure.legends[-1].get_texts()], ["padded boxes: filled"])
+        with self.assertRaisesRegex(TooMuch, "16 structures are too many to tell apart"):
+            accuracy_vs_time.draw(load(Folder([other("primary", structure=s) for s in (*style.COLOURS, "a_new_one")]).path))
 
     def test_panels_that_would_be_empty_are_left_out(self):
         rows = [other(w, s, isa=i, wrong_answers=0, **({} if w == "shadow" else {"t_error_ulp_p99": 1.5})) for s in ("bunny", "city") for w in ("primary", "shadow", "diffuse")

@@ -9,7 +9,7 @@ from made_results import Drawn, results_of  # noqa: E402
 
 from figures import build_vs_trace, memory_vs_time, trade_offs, visits_per_ray  # noqa: E402
 from figures.trade_offs import Point, builder_markers, pareto_front  # noqa: E402
-from results import Cell, Estimate, NoData  # noqa: E402
+from results import Cell, Estimate, NoData, TooMuch  # noqa: E402
 
 
 def exactly(value, spread=0.0):
@@ -125,6 +125,15 @@ class TradeOffs(Drawn):
         variants = builder_markers([f"binned_sah:bins={n}:collapse={c}" for n in (16, 32) for c in ("greedy", "optimal")] + ["low", "medium", "high", "binned_sah_reinsertion:bins=16:collapse=greedy"])
         self.assertEqual(len(set(variants.values())), 7)
         self.assertEqual(variants["binned_sah_reinsertion:bins=16:collapse=greedy"], variants["binned_sah:bins=16:collapse=greedy"])
+
+    def test_no_two_builders_have_one_sign(self):
+        few = [f"{b}:bins={n}:max_leaf_blocks={m}" for b in ("binned_sah", "spatial_sah") for n in (4, 16, 64) for m in (1, 4)]
+        self.assertEqual(len(set(builder_markers(few).values())), 12)
+        many = builder_markers([f"{b}:bins={n}" for b in ("binned_sah", "sweep_sah") for n in range(12)] + ["ploc"])
+        self.assertEqual(len(set(many.values())), 3)
+        self.assertEqual([h.get_label() for h in trade_offs.builder_legend(many)], ["binned_sah: 12 variants", "ploc", "sweep_sah: 12 variants"])
+        with self.assertRaisesRegex(TooMuch, "4 builders are too many to tell apart"):
+            builder_markers([f"a_new_one_{n}" for n in "abcd"])
 
     def test_the_legend_names_builders_that_exist(self):
         def names(*builders):
