@@ -75,23 +75,24 @@ def main():
             module = importlib.import_module(f"figures.{name}")
             try:
                 with told_in_a_line(name):
-                    style.save(module.draw(results), results.folder, name)
+                    figure = module.draw(results)
+                    style.save(figure, results.folder, name)
             except OSError:  # the disk's, not the figure's: the next one could not be written either
                 raise
             except NoData as reason:
                 # `run` hides what is written here to stdout; that a figure which somebody named is not there must be seen.
                 print(f"{name}: left out, {reason}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch)) else sys.stdout)
                 style.discard(results.folder, name)  # of a drawing before
-                drawn.append((name, module, str(reason)))
+                drawn.append((name, module, "", str(reason)))
                 continue
             except Exception as error:  # noqa: BLE001  of a figure: it takes no other with it
                 why = " ".join(f"{type(error).__name__}: {error}".split())
                 style.discard(results.folder, name)
-                drawn.append((name, module, f"an error of the figure's own, {why}"))
+                drawn.append((name, module, "", f"an error of the figure's own, {why}"))
                 failed.append(f"{name}: {why}")
                 continue
             print(f"{results.folder / name}.png .svg")
-            drawn.append((name, module, None))
+            drawn.append((name, module, getattr(figure, "more_caption", ""), None))
         if set(default) <= set(names) and not arguments.no_report:
             print(report.write(results, drawn))
         elif not arguments.no_report:

@@ -14,7 +14,7 @@ LARGEST_SVG = 1_500_000  # bytes; a drawing of more goes into the page as PNG
 
 
 def write(results, drawn):
-    """`drawn`: (name, module, why left out or None). Returns the page's path."""
+    """`drawn`: (name, module, what its caption goes on with, why left out or None). Returns the page's path."""
     parts = [f"<h1>{escape(results.name)}</h1>", f'<p class="soft">{escape(subtitle(results))}</p>']
     parts.append('<nav><a href="#fastest-structures">Fastest</a><a href="#figures">Figures</a>'
                  '<a href="#all-cells">All cells</a><a href="#built">Structures</a><a href="#skipped">Skipped</a>'
@@ -72,7 +72,7 @@ def subtitle(results):
     return ", ".join(str(v) for v in found if v)
 
 
-def figure(results, name, module, reason):
+def figure(results, name, module, more_caption, reason):
     head = f'<h3 id="{escape(name)}">{escape(module.TITLE)}</h3>'
     if reason:
         return f'{head}<p class="soft">Not drawn: {escape(reason)}.</p>'
@@ -81,7 +81,7 @@ def figure(results, name, module, reason):
         picture, kind = results.folder / f"{name}.png", "png"
     data = base64.b64encode(picture.read_bytes()).decode("ascii")
     return (f'{head}<figure><img alt="{escape(module.TITLE)}" src="data:image/{kind};base64,{data}">'
-            f"<figcaption>{escape(caption(results, module))}</figcaption></figure>")
+            f"<figcaption>{escape(caption(results, module) + more_caption)}</figcaption></figure>")
 
 
 def caption(results, module):

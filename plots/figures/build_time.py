@@ -1,6 +1,5 @@
 """Build time, from mesh to a structure ready for rays: one panel a scene."""
 
-from figures import squares
 from figures.bars import bar_panels
 from results import is_number
 from tables import digits
@@ -9,8 +8,7 @@ TITLE = "Build time"
 CAPTION = ("Wall time from mesh to a structure ready for rays, with {interval}; "
            "beside it, triangles a second. The parts are the build's own phases, each with its share of the repetitions' time "
            "together, drawn to the length of the median; grey is what none of them covers. "
-           "Lower is better."
-           + squares.CAPTION)
+           "Lower is better.")
 
 
 def draw(results):

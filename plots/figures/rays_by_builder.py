@@ -10,8 +10,7 @@ from tables import digits
 TITLE = "Rays per second by structure and builder"
 CAPTION = ("A bar reaches the fastest mode of a structure as built, with {interval}; markers "
            "show its other modes. Higher is better. A red marker is a mode with wrong answers; the red number behind a bar's own counts those of the mode "
-           "that the bar reaches, per million rays; a square of such a mode is framed red. Those of each cell stand in the table."
-           + squares.CAPTION)
+           "that the bar reaches, per million rays. Those of each cell stand in the table.")
 BUILT = ("scene", "workload", "isa", "structure", "builder", "threads")
 
 
@@ -44,6 +43,8 @@ def draw(results):
         figure, drawn = squares.square_panels([(titles[key], shown[key]) for key in keys], varied, value, digits, unit, higher_is_better=True)
         for axis, places in drawn:
             squares.mark_wrong(axis, places)
+        if any(map(is_wrong, best)):
+            figure.more_caption += " A square of a mode with wrong answers is framed red."
         legends_right(figure, wrong_legend(best))
         return figure
     columns = min(2, len(keys))

@@ -12,8 +12,7 @@ from style import WRONG, fits, is_wrong, most_wrong, panels
 
 MOST_BARS = 40
 MOST_ROWS_BELOW = 20
-CAPTION = (f" Where a scene has more than {MOST_BARS} bars there is a square for each structure and builder instead, in a row for each leaf, instruction set or number of threads that makes a difference: the median alone, the darker the better, "
-           "the best of a panel in bold; a white place with a dash was not measured.")
+WORDS = {"isa": "instruction set", "threads": "number of threads"}  # of axes, where their names are none
 SPAN = 100  # of the colours
 NOTHING = 1e-6  # of the largest: written as 0
 SHADES = LinearSegmentedColormap.from_list("better", ["#E4EEF8", "#C6DCF1", "#8FBCE6", "#4A8FC9", "#1F5A96"])  # none is white: that is where nothing was measured
@@ -26,7 +25,8 @@ def are_due(bars_of_panels, varied):
 
 def square_panels(cells_of, varied, value_of, text_of, quantity, higher_is_better):
     """A panel for each (title, cells) of `cells_of`, whose cells structure and the axes `varied` tell apart: builders across (where they are not varied, the axis of most
-    keys), the rest down. `value_of(cell)` gives (median, low, high), `text_of(median)` what stands in a square. Gives the figure and [(axis, {(x, y): cell})]."""
+    keys), the rest down. `value_of(cell)` gives (median, low, high), `text_of(median)` what stands in a square. Gives the figure, which
+    has the words for its caption, and [(axis, {(x, y): cell})]."""
     every = [c for _, cells in cells_of for c in cells]
     across = "builder" if "builder" in varied else max(varied, key=lambda a: len({c[a] for c in every}))
     down = ["structure"] + [a for a in varied if a != across]
@@ -53,7 +53,16 @@ def square_panels(cells_of, varied, value_of, text_of, quantity, higher_is_bette
         drawn.append((axis, places))
     for axis in axes.flat[len(tables):]:
         axis.set_visible(False)
+    figure.more_caption = caption(across, down[1:])
     return figure, drawn
+
+
+def caption(across, down):
+    """What is said of squares that are told apart by the axes `across` and `down`, besides structures."""
+    rows = " or ".join(WORDS.get(a, a) for a in down)
+    return (f" As there are more than {MOST_BARS} bars, there is a square for each structure and {WORDS.get(across, across)} instead"
+            + (f", in a row for each {rows} that makes a difference" if rows else "")
+            + ": the median alone, the darker the better, the best of a panel in bold; a white place with a dash was not measured.")
 
 
 def rows_of(cells_of, across, down, shown):

@@ -15,7 +15,7 @@ import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
 import warned  # noqa: E402
-from figures import ALL, accuracy_vs_time, leak_picture, leaks_vs_aspect, leaks_vs_distance, published_ratios, rays_per_second, self_intersection  # noqa: E402
+from figures import ALL, accuracy_vs_time, leak_picture, leaks_vs_aspect, leaks_vs_distance, published_ratios, rays_per_second, self_intersection, squares  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
 from figures.leak_lines import slots, wider, without  # noqa: E402
 from figures.leak_picture import by_test, sizes  # noqa: E402
@@ -459,6 +459,18 @@ class Drawing(Drawn):
             targets = re.findall(r'<a href="#([\w-]+)">', page)
             self.assertEqual(targets, re.findall(r'<h2 id="([\w-]+)"', page))
             self.assertEqual(len(targets), parts)
+
+    def test_captions_speak_of_squares_where_there_are_some(self):
+        def cell(structure, axis, k):
+            axes = {"builder": "binned_sah", "leaf": "triangle8", axis: f"triangle{k}"}
+            return build(structure, axes["builder"], sah_cost=10.0 + k, leaf=axes["leaf"]) | {"name": f"build/bunny/{structure}/{axes['builder']}/{axes['leaf']}/-/-/-/avx2/-/threads:1"}
+
+        for few, axis in ((True, "builder"), (False, "builder"), (False, "leaf")):
+            folder = Folder([cell(s, axis, k) for s in ("bvh2", "bvh4", "bvh8", "bvh16", "bih") for k in range(1, 4 if few else 10)], {"plots": ["sah_cost"]})
+            self.assertEqual(folder.plot().returncode, 0)
+            caption = re.search(r"<figcaption>(.*?)</figcaption>", (folder.path / "report.html").read_text()).group(1)
+            self.assertEqual(re.findall(r"more than 40 bars, there is a square for each structure and (\w+) instead", caption), [] if few else [axis], caption)
+        self.assertIn("and builder instead, in a row for each leaf or instruction set that makes a difference:", squares.caption("builder", ["leaf", "isa"]))
 
     def test_one_thread_is_one(self):
         cells = load(Folder([trace(), trace(threads=2, run_name="trace/two")]).path).traces
