@@ -18,6 +18,7 @@
 #include "structures/grid/grid_builder.h"
 #include "structures/leaves/triangle_overlap.h"
 #include "structures/octree/octree.h"
+#include "structures/statistics.h"
 #include "tests/catch.h"
 #include "tests/kernel_runner.h"
 #include "tests/kernel_scenes.h"
@@ -138,10 +139,12 @@ class Recorder final : public StructureVisitor {
   std::uint64_t hash = 1;
   std::size_t references = 0;
   std::set<std::uint32_t> seen;
+  bool finite = true;  ///< all boxes
 
  private:
   void put(std::uint64_t x) { hash = mix64(hash ^ x); }
   void put(const Bounds3f& b) {
+    finite &= is_finite(b.lower) && is_finite(b.upper);
     for (std::size_t a = 0; a < 3; ++a)
       put(std::bit_cast<std::uint32_t>(b.lower[a])), put(std::bit_cast<std::uint32_t>(b.upper[a]));
   }
@@ -243,6 +246,51 @@ TEST_CASE("scenes as wide as floats go take no more cells than others, and lose 
           CHECK((!truth[i].hit.is_hit() || hits[i].t == truth[i].hit.t));
         }
       }
+    }
+  }
+}
+
+TEST_CASE("an octree wider than floats go is divided as a narrower one is, and loses no hit") {
+  const TriangleMesh small = random_triangles(3000, 0.02f, 23);
+  float reach = 0;
+  for (const Vec3f& v : small.vertices) reach = std::max({reach, std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
+  const auto scaled = [&](double size) {
+    TriangleMesh mesh = small;
+    for (Vec3f& v : mesh.vertices)
+      for (std::size_t a = 0; a < 3; ++a)
+        v[a] = float(std::clamp(2.0 * double(v[a]) / double(reach) - 1.0, -1.0, 1.0) * size);
+    return mesh;
+  };
+  constexpr double kMost = std::numeric_limits<float>::max();
+  const TriangleMesh wide = scaled(kMost * 0.999), narrow = scaled(kMost * 0.25);
+  REQUIRE(std::isinf(wide.bounds().upper.x - wide.bounds().lower.x));
+  const auto of_wide = build(kVariants[2], wide, "triangle4i"), of_narrow = build(kVariants[2], narrow, "triangle4i");
+  const StructureStatistics w = compute_statistics(*of_wide, wide, {}, false),
+                            n = compute_statistics(*of_narrow, narrow, {}, false);
+  CAPTURE(w.leaves, n.leaves, w.references, n.references);
+  CHECK(n.leaves > 300);
+  CHECK(10 * w.leaves > 8 * n.leaves);
+  CHECK(10 * w.leaves < 11 * n.leaves);
+  Recorder seen;
+  REQUIRE(of_wide->visit(seen));
+  CHECK(seen.finite);
+  std::vector<Ray> rays;
+  for (std::uint64_t i = 0; i < 300; ++i) {
+    const auto c = wide.corners(i * 7 % wide.size());
+    const Vec3f at = c[0] * 0.25f + c[1] * 0.25f + c[2] * 0.5f;
+    const Vec3f from = uniform_point(5, i, 0, {{-1, -1, -1}, {1, 1, 1}}) * (float(kMost) / 4);
+    rays.push_back({from, 0, at * 0.25f - from * 0.25f, kInfinity});
+  }
+  const std::vector<ExactHit> truth = Oracle(wide).closest_hit(rays);
+  CHECK(std::ranges::count_if(truth, [](const ExactHit& h) { return h.hit.is_hit(); }) > 100);
+  for (const KernelRow& row : kernel_table()) {
+    if (row.structure != "octree" || row.leaf != "triangle4i" || !is_available(row.isa)) continue;
+    if (row.intersector != "exact" || row.box != "padded") continue;
+    INFO(name_of(row));
+    const std::vector<Hit> hits = closest_hit(row, *of_wide, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      INFO("ray " << i);
+      CHECK(hits[i].primitive == truth[i].hit.primitive);
     }
   }
 }

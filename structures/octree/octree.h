@@ -3,13 +3,15 @@
 // Urena, Lastra, WSCG 2000).
 //
 // A node has 8 bytes; the children that exist lie next to each other, in rising number (x is bit 0, y bit 1,
-// z bit 2). Boxes are not stored: face i of level l is the float lower + float(i) * (side * 2^-l), computed
-// by the same two roundings in the builder and in every kernel, so that both mean the same box. What no ray
-// misses then follows as for stored boxes (traversal/box_test.h).
+// z bit 2). Boxes are not stored: face i of level l is the float lower + float(i) * (half * 2^(1-l)), half the cube's
+// side (a whole one may be wider than floats go), computed by the same two roundings in the builder and in every
+// kernel, so that both mean the same box. What no ray misses then follows as for stored boxes (traversal/box_test.h).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "core/memory_meter.h"
 #include "core/type_list.h"
@@ -30,10 +32,12 @@ struct Node {
 /// The cube. Face i of a level: see above.
 struct Cube {
   float lower[4] = {};  ///< the fourth is 0
-  float side = 1.0f;
-  [[nodiscard]] float size(unsigned level) const noexcept { return side / float(1u << level); }
+  float half = 0.5f;
+  /// Of a child of a cell of that level.
+  [[nodiscard]] float child_size(unsigned level) const noexcept { return half / float(1u << level); }
+  /// The largest float where it is beyond; kernels take infinity there.
   [[nodiscard]] float face(std::size_t axis, unsigned level, std::uint32_t i) const noexcept {
-    return lower[axis] + float(i) * size(level);
+    return std::min(lower[axis] + float(2 * i) * child_size(level), std::numeric_limits<float>::max());
   }
   [[nodiscard]] Bounds3f box(unsigned level, const std::array<std::uint32_t, 3>& at) const noexcept {
     return {{face(0, level, at[0]), face(1, level, at[1]), face(2, level, at[2])},

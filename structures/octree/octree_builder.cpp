@@ -167,17 +167,17 @@ void build_tree(const TriangleMesh& mesh, const BuilderParameters& parameters, u
   PhaseClock phase(report);
   const Bounds3f bounds = mesh.bounds();
   const float largest = largest_coordinate(bounds);
-  float side = 0x1p-100f;
+  float half = 0x1p-101f;
   for (std::size_t a = 0; a < 3; ++a) {
     tree.cube.lower[a] = bounds.lower[a];
-    side = std::max(side, bounds.upper[a] - bounds.lower[a]);
-    while (bounds.lower[a] + side < bounds.upper[a])
-      side = std::nextafter(side, std::numeric_limits<float>::infinity());
+    half = std::max(half, 0.5f * bounds.upper[a] - 0.5f * bounds.lower[a]);
+    while (bounds.lower[a] + 2.0f * half < bounds.upper[a])
+      half = std::nextafter(half, std::numeric_limits<float>::infinity());
   }
-  tree.cube.side = side, tree.max_coordinate = largest;
+  tree.cube.half = half, tree.max_coordinate = largest;
   // Cells of less than 16 ulps of the largest coordinate would have faces that fall together.
   unsigned depth = parameters.max_depth == 0 ? kMostLevels : parameters.max_depth;
-  while (depth > 0 && tree.cube.size(depth) < 0x1p-19f * largest) --depth;
+  while (depth > 0 && tree.cube.child_size(depth - 1) < 0x1p-19f * largest) --depth;
 
   Ids ids(mesh.size());
   for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = std::uint32_t(i);

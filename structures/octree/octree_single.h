@@ -37,7 +37,7 @@ struct OctreePlanes {
   F in, middle, out;
   ARBORETUM_INLINE OctreePlanes(const octree::Cube& cube, const OctreeCell& cell, vm<4> negative)
       : twice(vi<4>::load(cell.at).template shift_left<1>()) {
-    const F lower = F::load(cube.lower), size(cube.side / float(2u << cell.level));
+    const F lower = F::load(cube.lower), size(cube.half / float(1u << cell.level));
     const F a = lower + to_float(twice) * size, b = lower + to_float(twice + vi<4>(2)) * size;
     middle = lower + to_float(twice + vi<4>(1)) * size;
     in = select(negative, b, a), out = select(negative, a, b);
