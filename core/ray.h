@@ -2,8 +2,8 @@
 //
 // A triangle is closed, so is the interval [tnear, tfar]; a coplanar or zero-area triangle is missed (in leaves of
 // indices only by the tests in double and `exact`: docs/numerics.md); among hits at an equal t the lowest primitive id
-// wins. A ray with a NaN, an infinite origin or direction, a zero direction or
-// tnear > tfar hits nothing. tnear >= 0.
+// wins. A ray with a NaN, an infinite origin or direction, a zero direction or tnear > tfar hits nothing.
+// tnear >= 0.
 #pragma once
 
 #include <cstdint>

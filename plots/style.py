@@ -272,7 +272,7 @@ def panel_grid(shown, places, width, height, most_columns, least_width=None):
 def lines_of(own, width, most_columns):
     """[(scene, places of a line)] of `own`, {scene: places}, of how many columns a line is, and how many lines stand beside each other."""
     most = max(map(len, own.values()))
-    columns = min(most, most_columns)
+    columns = -(-most // -(-most // most_columns))  # as few lines as there can be, the last as full as the others
     lines = [(scene, line[i:i + columns]) for scene, line in own.items() for i in range(0, len(line), columns)]
     return lines, columns, max(1, min(most_columns // columns, int(WIDEST / (columns * width)), len(lines))) if most == columns else 1
 
