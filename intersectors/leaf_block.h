@@ -67,7 +67,8 @@ ARBORETUM_INLINE VertexBlock<M> readable(const IndexBlock<M>& block, const Vec3f
         __m128 row[4];
         for (int j = 0; j < 4; ++j) {  // x y z 0, nothing read behind the vertex
           const float* p = &vertices[index[i + j]].x;
-          row[j] = _mm_movelh_ps(_mm_castpd_ps(_mm_load_sd(reinterpret_cast<const double*>(p))), _mm_load_ss(p + 2));
+          row[j] =
+              _mm_movelh_ps(_mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))), _mm_load_ss(p + 2));
         }
         _MM_TRANSPOSE4_PS(row[0], row[1], row[2], row[3]);
         for (int axis = 0; axis < 3; ++axis) _mm_storeu_ps(&to[axis][i], row[axis]);

@@ -52,9 +52,9 @@ struct vd<2> {
   ARBORETUM_INLINE explicit vd(__m128d x) : v(x) {}
   ARBORETUM_INLINE vd(double s) : v(_mm_set1_pd(s)) {}
   static ARBORETUM_INLINE vd load(const float* p) {
-    return vd(_mm_cvtps_pd(_mm_castpd_ps(_mm_load_sd(reinterpret_cast<const double*>(p)))));
+    return vd(_mm_cvtps_pd(_mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))));
   }
-  ARBORETUM_INLINE void store(float* p) const { _mm_store_sd(reinterpret_cast<double*>(p), _mm_castps_pd(_mm_cvtpd_ps(v))); }
+  ARBORETUM_INLINE void store(float* p) const { _mm_storel_epi64(reinterpret_cast<__m128i*>(p), _mm_castps_si128(_mm_cvtpd_ps(v))); }
   friend ARBORETUM_INLINE vd operator+(vd a, vd b) { return vd(_mm_add_pd(a.v, b.v)); }
   friend ARBORETUM_INLINE vd operator-(vd a, vd b) { return vd(_mm_sub_pd(a.v, b.v)); }
   friend ARBORETUM_INLINE vd operator*(vd a, vd b) { return vd(_mm_mul_pd(a.v, b.v)); }
