@@ -34,12 +34,12 @@ class InstanceLeaves {
     };
     row.box == "padded" ? set(std::true_type{}) : set(std::false_type{});
   }
-  /// Packets go on as such in the structure below, where `find` finds that it has a way; a ray goes on alone there,
-  /// too, where no more than `threshold` are left.
+  /// Packets go on as such in the structure below where there are `packets` for it. `group` is where, one instance
+  /// after the other.
   InstanceLeaves(const two_level::TwoLevel& accel, const KernelRow& row, Counting counting,
-                 PlacedPackets<Counting> packets, const int& threshold)
+                 PlacedPackets<Counting> packets, PlacedGroup& group)
       : InstanceLeaves(accel, row, counting) {
-    packets_ = packets, threshold_ = &threshold;
+    packets_ = packets, group_ = &group;
   }
 
   RayData prepare(const Ray& ray) const {
@@ -60,12 +60,13 @@ class InstanceLeaves {
   }
 
   /// As test_leaf().
-  template <bool AnyHit, class TopCounting, class RayAt, class DataOf, class BestOf, class OnHit>
-  void test_many(const LeafForm&, const TopCounting&, const std::byte* leaf, unsigned /*count*/, std::uint64_t rays,
-                 const RayAt& ray, const DataOf& data, const BestOf& best, const OnHit& hit) const {
+  template <bool AnyHit, class RayAt, class DataOf, class BestOf, class OnHit>
+  void test_many(const LeafForm&, const TopCounting<Counting>&, const std::byte* leaf, unsigned /*count*/,
+                 std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best, const OnHit& hit) const {
     const two_level::Placed& instance = instance_of(leaf);
-    PlacedGroup group;
-    const bool together = packets_ && __builtin_popcountll(rays) > *threshold_;
+    PlacedGroup& group = *group_;
+    group.count = 0, group.pad = 0.0f;
+    const bool together = packets_ && __builtin_popcountll(rays) > group.threshold;
     for (; rays; rays &= rays - 1) {
       const int i = __builtin_ctzll(rays);
       const PlacedRay placed(ray(i), instance, best(i).t);
@@ -79,7 +80,7 @@ class InstanceLeaves {
     }
     if (group.count == 0) return;
     blocks_.enter(instance);
-    packets_(*instance.below, *row_, blocks_, group, *threshold_, counting_);
+    packets_(*instance.below, *row_, blocks_, group, counting_);
     for (int k = 0; k < group.count; ++k) {
       const int i = group.number[k];
       if constexpr (!AnyHit) best(i) = group.best[k];
@@ -107,7 +108,7 @@ class InstanceLeaves {
   Counting counting_;
   PlacedSearch<Counting> closest_ = nullptr, any_ = nullptr;
   PlacedPackets<Counting> packets_ = nullptr;
-  const int* threshold_ = nullptr;
+  PlacedGroup* group_ = nullptr;
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -12,6 +12,7 @@ namespace ARBORETUM_ISA_NAMESPACE {
 /// Rays of a packet in one instance.
 struct PlacedGroup {
   static constexpr int kMost = LaneRays::kMost;
+  int threshold = 0;  ///< where no more rays are left they go on alone
   int count = 0;
   float pad = 0.0f;  ///< the largest of the rays' (PlacedRay)
   Ray ray[kMost];    ///< in object space
@@ -77,7 +78,7 @@ class PlacedGroupLeaves {
 /// Of a structure whose packets take groups: the search of all rays of `group`. `row` is that of two_level.
 template <class Counting>
 using PlacedPackets = void (*)(const Accel& below, const KernelRow& row, PlacedBlocks& blocks, PlacedGroup& group,
-                               int threshold, const Counting& counting);
+                               const Counting& counting);
 
 /// nullptr for other structures. W rays a register.
 template <int W, bool AnyHit, class Counting>
@@ -85,7 +86,7 @@ PlacedPackets<Counting> find_packets(std::string_view below) {
   PlacedPackets<Counting> found = nullptr;
   for_each_type(bvh::Structures{}, [&]<class Tree>(std::type_identity<Tree>) {
     if (Tree::kName != below) return;
-    found = [](const Accel& accel, const KernelRow& row, PlacedBlocks& blocks, PlacedGroup& group, int threshold,
+    found = [](const Accel& accel, const KernelRow& row, PlacedBlocks& blocks, PlacedGroup& group,
                const Counting& counting) {
       const auto& tree = static_cast<const Tree&>(accel);
       BvhPackets<SoaPacketNodes<Tree::kBranching>, W, PlacedGroupLeaves, AnyHit, Counting> packet(
@@ -93,7 +94,7 @@ PlacedPackets<Counting> find_packets(std::string_view below) {
           tree.max_coordinate() + group.pad);
       packet.set_size(group.count);
       if constexpr (Counting::kCounting) packet.set_width(unsigned(W));
-      packet.trace(RayBatch(group.ray, std::size_t(group.count)), threshold);
+      packet.trace(RayBatch(group.ray, std::size_t(group.count)), group.threshold);
       for (int i = 0; i < group.count; ++i) group.best[i] = packet.best(i);
     };
   });

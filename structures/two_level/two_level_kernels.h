@@ -67,18 +67,17 @@ struct TwoLevelPacketFamily {
    public:
     Packets(const Structure& accel, const KernelRow& row, Counting counting)
         : top_(accel.top(), row, TopCounting<Counting>(counting),
-               InstanceLeaves<Counting>(accel, row, counting, find_packets<W, AnyHit, Counting>(accel.below()),
-                                        threshold_),
+               InstanceLeaves<Counting>(accel, row, counting, find_packets<W, AnyHit, Counting>(accel.below()), group_),
                true, accel.top().max_coordinate()) {}
 
     void set_size(int rays_each) { top_.set_size(rays_each); }
     void set_width(unsigned width) requires Counting::kCounting { top_.set_width(width); }
-    void trace(const RayBatch& rays, int threshold) { threshold_ = threshold, top_.trace(rays, threshold); }
+    void trace(const RayBatch& rays, int threshold) { group_.threshold = threshold, top_.trace(rays, threshold); }
     [[nodiscard]] const NearestHit& best(int i) const { return top_.best(i); }
     [[nodiscard]] std::size_t times_alone() const { return top_.times_alone(); }
 
    private:
-    int threshold_ = 0;
+    PlacedGroup group_;
     BvhPackets<SoaPacketNodes<4>, W, InstanceLeaves<Counting>, AnyHit, TopCounting<Counting>> top_;
   };
 };
