@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "experiments/config.h"
 #include "experiments/plan.h"
 #include "tests/error_of.h"
 #include "tests/folder.h"
@@ -54,6 +55,11 @@ inline Registry paper_registry(std::vector<Isa> isas = {Isa::scalar, Isa::sse, I
     return std::string(structure) + " has no " + std::string(intersector);
   };
   return registry;
+}
+
+/// Of the configuration that the text is.
+inline Plan planned(const Folder& folder, const Registry& registry, const std::string& yaml) {
+  return make_plan(read_experiment(folder.write("plan.yaml", yaml), registry), registry);
 }
 
 inline std::vector<std::string> names(const Plan& plan, Cell::Metric metric) {
