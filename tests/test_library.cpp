@@ -126,7 +126,8 @@ TEST_CASE("keys that stand for others mean what they mean on the command line") 
       std::tie(plain.structure, plain.builder, plain.leaf, plain.intersector, plain.box, plain.isa));
   CHECK(settled({.intersector = "moller_trumbore", .box = "auto"}).box == "fast");
   CHECK(settled({.structure = "bvh8", .traversal = "auto"}).traversal == "auto");
-  CHECK(settled({.structure = "grid", .traversal = "auto"}).traversal == "single");
+  CHECK(settled({.structure = "grid", .traversal = "auto"}).traversal == "auto");
+  CHECK(settled({.structure = "brute_force", .traversal = "auto"}).traversal == "single");
   for (Isa isa : available_isas()) {
     const std::string width = std::to_string(native_width(isa)), name(to_string(isa));
     CHECK(settled({.traversal = "packet", .isa = name}).traversal == "packet" + width);
@@ -175,7 +176,6 @@ TEST_CASE("a packet with a mask: rays that are switched off are not traced") {
     for (const char* traversal : {"single", "auto", "hybrid"}) {
       TracerSettings settings = with(&TracerSettings::structure, structure);
       settings.traversal = traversal;
-      if (structure == std::string_view("grid") && traversal == std::string_view("hybrid")) continue;
       INFO(structure << ", " << traversal);
       const Tracer tracer(mesh, settings);
       check_masks<1>(tracer, rays);
@@ -203,7 +203,8 @@ TEST_CASE("a packet goes by the way of its own number of rays, of the kind that 
   CHECK(way("bvh8", "hybrid8", 64) == "hybrid8");
   CHECK(way("bvh8", "packet8", 64) == "packet64");
   CHECK(way("bvh8", "stream", 7) == "stream");
-  CHECK(way("grid", "single", 8) == "single");
+  CHECK(way("grid", "single", 8) == "packet8");
+  CHECK(way("brute_force", "single", 8) == "single");
 }
 
 TEST_CASE("settings of a batch have the command line's limits") {

@@ -36,9 +36,12 @@ const StructureInfo& Grid::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "grid with 3-D DDA, one or two levels of cells";
-    i.only_single_rays =
-        "not built: each ray steps from cell to cell at distances of its own; what packets share in a grid is another "
-        "walk, that of their frustum through slices of cells";
+    i.no_streams =
+        "not built: a stream's rays share nodes until they are alone in them; in a grid rays that start anywhere share "
+        "no cells";
+    i.no_queue =
+        "not built: a queue hides what a ray waits for from node to node; in a grid a ray's way through empty cells is "
+        "arithmetic, and it waits at the cells that hold triangles alone";
     i.builders = {"two_level", "uniform"};
     i.root_is_node = true;
     i.leaves = all_leaf_names();

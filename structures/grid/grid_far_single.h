@@ -65,17 +65,23 @@ class FarWalk {
   Leaf& leaf_;
 };
 
-/// Whether the walk's proof holds for the ray (grid.h), and its numbers are far from overflowing.
+/// Whether the walk's proof holds for rays (grid.h), and their numbers are far from overflowing. `away`: the largest
+/// |component| of the origin as the grid's lower corner sees it; `largest`: that of the direction. `F` is float or
+/// lanes.
+template <class F>
+ARBORETUM_INLINE auto within_walk_bounds(const grid::Grid& grid, F away, F largest) {
+  const float all = grid.max_coordinate() + 32.0f * grid.reach();
+  const float most_away = all < 0x1p120f ? 16.0f * grid.reach() : -1.0f;
+  return (away <= F(most_away)) & (F(all) <= F(0x1p60f) * largest) & (F(grid.pad()) >= F(0x1p-80f) * largest);
+}
 ARBORETUM_INLINE bool within_walk_bounds(const grid::Grid& grid, const Ray& ray) {
   const grid::Level& outer = grid.levels()[0];
-  float away = 0.0f, largest = 0.0f;
+  float away = 0.0f;
   for (int a = 0; a < 3; ++a) {
-    const float d = __builtin_fabsf((&ray.direction.x)[a]), o = __builtin_fabsf((&ray.origin.x)[a] - outer.lower[a]);
-    largest = d > largest ? d : largest, away = o > away ? o : away;
+    const float o = __builtin_fabsf((&ray.origin.x)[a] - outer.lower[a]);
+    away = o > away ? o : away;
   }
-  const float all = grid.max_coordinate() + 32.0f * grid.reach();
-  return (all < 0x1p120f) && (away <= 16.0f * grid.reach()) && (all <= 0x1p60f * largest) &&
-         (grid.pad() >= 0x1p-80f * largest);
+  return within_walk_bounds(grid, away, largest_component(ray.direction)) != 0;
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

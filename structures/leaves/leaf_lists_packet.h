@@ -20,6 +20,22 @@ class ListedPacketLeaves : protected PacketLeaves<W, Leaves, AnyHit, Counting, R
   ListedPacketLeaves(const KernelRow& row, const LeafStore& store, Counting counting)
       : Base(row, Leaves(row, store.vertices()), counting), store_(store) {}
 
+  /// Leaves are new to all rays again.
+  void forget_leaves() { std::fill(std::begin(last_leaf_), std::end(last_leaf_), kEmptyLeaf); }
+  /// The rays of `mask` that do not come from a leaf of that code: neighbouring cells may share one.
+  ARBORETUM_INLINE Mask new_to(LeafCode code, Mask mask) {
+    const vi<W> here{std::int32_t(code)};
+    Mask rays = 0;
+    for (int c = 0; c < Base::chunks_; ++c) {
+      const unsigned in = Base::lanes_of(mask, c);
+      if (in == 0) continue;
+      const vi<W> last = vi<W>::load(last_leaf_ + c * W);
+      rays |= Mask(~(last == here).bits() & in) << (c * W);
+      select(vm<W>::from_bits(in), here, last).store(last_leaf_ + c * W);
+    }
+    return rays;
+  }
+
   void leaf(LeafCode code, Mask mask) {
     const LongLeaf range = store_.range(code);
     Base::leaf(blocks_of(range), range.blocks, mask);
@@ -49,6 +65,9 @@ class ListedPacketLeaves : protected PacketLeaves<W, Leaves, AnyHit, Counting, R
   }
 
   const LeafStore& store_;
+
+ protected:
+  alignas(64) LeafCode last_leaf_[Base::kMost];  ///< of each ray (new_to())
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -40,7 +40,7 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
  private:
   using typename Base::Mask;
   using F = vf<W>;
-  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::lanes_, Base::rays_;
+  using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::lanes_, Base::last_leaf_, Base::rays_;
 
   struct Entry {
     OctreeCell cell;
@@ -54,10 +54,10 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
     Entry* top = stack;
     Entry e{{{0, 0, 0, 0}, nodes[0], 0}, group, 0.0f};
     float last = Base::farthest(group);
-    std::fill(std::begin(last_leaf_), std::end(last_leaf_), kEmptyLeaf);
+    Base::forget_leaves();
     for (;;) {
       if (e.cell.node.mask == 0) {
-        if (const Mask rays = new_to(e.cell.node.first, e.mask); rays != 0) {
+        if (const Mask rays = Base::new_to(e.cell.node.first, e.mask); rays != 0) {
           Base::leaf(e.cell.node.first, rays);
           if constexpr (!AnyHit) last = Base::farthest(group);
         }
@@ -87,20 +87,6 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
         if constexpr (AnyHit) e.mask &= active_;
       } while (e.mask == 0 || (!AnyHit && e.first > last));
     }
-  }
-
-  /// The rays of `mask` that do not come from a leaf of that code: neighbouring cells may share one.
-  ARBORETUM_INLINE Mask new_to(LeafCode code, Mask mask) {
-    const vi<W> here{std::int32_t(code)};
-    Mask rays = 0;
-    for (int c = 0; c < chunks_; ++c) {
-      const unsigned in = Base::lanes_of(mask, c);
-      if (in == 0) continue;
-      const vi<W> last = vi<W>::load(last_leaf_ + c * W);
-      rays |= Mask(~(last == here).bits() & in) << (c * W);
-      select(vm<W>::from_bits(in), here, last).store(last_leaf_ + c * W);
-    }
-    return rays;
   }
 
   /// The rays of `mask` that are in each of the children that exist, by their number as the rays meet them, and where
@@ -155,7 +141,6 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
 
   const octree::Octree& tree_;
   const bool padded_;
-  alignas(64) LeafCode last_leaf_[Base::kMost];  ///< of each ray
   Entry stack_[kMostOctreeCells];
 };
 

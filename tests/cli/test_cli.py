@@ -394,7 +394,8 @@ class CommandLine(CommandLineCase):
         self.assertIn("bvh8", self.call("list", "structures").stdout)
         self.assertLess(max(map(len, self.call("list", "structures").stdout.splitlines())), 260)
         ways = {s["name"]: s["traversals"] for s in listed["structures"] if s["available"]}
-        self.assertEqual(ways["grid"], ["single"])
+        self.assertEqual(ways["brute_force"], ["single"])
+        self.assertEqual(ways["grid"], ["single", "packet4", "packet8", "packet16", "packet32", "packet64", "hybrid4", "hybrid8", "hybrid16", "auto"])
         self.assertLess({"single", "packet8", "queued", "stream", "auto"}, set(ways["bvh8"]))
         read = {s["name"]: s["parameters"] for s in listed["structures"] if s["available"]}
         self.assertIn("ploc_radius", read["bvh8"]["ploc"])
