@@ -6,6 +6,7 @@
 #include "structures/leaves/leaf_kernels.h"
 #include "traversal/auto_rows.h"
 #include "traversal/packet_rows.h"
+#include "traversal/usual_leaves.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -29,8 +30,8 @@ struct GridSingle {
 inline void add_kernels(std::type_identity<grid::Grid>, KernelRows& rows) {
   using Single = ListedLeaves<grid::Grid, GridSingle>;
   Single::add(rows);
-  add_packet_rows<grid::Grid, GridPacketFamily>(rows, TypeList<>{});
-  add_rows<grid::Grid, AutoFunctions<GridPacketFamily, TypeList<>, Single::Functions>>(rows, "auto", TypeList<>{});
+  add_packet_rows<grid::Grid, GridPacketFamily>(rows, BatchLeaves{});
+  add_rows<grid::Grid, AutoFunctions<GridPacketFamily, BatchLeaves, Single::Functions>>(rows, "auto", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

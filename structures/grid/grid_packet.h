@@ -131,7 +131,14 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
     const grid::Level& outer = grid_.levels()[0];
     Order order;
     const Mask inside = clip(outer, group, order);
-    if (inside != 0) search<0>(outer, inside, order);
+    if (inside == 0) return;
+    for (int a = 0; a < 3; ++a) {
+      float low, high;
+      Base::range(lanes_.rays.origin[a], inside, low, high);
+      Base::set_axis(a, low, high, inside);
+    }
+    Base::look_for_common_origin(inside);
+    search<0>(outer, inside, order);
   }
 
   /// The rays of `mask` that meet the level's box (as GridWalk::clip() has it), and from where to where they are in it.
