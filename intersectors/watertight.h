@@ -9,18 +9,24 @@
 // inputs, decide, as in the paper.
 //
 // t is a mean of the vertices' depths, so its error grows with their distance, not with t: beside a large triangle a
-// ray that starts on it could meet it again. Let s be the largest less the smallest depth in units of t, R the sum of
-// the squares of all nine sheared coordinates, u = 2^-24. A sheared x or y is off by delta = u (2 L + 3 Z), or u (2 L +
-// 4 Z) unfused (exact_filter.h), so by less than 4.5 u sqrt(R); an edge function of corners b, c then by sqrt(2) delta
-// (|b| + |c|), and by 2 u |b||c| in its own roundings. Where the ray meets the triangle, t moves by the sum of these
-// times |depth - t| over |det|: s times those of two edges at most, 15.6 u R s + 1.5 u R s. Its other roundings are
-// under 9 u max |depth| <= 9 u (s + |t|), and |det| <= R. So |error of t| < 27 u R s / |det| + 9 u |t|: all but the
-// last, which is t's own rounding, within 2^-19 R s / |det|. The products that t is a sum of may underflow besides: by
-// less than 2^-147 / |det| in all. Where these could turn t across tnear, where |det| (t - tnear) is below 2^-124, so
-// that the last is more than t's rounding, and where t is closer to tnear than 2^-10 of s and so inaccurate itself, t
-// is computed again from the triangle's plane, in double, and kept between the nearest and the farthest corner: a
-// triangle that is met only because its corners are rounded, edge on, has its plane anywhere along the ray, and must
-// close the surface all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not.
+// ray that starts on it could meet it again. So t has a bound, and where that does not suffice it is computed again.
+//
+// Let u = 2^-24, L and Z the largest sheared coordinate across and depth, s the largest less the smallest depth in
+// units of t, R the sum of the squares of all nine sheared coordinates.
+// 1. A sheared x or y is off by delta = u (2 L + 3 Z), or u (2 L + 4 Z) unfused (exact_filter.h): less than
+//    4.5 u sqrt(R).
+// 2. An edge function of corners b and c is off by sqrt(2) delta (|b| + |c|), and by 2 u |b| |c| in its own roundings.
+// 3. Where the ray meets the triangle these move t by their sum times |depth - t| / |det|: s times those of two edges
+//    at most, (15.6 + 1.5) u R s / |det|. The other roundings of t are under 9 u max |depth| <= 9 u (s + |t|), and
+//    |det| <= R. So the error of t is below 27 u R s / |det| + 9 u |t|: but for the last term, which is t's own
+//    rounding, within 2^-19 R s / |det|.
+// 4. The products that t is a sum of may underflow: by less than 2^-147 / |det| in all. That is more than t's rounding
+//    where |det| (t - tnear) is below 2^-124.
+// 5. Where 3 or 4 could turn t across tnear, 3 only where t is closer to tnear than 2^-10 of s, t is computed again
+// from
+//    the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle that is met only
+//    because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the surface all the
+//    same. What lies clearly before tnear, as the triangle that a ray has just left, is not computed again.
 #pragma once
 
 #include "intersectors/sheared_packet.h"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <tuple>
 
 #include "core/missing_isa.h"
@@ -26,13 +27,17 @@ const std::map<Key, const KernelRow*>& index() {
   return map;
 }
 
-/// Whether any row of the structure agrees with the given keys; an empty key agrees with all.
-[[nodiscard]] bool any_row(std::string_view structure, std::string_view leaf, std::string_view intersector,
-                           std::string_view box, std::string_view traversal, const Isa* isa) {
-  const auto agrees = [](std::string_view wanted, std::string_view value) { return wanted.empty() || wanted == value; };
+/// What a row must have; an empty key, or no instruction set, is any.
+struct RowFilter {
+  std::string_view structure = {}, leaf = {}, intersector = {}, box = {}, traversal = {};
+  std::optional<Isa> isa = {};
+};
+[[nodiscard]] bool any_row(const RowFilter& wanted) {
+  const auto agrees = [](std::string_view key, std::string_view value) { return key.empty() || key == value; };
   return std::ranges::any_of(kernel_table(), [&](const KernelRow& r) {
-    return agrees(structure, r.structure) && agrees(leaf, r.leaf) && agrees(intersector, r.intersector) &&
-           agrees(box, r.box) && agrees(traversal, r.traversal) && (!isa || *isa == r.isa);
+    return agrees(wanted.structure, r.structure) && agrees(wanted.leaf, r.leaf) &&
+           agrees(wanted.intersector, r.intersector) && agrees(wanted.box, r.box) &&
+           agrees(wanted.traversal, r.traversal) && (!wanted.isa || *wanted.isa == r.isa);
   });
 }
 
@@ -107,7 +112,7 @@ template <int W>
 
 }  // namespace
 
-Counters& Counters::operator+=(const Counters& o) noexcept {
+Counters& Counters::operator+=(const Counters& o) {
   rays += o.rays, nodes += o.nodes, boxes += o.boxes, boxes_hit += o.boxes_hit, leaves += o.leaves, blocks += o.blocks;
   triangles += o.triangles, lanes += o.lanes, lanes_active += o.lanes_active;
   nodes_shared += o.nodes_shared, leaves_shared += o.leaves_shared, interval_tests += o.interval_tests;
@@ -140,11 +145,12 @@ std::string_view default_leaf(std::string_view structure, std::string_view inter
   // Eight triangles a block trace 5 to 7 % faster than four where a register holds eight (docs/performance.md); edges
   // where the intersector takes them, else vertices, else the form that was made for it.
   const bool wide = native_width(isa) >= 8;
-  const Isa* const of = cpu_supports(isa) ? &isa : nullptr;  // one that the machine lacks has no rows; leaves are alike
+  // One that the machine lacks has no rows; leaves are alike.
+  const std::optional<Isa> of = cpu_supports(isa) ? std::optional(isa) : std::nullopt;
   for (std::string_view leaf :
        {wide ? "triangle8" : "triangle4", wide ? "triangle8v" : "triangle4v", "triangle4", "triangle4v",
         wide ? "triangle8w" : "triangle4w", wide ? "triangle8h" : "triangle4h", wide ? "triangle8p" : "triangle4p"}) {
-    if (any_row(structure, leaf, intersector, "", "", of)) return leaf;
+    if (any_row({.structure = structure, .leaf = leaf, .intersector = intersector, .isa = of})) return leaf;
   }
   for (const KernelRow& r : kernel_table()) {
     if (r.structure == structure && r.intersector == intersector && (!of || r.isa == isa)) return r.leaf;
@@ -157,14 +163,18 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   if (find_kernel(structure, leaf, intersector, box, traversal, isa)) return {};
   if (!cpu_supports(isa)) return missing_isa_reason(isa);
   const std::string s(structure), l(leaf), i(intersector), b(box), t(traversal), a(to_string(isa));
-  if (!any_row(structure, "", "", "", "", nullptr)) return "no kernels for " + s;
-  if (!any_row(structure, "", "", "", "", &isa)) return s + " has no " + a + " kernels";
-  if (!any_row(structure, "", "", "", traversal, nullptr))
+  if (!any_row({.structure = structure})) return "no kernels for " + s;
+  if (!any_row({.structure = structure, .isa = isa})) return s + " has no " + a + " kernels";
+  if (!any_row({.structure = structure, .traversal = traversal}))
     return s + " has no " + t + " traversal: " + why_no_traversal(structure, traversal);
-  if (!any_row(structure, "", "", "", traversal, &isa)) return s + " has no " + t + " traversal on " + a;
-  if (!any_row(structure, "", intersector, "", traversal, &isa)) return s + " has no " + i + " kernels for " + t;
-  if (!any_row(structure, leaf, "", "", traversal, &isa)) return why_no_leaf(structure, leaf, traversal, isa);
-  if (!any_row(structure, leaf, intersector, "", traversal, &isa)) {
+  if (!any_row({.structure = structure, .traversal = traversal, .isa = isa}))
+    return s + " has no " + t + " traversal on " + a;
+  if (!any_row({.structure = structure, .intersector = intersector, .traversal = traversal, .isa = isa}))
+    return s + " has no " + i + " kernels for " + t;
+  if (!any_row({.structure = structure, .leaf = leaf, .traversal = traversal, .isa = isa}))
+    return why_no_leaf(structure, leaf, traversal, isa);
+  if (!any_row(
+          {.structure = structure, .leaf = leaf, .intersector = intersector, .traversal = traversal, .isa = isa})) {
     std::string others;
     for (const KernelRow& r : kernel_table()) {
       std::string other = " ";
@@ -178,7 +188,7 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
     return i + " cannot read leaf " + l + " in " + s + ": use" + others;
   }
   // A box test that only some ways of traversal, or some structures, have.
-  const bool elsewhere = !any_row(structure, "", "", box, traversal, nullptr);
+  const bool elsewhere = !any_row({.structure = structure, .box = box, .traversal = traversal});
   if (const std::string ways = values_of(&KernelRow::traversal,
                                          [&](const KernelRow& r) { return r.box == box && r.structure == structure; });
       elsewhere && !ways.empty())

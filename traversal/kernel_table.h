@@ -55,7 +55,7 @@ struct Counters {
   std::uint64_t queue_rounds = 0;  ///< of rays in flight: once through the queue of nodes and that of leaves
   std::uint64_t nodes_queued = 0;  ///< lengths of the queues when their turn comes, added up
   std::uint64_t leaves_queued = 0;
-  Counters& operator+=(const Counters& o) noexcept;
+  Counters& operator+=(const Counters& o);
 };
 
 struct KernelRow;

@@ -80,7 +80,7 @@ ARBORETUM_INLINE typename Leaves::RayData prepare_at(const Leaves& leaves, const
   }
 }
 
-/// Of any hit a ray's visit of a leaf: counted up to the block that ends it.
+/// A ray visits a leaf for any hit; blocks are counted up to and including the one that it hits.
 template <class Leaves, class RayData, class Counting>
 ARBORETUM_INLINE bool any_hit_in_leaf(const Leaves& leaves, RayData& data, [[maybe_unused]] const LeafForm& form,
                                       [[maybe_unused]] const Counting& counting, const std::byte* blocks,

@@ -223,11 +223,16 @@ class PacketLeaves {
   /// these tests take, those of registers without a ray left out, and of them those with one.
   std::pair<unsigned, unsigned> count_node(Mask mask, unsigned boxes) const requires Counting::kCounting {
     const auto rays = unsigned(__builtin_popcountll(mask));
+    const unsigned lanes = lanes_with(mask);
+    counting_.share_node(rays), counting_.box_tests(boxes * lanes, boxes * rays);
+    return {boxes * lanes, boxes * rays};
+  }
+  /// The lanes of those registers that hold rays of `mask`.
+  [[nodiscard]] unsigned lanes_with(Mask mask) const requires Counting::kCounting {
     unsigned lanes = 0;
     for (unsigned k = 0; k < unsigned(kMost); k += width_)
       if ((mask >> k & ((Mask{1} << width_) - 1)) != 0) lanes += width_;
-    counting_.share_node(rays), counting_.box_tests(boxes * lanes, boxes * rays);
-    return {boxes * lanes, boxes * rays};
+    return lanes;
   }
 
   void leaf(const std::byte* blocks, unsigned count, Mask mask) {

@@ -310,10 +310,7 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
   /// The rays of a slice were tested against a cell of it that is not empty; `in` are in it.
   void count_cell([[maybe_unused]] Mask slice, [[maybe_unused]] Mask in) const {
     if constexpr (Counting::kCounting) {
-      unsigned lanes = 0;
-      for (unsigned k = 0; k < unsigned(Base::kMost); k += Base::width_)
-        if ((slice >> k & ((Mask{1} << Base::width_) - 1)) != 0) lanes += Base::width_;
-      counting_.box_tests(lanes, unsigned(__builtin_popcountll(slice)));
+      counting_.box_tests(Base::lanes_with(slice), unsigned(__builtin_popcountll(slice)));
       counting_.counters.boxes_hit += std::uint64_t(__builtin_popcountll(in));
     }
   }

@@ -85,7 +85,7 @@ struct KdRay {
   ARBORETUM_INLINE void clip(const Bounds3f& bounds, float& begin, float& end) const {
     for (unsigned axis = 0; axis < 3; ++axis) {
       const bool up = far[axis] != 0;
-      const float low = (&bounds.lower.x)[axis], high = (&bounds.upper.x)[axis];
+      const float low = bounds.lower[axis], high = bounds.upper[axis];
       const float in = entering(up ? low : high, axis), out = leaving(up ? high : low, axis);
       begin = in > begin ? in : begin, end = out < end ? out : end;
     }
