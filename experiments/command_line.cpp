@@ -344,6 +344,9 @@ int command_line(int argc, char** argv) {
     return fail(e.what());
   } catch (const std::bad_alloc&) {
     return fail("out of memory; lower the number of triangles or the resolution");
+  } catch (const std::filesystem::filesystem_error& e) {
+    const std::string where = e.path1().empty() ? "" : e.path1().string() + ": ";
+    return fail(fmt::format("{}{}; check the path and its permissions", where, e.code().message()));
   } catch (const std::system_error& e) {
     if (e.code() == std::errc::broken_pipe) return kReaderLeft;
     return fail(fmt::format("output cannot be written: {}", why_no_output(e.code())));

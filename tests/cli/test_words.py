@@ -45,6 +45,12 @@ class Words(CommandLineCase):
         result = self.call("render", "sphere:100", "--structure", "embree", "--isa", "scalar")
         self.assert_error(result, "embree has no scalar kernels; possible with --structure embree: --isa sse")
 
+    def test_a_path_that_the_system_refuses_is_named(self):
+        name = 300 * "x"
+        result = self.call("plot", name)
+        self.assert_error(result, f"arboretum: {name}: ", "File name too long")
+        self.assertNotIn("output", result.stderr)
+
     def test_a_closed_stdout_is_said_to_be_closed(self):
         result = subprocess.run(["sh", "-c", f"'{ARBORETUM}' list >&-"], stderr=subprocess.PIPE, text=True, check=False)
         self.assert_error(result, "output cannot be written: stdout is closed")
