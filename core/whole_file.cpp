@@ -3,17 +3,18 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
 #include <cstring>
-#include <string>
 
 #include "core/error.h"
 
 namespace arboretum {
 namespace {
 
+constexpr std::size_t kPiece = std::size_t{1} << 16;
 constexpr int kMostLinks = 40;  // the kernel's own bound
 
 /// Where a file's text goes: into what is there, or over it.
@@ -57,6 +58,25 @@ void write_in_place(const Target& target, std::string_view text, const std::file
   if (error != 0) cannot_write(path, error, goes_on);
 }
 
+/// Appends what is left of it. Returns errno, 0 where it went well.
+int read_all(int descriptor, std::string& text) {
+  for (;;) {
+    const std::size_t before = text.size();
+    text.resize(before + kPiece);
+    const ssize_t count = ::read(descriptor, text.data() + before, kPiece);
+    const int error = count < 0 ? errno : 0;
+    text.resize(before + static_cast<std::size_t>(std::max(count, ssize_t{0})));
+    if (count == 0 || (error != 0 && error != EINTR)) return error;
+  }
+}
+
+[[noreturn]] void cannot_read(const std::filesystem::path& path, int error) {
+  if (error == ENOENT) throw UserError(path.string() + ": no such file; check the path");
+  if (error == EISDIR) throw UserError(path.string() + ": is a folder; a file is to stand there");
+  throw UserError(path.string() + ": cannot be read: " + std::strerror(error) +
+                  (error == EACCES ? "; check its permissions" : "; check the path and what it leads to"));
+}
+
 }  // namespace
 
 int write_all(int descriptor, std::string_view text) {
@@ -90,6 +110,16 @@ void write_whole(const std::filesystem::path& path, std::string_view text, std::
     ::unlink(beside.c_str());
     cannot_write(path, error, goes_on);
   }
+}
+
+std::string read_whole(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY);
+  if (descriptor < 0) cannot_read(path, errno);
+  std::string text;
+  const int error = read_all(descriptor, text);
+  ::close(descriptor);
+  if (error != 0) cannot_read(path, error);
+  return text;
 }
 
 void require_writable(const std::filesystem::path& path) {

@@ -1,7 +1,9 @@
-// Files that are written as a whole: every write is checked, and a failed one leaves what was there before whole.
+// Files that are written and read as a whole: every write and read is checked, and a failed write leaves what was there
+// before whole.
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace arboretum {
@@ -10,6 +12,8 @@ namespace arboretum {
 /// leads to is written. What is there and is no regular file (a device, a FIFO, /dev/stdout, /dev/fd/63) is written to
 /// as it stands. Throws UserError; `goes_on`: what to do about a full disk beside freeing space.
 void write_whole(const std::filesystem::path& path, std::string_view text, std::string_view goes_on = "");
+/// All bytes of a file, of a pipe or a device too. Throws UserError.
+[[nodiscard]] std::string read_whole(const std::filesystem::path& path);
 /// Throws UserError where write_whole could not write to `path`, as far as can be seen without writing.
 void require_writable(const std::filesystem::path& path);
 /// The regular file, there or not, that `path` leads to by symbolic links, for who writes beside it and renames over

@@ -8,8 +8,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -62,8 +60,9 @@ void AppendFile::append(std::string_view line) {
 }
 
 std::vector<std::string> read_lines(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::error_code ignored;
+  if (std::filesystem::status(path, ignored).type() == std::filesystem::file_type::not_found) return {};
+  const std::string text = read_whole(path);
   std::vector<std::string> lines;
   for (std::size_t begin = 0;;) {
     const std::size_t end = text.find('\n', begin);

@@ -34,7 +34,8 @@ class AppendFile {
   int descriptor_ = -1;
 };
 
-/// Whole lines of a file; a last line without its newline is left out. Empty when there is no such file.
+/// Whole lines of a file; a last line without its newline is left out. Empty where there is no such file; throws
+/// UserError where it cannot be read.
 [[nodiscard]] std::vector<std::string> read_lines(const std::filesystem::path& path);
 /// Hands what was printed to the operating system. Throws std::system_error where it does not go there: the reader has
 /// left (EPIPE), the disk is full.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <set>
 
@@ -13,6 +12,7 @@
 #include "core/error.h"
 #include "core/exact/exact_predicate.h"
 #include "core/names.h"
+#include "core/whole_file.h"
 #include "experiments/json_text.h"
 
 namespace arboretum {
@@ -208,8 +208,7 @@ std::string decimal(Vec3f p) { return fmt::format("[{},{},{}]", decimal(p.x), de
 }  // namespace
 
 std::vector<VerifyCase> read_case_file(const std::filesystem::path& file) {
-  if (!std::ifstream(file)) throw UserError(fmt::format("{}: no such file, or it cannot be read", file.string()));
-  const Json document = parse(file, read_text(file));
+  const Json document = parse(file, read_whole(file));
   if (!document.is_object() || !document.contains("cases") || !document["cases"].is_array() ||
       document["cases"].empty())
     throw UserError(

@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 
+#include "core/whole_file.h"
 #include "experiments/append_file.h"
 #include "experiments/commands.h"
 #include "experiments/conclusion.h"
@@ -40,11 +39,6 @@ std::vector<ResultFolder> read_parts(const std::vector<fs::path>& paths) {
   return parts;
 }
 
-std::string whole_file(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 /// What stands beside the results: the effective configuration without the shard, repetitions of cells that have not
 /// ended, points of pictures.
 void write_beside(const fs::path& out, const std::vector<ResultFolder>& parts, const Merged& merged) {
@@ -61,7 +55,7 @@ void write_beside(const fs::path& out, const std::vector<ResultFolder>& parts, c
   for (const ResultFolder& part : parts) {
     for (const fs::directory_entry& entry : fs::directory_iterator(part.path)) {
       const std::string name = entry.path().filename().string();
-      if (is_seen_points_file(name)) write_whole(out / name, whole_file(entry.path()));
+      if (is_seen_points_file(name)) write_whole(out / name, read_whole(entry.path()));
     }
   }
 }

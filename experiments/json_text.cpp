@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
 #include "core/error.h"
 
@@ -20,11 +18,6 @@ std::string text_of(const AnyJson& json, int indent) {
 
 std::string to_text(const nlohmann::ordered_json& json, int indent) { return text_of(json, indent); }
 std::string to_text(const nlohmann::json& json, int indent) { return text_of(json, indent); }
-
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 void fail_syntax(const std::filesystem::path& file, std::string_view text, const nlohmann::json::parse_error& error,
                  std::string_view mend) {

@@ -13,7 +13,6 @@ namespace arboretum {
 /// no part of UTF-8 become U+FFFD.
 [[nodiscard]] std::string to_text(const nlohmann::ordered_json& json, int indent = -1);
 [[nodiscard]] std::string to_text(const nlohmann::json& json, int indent = -1);
-[[nodiscard]] std::string read_text(const std::filesystem::path& file);
 /// Throws UserError: file and line, what was found and what is expected there, and the mend.
 [[noreturn]] void fail_syntax(const std::filesystem::path& file, std::string_view text,
                               const nlohmann::json::parse_error& error, std::string_view mend);

@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <set>
+#include <system_error>
 
 #include "core/error.h"
+#include "core/whole_file.h"
 #include "experiments/json_text.h"
 
 namespace arboretum {
@@ -79,8 +80,9 @@ std::string to_text(const PlanRecord& record) {
 
 std::optional<PlanRecord> read_plan_record(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / kPlanFile;
-  if (!std::ifstream(file)) return std::nullopt;
-  const std::string text = read_text(file);
+  std::error_code ignored;
+  if (std::filesystem::status(file, ignored).type() == std::filesystem::file_type::not_found) return std::nullopt;
+  const std::string text = read_whole(file);
   try {
     const Json json = Json::parse(text);
     PlanRecord record;

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "core/whole_file.h"
 #include "experiments/append_file.h"
 #include "experiments/json_text.h"
 #include "experiments/results_writer.h"
@@ -53,8 +54,7 @@ std::vector<std::string> folders_in(const fs::path& path) {
 }
 
 Json read_json(const fs::path& path) {
-  if (!std::ifstream(path)) throw UserError(fmt::format("{}: cannot be read; check its permissions", path.string()));
-  const std::string text = read_text(path);
+  const std::string text = read_whole(path);
   try {
     Json document = Json::parse(text);
     if (document.is_object() && document.value("context", Json::object()).is_object()) return document;
@@ -89,7 +89,6 @@ void read_entries(const Json& document, ResultFolder& folder) {
 }
 
 void read_lines_of_cells(const fs::path& file, ResultFolder& folder) {
-  if (!std::ifstream(file)) throw UserError(fmt::format("{}: cannot be read; check its permissions", file.string()));
   std::map<std::string, std::size_t> places;
   std::size_t number = 0;
   for (const std::string& text : read_lines(file)) {

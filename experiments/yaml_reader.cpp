@@ -3,33 +3,27 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 #include <set>
 #include <system_error>
 
 #include "core/error.h"
 #include "core/names.h"
+#include "core/whole_file.h"
 #include "scenes/yaml_node.h"
 
 namespace arboretum {
 namespace {
 
-std::string read_text(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status)) {
+/// Throws UserError with the mends that a configuration has.
+std::string read_configuration(const std::filesystem::path& file) {
+  std::error_code ignored;
+  const std::filesystem::file_type type = std::filesystem::status(file, ignored).type();
+  if (type == std::filesystem::file_type::not_found)
     throw UserError(fmt::format("{}: no such file; name a configuration, as in configs/quick.yaml", file.string()));
-  }
-  if (std::filesystem::is_directory(status)) {
+  if (type == std::filesystem::file_type::directory)
     throw UserError(fmt::format("{}: is a folder; name the YAML file in it", file.string()));
-  }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw UserError(fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
-  return {std::istreambuf_iterator<char>(stream), {}};
+  return read_whole(file);
 }
 
 /// For a message of one line: a file that is no YAML may be one scalar from end to end.
@@ -52,7 +46,7 @@ std::string one_spelling(const std::string& word) {
 }  // namespace
 
 YamlReader::YamlReader(std::filesystem::path file) : file_(std::move(file)) {
-  root_ = read_document(read_text(file_), file_, "a configuration");
+  root_ = read_document(read_configuration(file_), file_, "a configuration");
   if (!root_ || root_.IsNull())
     throw UserError(fmt::format("{}: empty; a configuration has at least `scenes`", file_.string()));
 }

@@ -14,7 +14,10 @@
 #include "core/ray.h"
 #include "core/reserved_array.h"
 #include "core/rounding.h"
+#include "core/whole_file.h"
 #include "tests/catch.h"
+#include "tests/error_of.h"
+#include "tests/folder.h"
 
 using namespace arboretum;
 
@@ -24,6 +27,19 @@ TEST_CASE("isa names go there and back") {
   CHECK_FALSE(parse_isa("avx3").has_value());
   CHECK(is_available(Isa::scalar));
   for (Isa isa : available_isas()) CHECK(cpu_supports(isa));
+}
+
+TEST_CASE("whole files are read to their last byte, and what cannot be read is an error") {
+  const test::Folder folder;
+  std::string bytes;
+  for (std::size_t i = 0; i < 200'000; ++i) bytes += static_cast<char>(i % 251);
+  for (const std::string& text : {std::string(), std::string("\r\n\0x", 4), bytes})
+    CHECK(read_whole(folder.write("file", text)) == text);
+  const std::string path = folder.path().string();
+  CHECK(test::error_of([&] { (void)read_whole(folder / "none"); }) == path + "/none: no such file; check the path");
+  CHECK(test::error_of([&] { (void)read_whole(folder.path()); }) == path + ": is a folder; a file is to stand there");
+  CHECK_THAT(test::error_of([&] { (void)read_whole(folder / "file/below"); }),
+             Catch::Contains("file/below: cannot be read: "));
 }
 
 TEST_CASE("an empty box has no area and contains nothing") {

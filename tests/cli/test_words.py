@@ -89,6 +89,21 @@ class Words(CommandLineCase):
                 self.assert_error(result, part)
                 self.assertNotIn("json.exception", result.stderr)
 
+    def test_what_cannot_be_read_in_a_result_folder_is_not_taken_for_missing(self):
+        self.assertEqual(self.run_small(*FEW, "--out", "out").returncode, 0)
+        again = ("run", self.config, *FEW, "--no-plots", "--out", "out", "--resume")
+        for name, calls in (("plan.json", (("compare", "out", "out"), again)), ("cells.jsonl", (("compare", "out", "out"), again)),
+                            ("camera_edges-flake.json", (("merge", "joined", "out", "--no-plots"),))):
+            file = self.folder / "out" / name
+            text = file.read_bytes() if file.exists() else None
+            file.unlink(missing_ok=True)
+            file.mkdir()
+            for words in calls:
+                self.assert_error(self.call(*words), f"out/{name}: is a folder")
+            file.rmdir()
+            if text is not None:
+                file.write_bytes(text)
+
     def test_verify_leaves_no_cases_of_a_run_before(self):
         (self.folder / "out").mkdir()
         old = self.write("out/cases.json", "old")
