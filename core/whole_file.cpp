@@ -5,11 +5,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 
 #include "core/error.h"
+#include "core/parse_number.h"
 
 namespace arboretum {
 namespace {
@@ -28,11 +29,8 @@ struct Target {
 /// and opening it anew would begin at the start of the file.
 int own_descriptor(const std::filesystem::path& path) {
   std::error_code ignored;
-  const std::string name = path.filename().string();
-  int number = -1;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-  const bool is_number = error == std::errc{} && end == name.data() + name.size();
-  return is_number && std::filesystem::equivalent(path.parent_path(), "/proc/self/fd", ignored) ? number : -1;
+  const std::optional<int> number = parse_number<int>(path.filename().string());
+  return number && std::filesystem::equivalent(path.parent_path(), "/proc/self/fd", ignored) ? *number : -1;
 }
 
 Target target_of(std::filesystem::path path) {

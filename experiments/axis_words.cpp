@@ -3,22 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <optional>
 #include <set>
 
 #include "core/error.h"
 #include "core/names.h"
+#include "core/parse_number.h"
 
 namespace arboretum {
 
 std::string check_axis_value(Axis axis, std::string& value, const Registry& registry) {
   if (axis == Axis::threads) {
-    unsigned n = 0;
-    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), n);
-    if (error != std::errc{} || end != value.data() + value.size() || n < 1 || n > kMaxThreads) {
+    const std::optional<unsigned> n = parse_number<unsigned>(value);
+    if (!n || *n < 1 || *n > kMaxThreads)
       return fmt::format("threads must be an integer from 1 to {}, not '{}'", kMaxThreads, value);
-    }
-    value = std::to_string(n);
+    value = std::to_string(*n);
     return {};
   }
   if (axis == Axis::isa) {

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <optional>
 #include <set>
 
 #include "core/error.h"
 #include "core/names.h"
+#include "core/parse_number.h"
 #include "experiments/config.h"
 
 namespace arboretum {
@@ -16,12 +17,10 @@ namespace {
 template <class T>
 T number(const std::string& flag, std::string text, T low, T high) {
   if (text.ends_with('s')) text.pop_back();  // newer releases write 0.5s
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !(value >= low && value <= high)) {
+  const std::optional<T> value = parse_number<T>(text);
+  if (!value || !(*value >= low && *value <= high))
     throw UserError(fmt::format("{}: a number from {} to {}, not '{}'", flag, low, high, text));
-  }
-  return value;
+  return *value;
 }
 
 std::string one_of(const std::string& flag, const std::string& value, std::initializer_list<std::string_view> allowed) {

@@ -8,16 +8,17 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <new>
+#include <optional>
 #include <span>
 #include <system_error>
 
 #include "core/names.h"
+#include "core/parse_number.h"
 #include "experiments/append_file.h"
 #include "experiments/axis_words.h"
 #include "experiments/build_info.h"
@@ -42,9 +43,7 @@ struct Arguments {
 
 /// A whole number from 0 to 2^64 - 1. By itself the conversion takes -1 for 2^64 - 1.
 std::string refuse_no_count(const std::string& word) {
-  std::uint64_t number = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  return error == std::errc{} && end == word.data() + word.size()
+  return parse_number<std::uint64_t>(word)
              ? ""
              : fmt::format("'{}' is no whole number from 0 to {}", word, ~std::uint64_t{0});
 }
@@ -52,19 +51,16 @@ std::string refuse_no_count(const std::string& word) {
 /// CLI11's own ranges let NaN through, which then compares with nothing.
 auto number_from_to(double low, double high) {
   return [low, high](const std::string& word) -> std::string {
-    double number = 0.0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-    const bool whole = error == std::errc{} && end == word.data() + word.size();
-    return whole && number >= low && number <= high ? ""
-                                                    : fmt::format("'{}' is no number from {} to {}", word, low, high);
+    const std::optional<double> number = parse_number<double>(word);
+    return number && *number >= low && *number <= high
+               ? ""
+               : fmt::format("'{}' is no number from {} to {}", word, low, high);
   };
 }
 
 std::string refuse_not_positive(const std::string& word) {
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  const bool whole = error == std::errc{} && end == word.data() + word.size();
-  return whole && number > 0.0 ? "" : fmt::format("'{}' is no number above 0", word);
+  const std::optional<double> number = parse_number<double>(word);
+  return number && *number > 0.0 ? "" : fmt::format("'{}' is no number above 0", word);
 }
 
 void declare_run(CLI::App& app, RunCommand& run) {

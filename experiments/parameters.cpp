@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <optional>
 #include <stdexcept>
 
+#include "core/parse_number.h"
 #include "structures/parameter_limits.h"
 
 namespace arboretum {
@@ -44,10 +45,9 @@ std::string expectation(const Parameter<Set>& p) {
 
 template <class T>
 bool parse_within(const std::string& text, const ParameterLimits& limits, T& out) {
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !limits.hold(value)) return false;
-  out = value;
+  const std::optional<T> value = parse_number<T>(text);
+  if (!value || !limits.hold(*value)) return false;
+  out = *value;
   return true;
 }
 

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <set>
 #include <system_error>
 
 #include "core/error.h"
 #include "core/names.h"
+#include "core/parse_number.h"
 #include "core/whole_file.h"
 #include "scenes/yaml_node.h"
 
@@ -38,9 +40,8 @@ std::string shown(const YAML::Node& node) {
 
 /// The same text for the same number: 1, 1.0 and 1e0 are one value.
 std::string one_spelling(const std::string& word) {
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  return error == std::errc{} && end == word.data() + word.size() ? fmt::format("{}", number) : word;
+  const std::optional<double> number = parse_number<double>(word);
+  return number ? fmt::format("{}", *number) : word;
 }
 
 }  // namespace
@@ -85,23 +86,17 @@ std::string YamlReader::text(const YAML::Node& node, std::string_view what) cons
 
 std::uint64_t YamlReader::integer(const YAML::Node& node, std::string_view what, std::uint64_t low,
                                   std::uint64_t high) const {
-  std::uint64_t value = 0;
-  const std::string s = node.IsScalar() ? node.Scalar() : "";
-  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
-  if (s.empty() || error != std::errc{} || end != s.data() + s.size() || value < low || value > high) {
+  const auto value = parse_number<std::uint64_t>(node.IsScalar() ? node.Scalar() : "");
+  if (!value || *value < low || *value > high)
     fail(node, fmt::format("{} must be an integer from {} to {}, not {}", what, low, high, shown(node)));
-  }
-  return value;
+  return *value;
 }
 
 double YamlReader::number(const YAML::Node& node, std::string_view what, double low, double high) const {
-  double value = 0;
-  const std::string s = node.IsScalar() ? node.Scalar() : "";
-  const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
-  if (s.empty() || error != std::errc{} || end != s.data() + s.size() || !(value >= low && value <= high)) {
+  const auto value = parse_number<double>(node.IsScalar() ? node.Scalar() : "");
+  if (!value || !(*value >= low && *value <= high))
     fail(node, fmt::format("{} must be a number from {} to {}, not {}", what, low, high, shown(node)));
-  }
-  return value;
+  return *value;
 }
 
 std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, std::string_view what) const {

@@ -1,12 +1,13 @@
 // load_scene: the four ways in which a scene is named, one way out.
 #include <algorithm>
 #include <cctype>
-#include <charconv>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "core/error.h"
 #include "core/names.h"
+#include "core/parse_number.h"
 #include "scenes/catalogue.h"
 #include "scenes/generators/generators.h"
 #include "scenes/preflight.h"
@@ -37,13 +38,12 @@ std::vector<std::string> generator_names() {
 }
 
 std::uint64_t parse_whole_number(std::string_view text, std::string_view what, const std::string& word) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size())
+  const std::optional<std::uint64_t> value = parse_number<std::uint64_t>(text);
+  if (!value)
     throw UserError(
         fmt::format("scene '{}': {} '{}' is no whole number; write GENERATOR:TRIANGLES or GENERATOR:TRIANGLES:SEED",
                     word, what, text));
-  return value;
+  return *value;
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #include "scenes/ply_header.h"
 
-#include <charconv>
 #include <utility>
 
+#include "core/parse_number.h"
 #include "scenes/readers.h"
 
 namespace arboretum::ply {
@@ -58,11 +58,9 @@ Header parse_header(std::string_view text, const Failure& fail) {
         fail.line(number, fmt::format("unknown format '{}'; PLY has ascii, binary_little_endian, binary_big_endian",
                                       one_line(word[1])));
     } else if (word[0] == "element" && word.size() == 3) {
-      Element element{.name = std::string(word[1]), .count = 0, .properties = {}};
-      const auto [p, error] = std::from_chars(word[2].data(), word[2].data() + word[2].size(), element.count);
-      if (error != std::errc{} || p != word[2].data() + word[2].size())
-        fail.line(number, fmt::format("the number of elements '{}' is no whole number", one_line(word[2])));
-      header.elements.push_back(std::move(element));
+      const auto count = parse_number<decltype(Element::count)>(word[2]);
+      if (!count) fail.line(number, fmt::format("the number of elements '{}' is no whole number", one_line(word[2])));
+      header.elements.push_back({.name = std::string(word[1]), .count = *count, .properties = {}});
     } else if (word[0] == "property" && !header.elements.empty() && word.size() >= 3) {
       Property property;
       if (word[1] == "list") {

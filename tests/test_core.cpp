@@ -10,6 +10,7 @@
 #include "core/isa.h"
 #include "core/memory_meter.h"
 #include "core/names.h"
+#include "core/parse_number.h"
 #include "core/random.h"
 #include "core/ray.h"
 #include "core/reserved_array.h"
@@ -27,6 +28,16 @@ TEST_CASE("isa names go there and back") {
   CHECK_FALSE(parse_isa("avx3").has_value());
   CHECK(is_available(Isa::scalar));
   for (Isa isa : available_isas()) CHECK(cpu_supports(isa));
+}
+
+TEST_CASE("a number is all of its word") {
+  CHECK(parse_number<unsigned>("042") == 42u);
+  CHECK(parse_number<int>("-7") == -7);
+  CHECK(parse_number<double>("1e-3") == 1e-3);
+  for (const char* word : {"", " ", " 1", "1 ", "+1", "-1", "0x1", "1.0", "1a", "4294967296"})
+    CHECK_FALSE(parse_number<unsigned>(word));
+  for (const char* word : {"", " 1", "1 ", "+1", "0x1p3", "1e", "1e999", "1,5"})
+    CHECK_FALSE(parse_number<double>(word));
 }
 
 TEST_CASE("whole files are read to their last byte, and what cannot be read is an error") {
