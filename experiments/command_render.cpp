@@ -3,15 +3,16 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <optional>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/names.h"
+#include "core/parse_number.h"
 #include "core/timer.h"
 #include "experiments/append_file.h"
 #include "experiments/axis_words.h"
@@ -36,13 +37,11 @@ void set_resolution(const std::string& word, const Camera& camera, RenderSetting
     return;
   }
   const std::size_t cross = word.find('x');
-  const auto read = [](std::string_view text, unsigned& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc{} && end == text.data() + text.size();
-  };
-  if (cross == std::string::npos || !read(std::string_view(word).substr(0, cross), settings.width) ||
-      !read(std::string_view(word).substr(cross + 1), settings.height))
-    throw UserError(fmt::format("--resolution '{}' is no WIDTHxHEIGHT, as in 640x480", word));
+  const auto width = parse_number<unsigned>(std::string_view(word).substr(0, cross));
+  const auto height =
+      parse_number<unsigned>(cross == std::string::npos ? "" : std::string_view(word).substr(cross + 1));
+  if (!width || !height) throw UserError(fmt::format("--resolution '{}' is no WIDTHxHEIGHT, as in 640x480", word));
+  settings.width = *width, settings.height = *height;
   if (settings.width == 0 || settings.height == 0)
     throw UserError(fmt::format("--resolution {}: width and height must each be 1 or more, as in 640x480", word));
 }
@@ -60,15 +59,12 @@ bool draws_light(Integrator integrator) { return integrator == Integrator::path 
 std::optional<double> parse_exposure(const std::string& word, Integrator integrator) {
   if (word.empty() && !draws_light(integrator)) return 0.0;  // values within [0, 1] that mean the same in every picture
   if (word.empty() || word == "auto") return std::nullopt;
-  try {
-    std::size_t used = 0;
-    if (const double stops = std::stod(word, &used); used == word.size() && std::isfinite(stops)) {
-      check_exposure(stops);
-      return stops;
-    }
-  } catch (const std::logic_error&) {  // std::stod's way to say that it is no number
-  }
-  throw UserError(fmt::format("--exposure '{}' is neither 'auto' nor a number of stops", word));
+  const bool has_plus = word.size() > 1 && word[0] == '+' && word[1] != '-';  // as the exposure is printed
+  const std::optional<double> stops = parse_number<double>(std::string_view(word).substr(has_plus ? 1 : 0));
+  if (!stops || !std::isfinite(*stops))
+    throw UserError(fmt::format("--exposure '{}' is neither 'auto' nor a number of stops", word));
+  check_exposure(*stops);
+  return stops;
 }
 
 /// What knows no light simulates no effect of light.

@@ -48,6 +48,7 @@ class Render(CommandLineCase):
         self.assertIn("(exposure +0.00 stops", normals)
         self.assertIn("(exposure +0.00 stops", self.render("--integrator", "ambient_occlusion"))
         self.assertIn("(automatic exposure", self.render("--integrator", "normals", "--exposure", "auto"))
+        self.assertIn("(exposure +1.50 stops", self.render("--integrator", "normals", "--exposure", "+1.5"))
         self.assertIn("paths         depth 7, clamp 2.5\n", self.render("--depth", "7", "--clamp", "2.5"))
         for what in ("nodes", "triangles"):
             result = self.call("render", "cornell_box:600", "--resolution", "16x12", "--heatmap", what)
@@ -84,6 +85,7 @@ class Render(CommandLineCase):
             (("--resolution", "0x5"), "resolution 0x5"),
             (("--spp", "0"), "--spp"),
             (("--exposure", "bright"), "--exposure"),
+            *((("--exposure", word), f"--exposure '{word}' is neither 'auto' nor a number of stops") for word in ("0x1p3", " 1", "1 ", "nan", "inf", "+-1", "+", "1e999")),
             (("--out", "a.jpg"), ".png"),
             (("--out", "nowhere/a.png"), "no such folder"),
             (("--heatmap", "nodes", "--out", "a.pfm"), ".png"),
