@@ -198,12 +198,17 @@ function(arboretum_add_structures target)
   target_include_directories(${target} PRIVATE "${ARBORETUM_HEADERS}")
 endfunction()
 
-# The `arboretum` program with structures of one's own beside Arboretum's: `list` shows them, `run` sweeps them.
-function(arboretum_executable target)
+# What follows <target> in the arguments of the function `command` that calls it: words_STRUCTURES and words_LIBRARIES.
+macro(arboretum_parse_words command)
   cmake_parse_arguments(PARSE_ARGV 1 words "" "" "STRUCTURES;LIBRARIES")
   if(words_UNPARSED_ARGUMENTS)
-    message(FATAL_ERROR "arboretum_executable(${target}): unknown words '${words_UNPARSED_ARGUMENTS}'; use STRUCTURES <folder>... LIBRARIES <library>...")
+    message(FATAL_ERROR "${command}(${target}): unknown words '${words_UNPARSED_ARGUMENTS}'; use STRUCTURES <folder>... LIBRARIES <library>...")
   endif()
+endmacro()
+
+# The `arboretum` program with structures of one's own beside Arboretum's: `list` shows them, `run` sweeps them.
+function(arboretum_executable target)
+  arboretum_parse_words(arboretum_executable)
   if(NOT TARGET arboretum::experiments)
     message(FATAL_ERROR "arboretum_executable(${target}) needs find_package(arboretum REQUIRED COMPONENTS experiments)")
   endif()
@@ -227,7 +232,7 @@ endfunction()
 # Arboretum's tests of every kernel and its structure-level cases B01 to B30, over these structures and brute_force, which they are
 # compared with.
 function(arboretum_kernel_tests target)
-  cmake_parse_arguments(PARSE_ARGV 1 words "" "" "STRUCTURES;LIBRARIES")
+  arboretum_parse_words(arboretum_kernel_tests)
   if(NOT TARGET arboretum::tests)
     message(FATAL_ERROR "arboretum_kernel_tests(${target}) needs find_package(arboretum REQUIRED COMPONENTS tests)")
   endif()

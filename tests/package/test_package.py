@@ -88,6 +88,11 @@ def step_library():
                                           "find_package(arboretum REQUIRED COMPONENTS forest)\n")
     error = configure(wrong, wrong / "build", f"-DCMAKE_PREFIX_PATH={PREFIX}", expect=1).stderr
     check("forest" in error, f"an unknown component passes, or is not named: {error}")
+    for function in ("arboretum_executable", "arboretum_kernel_tests"):
+        (wrong / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(wrong LANGUAGES CXX)\n"
+                                              f"find_package(arboretum REQUIRED)\n{function}(mine STRUCTURE sorted_boxes)\n")
+        error = configure(wrong, wrong / "build", f"-DCMAKE_PREFIX_PATH={PREFIX}", expect=1).stderr
+        check("unknown words 'STRUCTURE;sorted_boxes'" in " ".join(error.split()), f"{function} takes any word: {error}")
 
 
 def step_structure():
