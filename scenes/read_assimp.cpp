@@ -154,8 +154,9 @@ class AssimpReader {
       triangulate(corners_, out.vertices, out.triangles);
     }
     if (mesh.HasTextureCoords(0)) add_texture_coordinates(mesh, first);
-    if (mesh.mMaterialIndex < scene_.materials.size())
-      out.materials.resize(out.triangles.size(), std::uint16_t(mesh.mMaterialIndex));
+    // One a triangle, whatever a file says: a mesh of no material that there is would put all later ones in disorder.
+    const bool is_there = mesh.mMaterialIndex < scene_.materials.size();
+    out.materials.resize(out.triangles.size(), is_there ? std::uint16_t(mesh.mMaterialIndex) : std::uint16_t{0});
   }
 
   /// Of the triangles since those that have some; meshes before this one without any have (0, 0).

@@ -331,6 +331,42 @@ std::string gltf_chain(std::size_t nodes) {
   return json + "]}";
 }
 
+/// Assimp's own dump of two triangles, a mesh each, of the materials with these numbers, and of two materials.
+std::string assbin_of(std::uint32_t first, std::uint32_t second) {
+  const auto numbers = [](std::string& s, std::initializer_list<std::uint32_t> all) {
+    for (const std::uint32_t number : all) put(s, number, false);
+  };
+  const auto chunk = [&](std::uint32_t kind, const std::string& bytes) {
+    std::string s;
+    numbers(s, {kind, std::uint32_t(bytes.size())});
+    return s + bytes;
+  };
+  std::string node, scene, s = "ASSIMP.binary-dump.";
+  numbers(node, {0});  // no name
+  for (int i = 0; i < 16; ++i) put(node, i % 5 == 0 ? 1.0f : 0.0f, false);
+  numbers(node, {0, 2, 0, 0, 1});  // children, meshes, metadata; which meshes
+  numbers(scene, {0, 2, 2, 0, 0, 0, 0});
+  scene += chunk(0x123c, node);
+  for (const std::uint32_t material : {first, second}) {
+    std::string mesh;
+    numbers(mesh, {4, 3, 1, 0, material, 1});  // triangles: 3 vertices, 1 face, no bones; positions alone
+    for (const float x : {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f}) put(mesh, x, false);
+    for (const int x : {3, 0, 1, 2}) put(mesh, std::uint16_t(x), false);
+    scene += chunk(0x1237, mesh);
+  }
+  for (int i = 0; i < 2; ++i) scene += chunk(0x123d, std::string(4, '\0'));
+  s.resize(44), numbers(s, {1, 0, 0, 0}), s.resize(512);
+  return s + chunk(0x1239, scene);
+}
+
+TEST_CASE("a mesh of a material that is not there has the first, and later ones keep theirs") {
+  const Folder folder;
+  using Ids = std::vector<std::uint16_t>;
+  CHECK(load_file(folder.write("good.assbin", assbin_of(1, 0))).mesh.materials == Ids{1, 0});
+  CHECK(load_file(folder.write("first.assbin", assbin_of(7, 1))).mesh.materials == Ids{0, 1});
+  CHECK(load_file(folder.write("last.assbin", assbin_of(1, 7))).mesh.materials == Ids{1, 0});
+}
+
 TEST_CASE("OBJ: lines that a backslash continues, comments behind faces, and every way to write a corner") {
   const Folder folder;
   const std::string points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvn 0 0 1\n";
