@@ -15,18 +15,18 @@ double upper_end(std::size_t bin) { return std::exp2(double(kLowest) + double(bi
 }  // namespace
 
 void ErrorHistogram::add(double error) {
-  if (bins_.empty()) bins_.resize(kBins);
-  double bin = 0;
-  if (error > 0) bin = std::ceil((std::log2(error) - kLowest) * kPerOctave);
-  ++bins_[static_cast<std::size_t>(std::clamp(bin, 0.0, double(kBins - 1)))];
+  double place = 0;
+  if (error > 0) place = std::ceil((std::log2(error) - kLowest) * kPerOctave);
+  const auto bin = static_cast<std::size_t>(std::clamp(place, 0.0, double(kBins - 1)));
+  if (bins_.size() <= bin) bins_.resize(bin + 1);
+  ++bins_[bin];
   ++count_;
   max_ = std::max(max_, error);
 }
 
 ErrorHistogram& ErrorHistogram::operator+=(const ErrorHistogram& other) {
-  if (other.bins_.empty()) return *this;
-  bins_.resize(kBins);
-  for (std::size_t i = 0; i < kBins; ++i) bins_[i] += other.bins_[i];
+  if (bins_.size() < other.bins_.size()) bins_.resize(other.bins_.size());
+  for (std::size_t i = 0; i < other.bins_.size(); ++i) bins_[i] += other.bins_[i];
   count_ += other.count_;
   max_ = std::max(max_, other.max_);
   return *this;

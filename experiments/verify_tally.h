@@ -22,7 +22,7 @@ class ErrorHistogram {
   [[nodiscard]] double max() const noexcept { return max_; }
 
  private:
-  std::vector<std::uint32_t> bins_;  ///< empty until the first error
+  std::vector<std::uint64_t> bins_;  ///< up to that of the largest error
   std::uint64_t count_ = 0;
   double max_ = 0;
 };

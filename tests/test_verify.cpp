@@ -184,6 +184,20 @@ TEST_CASE("the histogram's quantiles are within 4.5 %, its maximum exact") {
   CHECK(exact.quantile(0.99) == 0.0);
 }
 
+TEST_CASE("the histogram counts beyond 2^32 rays") {
+  ErrorHistogram h;
+  h.add(1.0), h.add(4.0), h.add(4.0);
+  for (int i = 0; i < 33; ++i) h += ErrorHistogram(h);
+  CHECK(h.count() == std::uint64_t{3} << 33);
+  CHECK(h.quantile(0.3) >= 1.0);
+  CHECK(h.quantile(0.3) <= 1.045);
+  CHECK(h.quantile(0.9) == 4.0);
+  ErrorHistogram sum;
+  sum.add(0.0), sum += h;
+  CHECK(sum.quantile(1.0) == 4.0);
+  CHECK(ErrorHistogram().quantile(0.5) == 0.0);
+}
+
 TEST_CASE("cells keep their promises on spheres, fans and boxes, near and far from the origin") {
   const Registry registry = this_registry();
   std::vector<VerifiedCell> cells = promising_cells(registry);
