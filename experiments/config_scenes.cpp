@@ -15,13 +15,6 @@
 namespace arboretum {
 namespace {
 
-std::vector<std::string> generator_names() {
-  std::vector<std::string> names;
-  for (const CatalogueEntry& entry : catalogue())
-    if (entry.source == CatalogueEntry::Source::generator) names.push_back(entry.name);
-  return names;
-}
-
 SceneSpec named(const std::string& name) {
   const CatalogueEntry entry = find_catalogue_entry(name);
   SceneSpec spec;

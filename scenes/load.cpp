@@ -31,12 +31,6 @@ bool is_yaml(const std::filesystem::path& path) {
   return extension == ".yaml" || extension == ".yml";
 }
 
-std::vector<std::string> generator_names() {
-  std::vector<std::string> names;
-  for (const GeneratorInfo& g : generators()) names.emplace_back(g.name);
-  return names;
-}
-
 std::uint64_t parse_whole_number(std::string_view text, std::string_view what, const std::string& word) {
   const std::optional<std::uint64_t> value = parse_number<std::uint64_t>(text);
   if (!value)

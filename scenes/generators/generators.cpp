@@ -38,13 +38,17 @@ static_assert(std::size(kInfos) == std::size(kFunctions));
 
 std::span<const GeneratorInfo> generators() { return kInfos; }
 
+std::vector<std::string> generator_names() {
+  std::vector<std::string> names;
+  for (const GeneratorInfo& info : kInfos) names.emplace_back(info.name);
+  return names;
+}
+
 namespace {
 
 /// The generator's place in the table.
 std::size_t checked(std::string_view name, std::size_t triangles, std::uint64_t seed) {
-  std::vector<std::string> names;
   for (std::size_t i = 0; i < std::size(kInfos); ++i) {
-    names.emplace_back(kInfos[i].name);
     if (kInfos[i].name != name) continue;
     if (triangles == 0 || triangles > kMaxGeneratedTriangles)
       throw UserError(
@@ -54,7 +58,7 @@ std::size_t checked(std::string_view name, std::size_t triangles, std::uint64_t 
           "generator {}: seed: {} would change nothing, since its shape has nothing random; leave it out", name, seed));
     return i;
   }
-  throw UserError(unknown_name_message("generator", name, names));
+  throw UserError(unknown_name_message("generator", name, generator_names()));
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "scenes/scene.h"
 
@@ -21,6 +23,7 @@ struct GeneratorInfo {
 };
 
 [[nodiscard]] std::span<const GeneratorInfo> generators();
+[[nodiscard]] std::vector<std::string> generator_names();
 
 /// Most triangles that a generator makes.
 inline constexpr std::size_t kMaxGeneratedTriangles = 500'000'000;
