@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -11,6 +12,7 @@
 #include "experiments/exclusion.h"
 #include "experiments/fnv.h"
 #include "experiments/sampling.h"
+#include "oracle/hard_rays.h"
 #include "rendering/hard_workload.h"
 #include "scenes/file_bytes.h"
 #include "scenes/sanitise.h"
@@ -120,7 +122,7 @@ void SceneData::note_to(NoteFunction note) {
 }
 
 void SceneData::place(const Placing& placing) {
-  const double by[3] = {placing.offset, -0.75 * placing.offset, 0.5 * placing.offset};
+  const std::array<double, 3> by = displacement(placing.offset);
   const auto move = [&](std::vector<Vec3f>& vertices) {
     for (Vec3f& v : vertices)
       for (std::size_t axis = 0; axis < 3; ++axis)

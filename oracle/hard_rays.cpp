@@ -265,8 +265,8 @@ TriangleMesh moved_and_scaled(const TriangleMesh& mesh, double offset, int expon
   TriangleMesh result = mesh;
   if (offset == 0.0 && exponent == 0) return result;
   result.instancing.reset();
+  const std::array<double, 3> by = displacement(offset);
   const auto move = [&](Vec3f& v) {
-    const double by[3] = {offset, -0.75 * offset, 0.5 * offset};
     for (std::size_t a = 0; a < 3; ++a) v[a] = std::ldexp(float(double(v[a]) + by[a]), exponent);
   };
   for (Vec3f& v : result.vertices) move(v);

@@ -76,7 +76,11 @@ class HardRayMaker {
   float radius_;
 };
 
-/// Every vertex v becomes (v + offset * (1, -3/4, 1/2)) * 2^exponent, rounded after the addition. Instances are laid
+/// offset * (1, -3/4, 1/2): by what a scene is moved, along no axis and no diagonal.
+[[nodiscard]] constexpr std::array<double, 3> displacement(double offset) noexcept {
+  return {offset, -0.75 * offset, 0.5 * offset};
+}
+/// Every vertex v becomes (v + displacement(offset)) * 2^exponent, rounded after the addition. Instances are laid
 /// out, but for offset 0 and exponent 0, which give a copy of the mesh.
 [[nodiscard]] TriangleMesh moved_and_scaled(const TriangleMesh& mesh, double offset, int exponent);
 
