@@ -12,14 +12,15 @@ namespace {
 /// No name of ours is nearly as long, nor near to one that is.
 constexpr std::size_t kLongestName = 100;
 
-std::string shortened(std::string_view name) {
-  if (name.size() <= kLongestName) return std::string(name);
-  std::size_t end = kLongestName;
-  while (end > 0 && continues_character(name[end])) --end;
-  return std::string(name.substr(0, end)) + "... (" + std::to_string(name.size()) + " characters)";
-}
-
 }  // namespace
+
+std::string shortened(std::string_view text, std::size_t most) {
+  if (text.size() <= most) return std::string(text);
+  std::size_t end = most;
+  while (end > 0 && continues_character(text[end])) --end;
+  const auto characters = text.size() - static_cast<std::size_t>(std::ranges::count_if(text, continues_character));
+  return std::string(text.substr(0, end)) + "... (" + std::to_string(characters) + " characters)";
+}
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
@@ -54,7 +55,7 @@ std::string close_name(std::string_view name, std::span<const std::string> candi
 
 std::string unknown_name_message(std::string_view kind, std::string_view name,
                                  std::span<const std::string> candidates) {
-  std::string message = "unknown " + std::string(kind) + " '" + shortened(name) + "'";
+  std::string message = "unknown " + std::string(kind) + " '" + shortened(name, kLongestName) + "'";
   name = name.substr(0, kLongestName);
   if (candidates.empty()) return message;
   const std::string close = close_name(name, candidates);

@@ -14,6 +14,9 @@ namespace arboretum {
 /// The nearest candidate, if it looks like a misspelling: at most a third of the longer word differs, or the first
 /// three letters are the same. Empty where none does.
 [[nodiscard]] std::string close_name(std::string_view name, std::span<const std::string> candidates);
+/// `text` for a message of one line: where it is longer than `most` bytes, whole characters of its start and its
+/// length.
+[[nodiscard]] std::string shortened(std::string_view text, std::size_t most);
 /// "unknown <kind> 'naem'; did you mean 'name'? (valid: a b c)": one line for UserError. Asks only for a close name,
 /// and shows the first 100 characters of a longer one.
 [[nodiscard]] std::string unknown_name_message(std::string_view kind, std::string_view name,

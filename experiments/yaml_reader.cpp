@@ -31,10 +31,7 @@ std::string read_configuration(const std::filesystem::path& file) {
 /// For a message of one line: a file that is no YAML may be one scalar from end to end.
 std::string shown(const YAML::Node& node) {
   constexpr std::size_t kMostShown = 60;
-  if (node.IsScalar()) {
-    const std::string& text = node.Scalar();
-    return text.size() <= kMostShown ? "'" + text + "'" : "'" + text.substr(0, kMostShown) + "…'";
-  }
+  if (node.IsScalar()) return fmt::format("'{}'", shortened(node.Scalar(), kMostShown));
   return node.IsSequence() ? "a list" : node.IsMap() ? "a map" : "nothing";
 }
 

@@ -49,6 +49,8 @@ TEST_CASE("every fault of a configuration is one line with file, line and the ne
       {"scenes: [bunny]\nmeasure: {resolution: 512}\n", ":2", "[width, height]"},
       {"scenes: [bunny]\nmeasure: {repetitions: -3}\n", ":2", "repetitions must be an integer"},
       {"scenes: [bunny]\nmeasure: {repetitions: 2.5}\n", ":2", "repetitions must be an integer"},
+      {"scenes: [bunny]\nmeasure: {repetitions: aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaüü}\n", ":2",
+       "not 'aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa... (61 characters)'"},
       {"scenes: [bunny]\nmeasure: {min_time: nan}\n", ":2", "min_time (seconds) must be a number"},
       {"scenes: [bunny]\nmeasure: {memory: 8GB}\n", ":2", "8GiB"},
       {"scenes: [bunny]\nmeasure: {repetition: 3}\n", ":2", "did you mean 'repetitions'"},

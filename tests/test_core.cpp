@@ -30,6 +30,13 @@ TEST_CASE("isa names go there and back") {
   for (Isa isa : available_isas()) CHECK(cpu_supports(isa));
 }
 
+TEST_CASE("long words are shortened between characters") {
+  CHECK(shortened("grüße", 7) == "grüße");
+  CHECK(shortened("grüße", 6) == "grüß... (5 characters)");
+  CHECK(shortened("grüße", 5) == "grü... (5 characters)");
+  CHECK(shortened("grüße", 3) == "gr... (5 characters)");
+}
+
 TEST_CASE("a number is all of its word") {
   CHECK(parse_number<unsigned>("042") == 42u);
   CHECK(parse_number<int>("-7") == -7);
