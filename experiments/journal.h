@@ -24,8 +24,8 @@ class Journal {
 
   /// Results of the cells that are done, by name.
   [[nodiscard]] const std::map<std::string, CellResult>& done() const noexcept { return done_; }
-  /// Repetitions of a cell that is not done, by index.
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
+  /// Repetitions of a cell that is not done, by index.
   [[nodiscard]] std::vector<Repetition> started(const std::string& name) const;
 
   void add(const std::string& name, const Repetition& repetition);
