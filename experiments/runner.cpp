@@ -15,6 +15,7 @@
 #include "experiments/build_job.h"
 #include "experiments/interleave.h"
 #include "experiments/json_text.h"
+#include "experiments/plan_record.h"
 #include "experiments/progress.h"
 #include "experiments/sampling.h"
 #include "experiments/scene_data.h"
@@ -104,9 +105,9 @@ class Runner {
   void refuse_changed(const SceneData& data) const {
     const auto begun = options_.geometry.find(data.name());
     if (begun == options_.geometry.end() || begun->second == data.geometry()) return;
-    throw UserError(fmt::format(
-        "scene {}: its geometry has changed since the run began; put its files back and go on with --resume",
-        data.name()));
+    throw UserError(
+        fmt::format("scene {} is not what it was when the run began ({}); put its files back and go on with --resume",
+                    data.name(), kHeldByGeometry));
   }
 
   /// Cells that share a structure stay together; as many structures are held at once as fit the memory.

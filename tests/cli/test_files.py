@@ -85,6 +85,22 @@ class Files(CommandLineCase):
         self.write("yard_scene.yaml", scene % 3)
         self.assert_error(self.call("run", config, "--no-plots", "--out", "out", "--resume"), "scene yard is not what out was measured with (geometry, camera")
 
+    def test_a_scene_that_changes_before_its_turn_ends_the_run(self):
+        self.write("model.obj", CUBE)
+        scene = "name: yard\nmeshes: [{file: model.obj}]\ncamera: {position: [%s, 2, 5], look_at: [0, 0, 0]}\n"
+        config = self.write("yard.yaml", MODEL.replace("{file: model.obj}", "sphere:200, {scene: yard_scene.yaml}"))
+        file = self.write("yard_scene.yaml", scene % 1)
+        run = subprocess.Popen([ARBORETUM, "run", config, "--no-plots", "--out", "out", "--benchmark_min_time=0.5"],
+                               cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        for _ in range(3000):
+            if (self.folder / "out/plan.json").exists():
+                break
+            time.sleep(0.01)
+        file.write_text(scene % 3)
+        errors = run.communicate(timeout=300)[1].splitlines()
+        self.assertEqual(run.returncode, 2, errors)
+        self.assertIn("arboretum: scene yard is not what it was when the run began (geometry, camera", errors[-1])
+
     def test_a_scene_with_another_shutter_material_or_image_is_another_scene(self):
         def model(name, material, move=0):
             self.write(f"{name}.obj", f"mtllib all.mtl\nusemtl {material}\n" + CUBE.replace("v 0 0 0", f"v {move} 0 0").replace("f 3 4 8", "usemtl plain\nf 3 4 8"))
