@@ -51,33 +51,46 @@ class Planner {
   }
 
  private:
+  /// The structures of a scene, as they are built.
   void product(std::size_t scene, const AxisLists& lists, std::vector<Cell>& out) {
-    const auto& values = [&](Axis a) -> const std::vector<std::string>& { return lists[index_of(a)]; };
-    for (const std::string& structure : values(Axis::structure))
-      for (const std::string& builder : builders_of(structure, values(Axis::builder)))
+    for (const std::string& structure : lists[index_of(Axis::structure)])
+      for (const std::string& builder : builders_of(structure, lists[index_of(Axis::builder)]))
         for (const ParameterPoint& point : points_)
-          for (const std::string& leaf : values(Axis::leaf))
-            for (const std::string& intersector : values(Axis::intersector))
-              for (const std::string& box : values(Axis::box))
-                for (const std::string& traversal : values(Axis::traversal))
-                  for (const std::string& call : values(Axis::call))
-                    for (const std::string& isa : values(Axis::isa))
-                      for (const std::string& workload : values(Axis::workload))
-                        for (SelfIntersection start : starts_of(workload))
-                          for (const std::string& threads : values(Axis::threads)) {
-                            Cell cell;
-                            cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
-                            cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
-                            cell.intersector = intersector, cell.box = box, cell.traversal = traversal;
-                            cell.call = call, cell.isa = *parse_isa(isa), cell.workload = workload;
-                            cell.threads = static_cast<unsigned>(std::stoul(threads));
-                            cell.parameters = point.parameters.builder, cell.parameter_label = point.label;
-                            cell.settings = point.parameters.traversal, cell.setting_label = point.traversal_label;
-                            cell.start = {start, experiment_.rays.epsilon};
-                            if (starts_of(workload).size() > 1)
-                              cell.start_label = fmt::format(":self_intersection={}", to_string(start));
-                            add(std::move(cell), out);
-                          }
+          for (const std::string& leaf : lists[index_of(Axis::leaf)]) {
+            Cell cell;
+            cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
+            cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
+            cell.parameters = point.parameters.builder, cell.parameter_label = point.label;
+            cell.settings = point.parameters.traversal, cell.setting_label = point.traversal_label;
+            add_kernels(cell, lists, out);
+          }
+  }
+
+  /// What traces such a structure.
+  void add_kernels(Cell cell, const AxisLists& lists, std::vector<Cell>& out) {
+    for (const std::string& intersector : lists[index_of(Axis::intersector)])
+      for (const std::string& box : lists[index_of(Axis::box)])
+        for (const std::string& traversal : lists[index_of(Axis::traversal)])
+          for (const std::string& call : lists[index_of(Axis::call)])
+            for (const std::string& isa : lists[index_of(Axis::isa)]) {
+              cell.intersector = intersector, cell.box = box, cell.traversal = traversal, cell.call = call;
+              cell.isa = *parse_isa(isa);
+              add_rays(cell, lists, out);
+            }
+  }
+
+  /// Which rays are traced so, and by how many threads.
+  void add_rays(Cell cell, const AxisLists& lists, std::vector<Cell>& out) {
+    for (const std::string& workload : lists[index_of(Axis::workload)]) {
+      const std::vector<SelfIntersection> starts = starts_of(workload);
+      for (const SelfIntersection start : starts)
+        for (const std::string& threads : lists[index_of(Axis::threads)]) {
+          cell.workload = workload, cell.threads = static_cast<unsigned>(std::stoul(threads));
+          cell.start = {start, experiment_.rays.epsilon};
+          cell.start_label = starts.size() > 1 ? fmt::format(":self_intersection={}", to_string(start)) : "";
+          add(cell, out);
+        }
+    }
   }
 
   /// The ways of leaving a surface that make cells of the workload; the usual one for rays that start elsewhere.
