@@ -77,7 +77,7 @@ class Cell:
         return self._estimates[name]
 
     def per_million(self, name):
-        """A count of answers per million of the rays that were checked; None where none were."""
+        """A count of answers per million of the rays that were checked, the most of any repetition; None where none were."""
         rates = [1e6 * row[name] / rays for row in self.rows if is_number(row.get(name)) and (rays := answered(row))]
         return max(rates) if rates else None
 
