@@ -81,7 +81,8 @@ def main():
                 raise
             except NoData as reason:
                 # `run` hides what is written here to stdout; that a figure which somebody named is not there must be seen.
-                print(f"{name}: left out, {reason}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch)) else sys.stdout)
+                print(f"{name}: left out, {reason}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch))
+                      else sys.stdout)
                 style.discard(results.folder, name)  # of a drawing before
                 drawn.append((name, module, "", str(reason)))
                 continue

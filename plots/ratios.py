@@ -53,7 +53,8 @@ def rows_of(comparison, metric):
         shared = f"{len(shown)} of {len(cells)} cells, those that differ most, called so or not" + (f"; {shared}" if shared else "")
     for name, cell in shown:
         ratio = cell["ratio"]  # of one repetition, which has no interval
-        rows.append((name, ratio, ratio if cell["ratio_low"] is None else cell["ratio_low"], ratio if cell["ratio_high"] is None else cell["ratio_high"], cell["verdict"]))
+        rows.append((name, ratio, ratio if cell["ratio_low"] is None else cell["ratio_low"], ratio if cell["ratio_high"] is None else cell["ratio_high"],
+                     cell["verdict"]))
     return rows, shared
 
 

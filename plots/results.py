@@ -143,7 +143,8 @@ class Results:
 
 
 def answered(row):
-    """How many rays the counts of answers of `row` are of: of a workload that is a picture, those that its renderer sends where exact answers lead it, else all; 0 where that is unknown."""
+    """How many rays the counts of answers of `row` are of: of a workload that is a picture, those that its renderer sends where exact answers lead it, else
+    all; 0 where that is unknown."""
     rays = next((row[name] for name in ("checked_rays", "rays") if is_number(row.get(name))), 0)
     return max(rays, 0)
 
@@ -194,7 +195,8 @@ def interval_words(counts):
     fewest = min(counts, default=0)
     return {"interval": "no interval, which a single repetition has not",
             "95 % interval": "the 95 % interval of the median",
-            "range": f"the range of the {fewest} repetitions, which covers the median {100 * coverage(fewest, 1):.0f} times in 100 (95 take {FEWEST_OF_INTERVAL} repetitions)" if fewest else "",
+            "range": f"the range of the {fewest} repetitions, which covers the median {100 * coverage(fewest, 1):.0f} times in 100 (95 take "
+                     f"{FEWEST_OF_INTERVAL} repetitions)" if fewest else "",
             "95 % interval or range": f"the 95 % interval of the median, of fewer than {FEWEST_OF_INTERVAL} repetitions their range"}[interval_name(counts)]
 
 

@@ -32,8 +32,9 @@ TALLEST = 8000  # pixels of a figure
 WIDEST = 17.0  # inches of scenes beside each other
 
 # Of fonts that have what DejaVu Sans lacks (Chinese, Japanese, Korean; then the rest of Unicode), those that are installed are asked for such characters.
-FALLBACK_FONTS = ("Noto Sans CJK JP", "Noto Sans CJK SC", "Noto Sans JP", "Noto Sans SC", "Source Han Sans", "IPAexGothic", "IPAGothic", "TakaoGothic", "VL Gothic", "WenQuanYi Zen Hei",
-                  "WenQuanYi Micro Hei", "Droid Sans Fallback", "Baekmuk Gulim", "NanumGothic", "Hiragino Sans", "Yu Gothic", "Noto Sans", "FreeSans", "Symbola", "Unifont")
+FALLBACK_FONTS = ("Noto Sans CJK JP", "Noto Sans CJK SC", "Noto Sans JP", "Noto Sans SC", "Source Han Sans", "IPAexGothic", "IPAGothic", "TakaoGothic",
+                  "VL Gothic", "WenQuanYi Zen Hei", "WenQuanYi Micro Hei", "Droid Sans Fallback", "Baekmuk Gulim", "NanumGothic", "Hiragino Sans", "Yu Gothic",
+                  "Noto Sans", "FreeSans", "Symbola", "Unifont")
 
 
 def font_families(installed):
@@ -55,7 +56,8 @@ if "text.parse_math" in plt.rcParams:  # from matplotlib 3.6 on: names of scenes
 
 class Palette:
     """Names that have a colour of their own, and spare colours for those that are new: by the name, or the next one free: the same in
-    every figure of a report unless two new names fall on one colour, then by the order in which they are drawn. Two names get the same only where there are more of them than spare colours."""
+    every figure of a report unless two new names fall on one colour, then by the order in which they are drawn. Two names get the same only where there are
+    more of them than spare colours."""
 
     def __init__(self, own, spare):
         self.own, self.spare, self.given = own, spare, {}
@@ -171,7 +173,8 @@ def structure_legend(structures):
             for s in ordered(structures, "structure")]
 
 
-BUILDER_MARKERS = {"binned_sah": "o", "sweep_sah": "s", "spatial_sah": "D", "morton": "^", "ploc": "v", "low": "<", "medium": ">", "high": "P", "octants": "h", "uniform": "X",
+BUILDER_MARKERS = {"binned_sah": "o", "sweep_sah": "s", "spatial_sah": "D", "morton": "^", "ploc": "v", "low": "<", "medium": ">", "high": "P", "octants": "h",
+                   "uniform": "X",
                    "two_level": "p"}
 builder_marker = Palette(BUILDER_MARKERS, ("*", "d", "H"))
 
@@ -248,9 +251,9 @@ def panel_title(scene, workload, width):
 
 
 def panel_grid(shown, places, width, height, most_columns, least_width=None):
-    """A panel for each (scene, place) of `shown`, titled; `places`, {place: words of the title}, gives their order. A scene begins a row, or stands beside the one
-    before where all panels of both fit. A figure that would be too tall has more columns than `most_columns`, up to WIDEST, of panels that are as narrow as `least_width`
-    where that is given. Gives the figure and {(scene, place): axis}."""
+    """A panel for each (scene, place) of `shown`, titled; `places`, {place: words of the title}, gives their order. A scene begins a row, or stands beside the
+    one before where all panels of both fit. A figure that would be too tall has more columns than `most_columns`, up to WIDEST, of panels that are as narrow as
+    `least_width` where that is given. Gives the figure and {(scene, place): axis}."""
     shown = dict.fromkeys(shown)  # in order, each once
     own = {scene: [place for place in places if (scene, place) in shown] for scene in dict.fromkeys(scene for scene, _ in shown)}
     lines, columns, beside = lines_of(own, width, most_columns)
@@ -288,7 +291,8 @@ def legends_right(figure, legends):
 def panels(rows, columns, width, height, **options):
     """A grid of axes, always two-dimensional. Sizes in inches, one panel's each. TooMuch where that is taller than can be read."""
     if not fits(height * rows):
-        raise TooMuch(f"it would be {DPI * height * rows:.0f} pixels tall ({TALLEST} at most); choose fewer scenes, workloads or builders, in the configuration or with --filter")
+        raise TooMuch(f"it would be {DPI * height * rows:.0f} pixels tall ({TALLEST} at most); choose fewer scenes, workloads or builders, in the "
+                      f"configuration or with --filter")
     figure, axes = plt.subplots(rows, columns, figsize=(width * columns, height * rows), squeeze=False,
                                 layout="constrained", **options)
     return figure, axes

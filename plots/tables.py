@@ -8,8 +8,8 @@ from results import STRUCTURE_AXES, axis_sort_key, interval_name, interval_words
 PER_MILLION = (("wrong_answers", "wrong"), ("missed_hits", "missed"), ("false_hits", "false"),
                ("wrong_surface", "wrong surface"), ("wrong_primitive", "wrong primitive"), ("cracks", "cracks"))
 
-SAH_STEP = ("A visit of a node counts as one step whatever the number of its children (of a grid, each cell crossed), and a leaf block as one test whatever the number of its triangles: "
-            "a lower cost of wider nodes or blocks is not less work by as much.")
+SAH_STEP = ("A visit of a node counts as one step whatever the number of its children (of a grid, each cell crossed), and a leaf block as one test whatever "
+            "the number of its triangles: a lower cost of wider nodes or blocks is not less work by as much.")
 
 
 def number(value, form="{:.3g}".format):
@@ -122,8 +122,8 @@ def throughput_table(results):
                                                ("interval_tests_per_ray", "interval tests/ray"), ("rays_per_node_visit", "rays/node visit"),
                                                ("rays_per_leaf_visit", "rays/leaf visit"), ("packet_share", "rays in packets"),
                                                ("stream_share", "rays in streams"), ("queued_share", "rays in flight"), ("single_share", "rays singly"),
-                                               ("switches_per_packet", "switches/packet"), ("rays_per_switch", "rays/switch"), ("node_queue_length", "nodes queued"),
-                                               ("leaf_queue_length", "leaves queued"))
+                                               ("switches_per_packet", "switches/packet"), ("rays_per_switch", "rays/switch"),
+                                               ("node_queue_length", "nodes queued"), ("leaf_queue_length", "leaves queued"))
              if any(c.value(name) is not None for c in cells)]
     if any(cell.value("hits") == 0 for cell in cells):
         extra.insert(0, ("hits", "rays that hit, %"))
@@ -156,16 +156,17 @@ def throughput_table(results):
             out.append(text(" ".join(f"{100 * share:.0f}" for share in cell.series("children_hit"))))
         rows.append((out, "best" if rate.median == best[beside(cell)] else ""))
     note = constant_axes(cells, [a for a in THROUGHPUT_AXES if a not in axes])
-    return (f'<p class="soft">Throughput: {escape(unit)}, the median of the repetitions, with {escape(interval_words(c.estimate(metric).samples for c in cells))}. Wrong answers are missed hits, false '
+    return (f'<p class="soft">Throughput: {escape(unit)}, the median of the repetitions, with '
+            f'{escape(interval_words(c.estimate(metric).samples for c in cells))}. Wrong answers are missed hits, false '
             f"hits and wrong surfaces against exact arithmetic; “wrong primitive” counts apart. The fastest "
             f"structure of a scene, workload and ISA is green. {escape('Same for all: ' + note + '.' if note else '')}</p>"
             + table("throughput", heads, rows))
 
 
-STRUCTURE_COLUMNS = (("build_seconds", "build, ms", 1e3), ("triangles_per_second", "Mtri/s", 1e-6), ("refit_seconds", "refit, ms", 1e3), ("sah_cost", "SAH cost", 1),
-                     ("sah_child_cost", "SAH, child boxes", 1), ("epo", "EPO", 1), ("lcv", "LCV", 1),
-                     ("duplication", "references/triangle", 1), ("leaf_fill", "leaf fill", 1), ("nodes", "nodes", 1), ("leaves", "leaves", 1), ("depth", "depth", 1),
-                     ("bytes_per_triangle", "bytes/triangle", 1), ("bytes", "MiB", 2.0**-20),
+STRUCTURE_COLUMNS = (("build_seconds", "build, ms", 1e3), ("triangles_per_second", "Mtri/s", 1e-6), ("refit_seconds", "refit, ms", 1e3),
+                     ("sah_cost", "SAH cost", 1), ("sah_child_cost", "SAH, child boxes", 1), ("epo", "EPO", 1), ("lcv", "LCV", 1),
+                     ("duplication", "references/triangle", 1), ("leaf_fill", "leaf fill", 1), ("nodes", "nodes", 1), ("leaves", "leaves", 1),
+                     ("depth", "depth", 1), ("bytes_per_triangle", "bytes/triangle", 1), ("bytes", "MiB", 2.0**-20),
                      ("peak_build_bytes", "peak while building, MiB", 2.0**-20))
 
 

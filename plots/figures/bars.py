@@ -25,7 +25,8 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
     if squares.are_due(bars.values(), varied):
         every = [c for c in results.structures if value_of(c)]
         varied = telling_axes(every, ("scene", "structure"), label_axes)
-        return squares.square_panels([(short(scene), [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label, higher_is_better=False)[0]
+        return squares.square_panels([(short(scene), [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label,
+                                     higher_is_better=False)[0]
 
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
@@ -62,7 +63,8 @@ def distinct(results, shown_of, label_axes):
 
 
 def without_doubles(cells, shown_of):
-    """A SAH cost that is the same for several ISAs, thread counts and leaf layouts is one bar, called by all of them: "all ISAs" where none of them differs. Threads go unsaid where several have the same."""
+    """A SAH cost that is the same for several ISAs, thread counts and leaf layouts is one bar, called by all of them: "all ISAs" where none of them differs.
+    Threads go unsaid where several have the same."""
     seen, kin = {}, {}
     for cell in cells:
         built = tuple(cell[a] for a in ("scene", "structure", "builder"))

@@ -5,10 +5,11 @@ from figures.trade_offs import MOST_NAMES, draw_panels, fastest_points, of_place
 from results import STRUCTURE_AXES
 
 TITLE = "Build time against trace time"
-CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. The grey steps join the points that no other beats in "
-           "both. Numbered are those that take the least time for build and rays together, each with the number of rays from which on it does: what its build takes more "
-           "than that of the number before, by what each ray takes less. Any other is best at no number of rays, or, where there are more than ten of them, over the shortest ranges. Of two points whose intervals "
-           "overlap in build time or in the time of a ray, neither is taken to be better in that; intervals are {interval}. Builds are measured in wall time, with as many threads as the rays beside them; "
+CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. The grey steps join the "
+           "points that no other beats in both. Numbered are those that take the least time for build and rays together, each with the number of rays from "
+           "which on it does: what its build takes more than that of the number before, by what each ray takes less. Any other is best at no number of rays, "
+           "or, where there are more than ten of them, over the shortest ranges. Of two points whose intervals overlap in build time or in the time of a ray, "
+           "neither is taken to be better in that; intervals are {interval}. Builds are measured in wall time, with as many threads as the rays beside them; "
            "with more threads both are faster, builds as a rule by less, and then slow ones pay later.")
 POWERS = ((1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k"), (1, ""))
 
@@ -26,7 +27,8 @@ def draw(results):
         return results.clock() if "CPU" in results.clock() else wall(threads)
 
     points = [p.scaled(1e3) for p in fastest_points(results.traces, metric, seconds)]
-    return draw_panels(of_places(points), lambda threads: f"build time, ms ({wall(threads)})", lambda threads: f"time, ns a ray\n({rays_are_of(threads)})", labelled)
+    return draw_panels(of_places(points), lambda threads: f"build time, ms ({wall(threads)})", lambda threads: f"time, ns a ray\n({rays_are_of(threads)})",
+                       labelled)
 
 
 def wall(threads):

@@ -35,4 +35,5 @@ def draw(results):
     if not rows_are_due(cells):
         return bar_panels(results, value, "bytes a triangle", note, AXES, parts)
     groups = groups_of(cells, varied, shown)
-    return bar_rows(groups, ordered((c["scene"] for c in cells), "scene"), value, parts, lambda c: note(c, ""), "bytes a triangle\n(in brackets: peak ÷ result)")
+    return bar_rows(groups, ordered((c["scene"] for c in cells), "scene"), value, parts, lambda c: note(c, ""),
+                    "bytes a triangle\n(in brackets: peak ÷ result)")

@@ -14,10 +14,10 @@ from results import ordered
 from style import legends_right
 
 TITLE = "Leaves by depth and by triangles"
-CAPTION = ("Two histograms of a structure's leaves: how deep they lie (the root's depth is 0) and how many triangles they hold (references: one that lies in two leaves counts "
-           "in both; 32 stands for more, too). A square's colour is the share of the leaves. The orange line is the mean, which is written beside the first; beside the second "
-           "is the leaf fill, the share of the lanes of leaf blocks that hold a triangle. Structures whose trees are the same in all rows share them. "
-           "Structures that cannot be looked into, as embree, have none.")
+CAPTION = ("Two histograms of a structure's leaves: how deep they lie (the root's depth is 0) and how many triangles they hold (references: one that lies in "
+           "two leaves counts in both; 32 stands for more, too). A square's colour is the share of the leaves. The orange line is the mean, which is written "
+           "beside the first; beside the second is the leaf fill, the share of the lanes of leaf blocks that hold a triangle. Structures whose trees are the "
+           "same in all rows share them. Structures that cannot be looked into, as embree, have none.")
 AXES = ("builder", "leaf", "isa")
 BOUNDS = (0, 1, 5, 10, 20, 40)  # %, where a colour begins
 SHADES = ("#E4EEF8", "#C6DCF1", "#9CC2E5", "#6299CF", "#2F6BA8", "#123E6B")
@@ -105,8 +105,8 @@ def runs(histogram):
 def means(axis, marks):
     """A line at the foot of the strip at each (place, mean) that lies within it."""
     found = [(place, at) for place, at in marks if at is not None and at <= axis.get_xlim()[1]]
-    axis.plot([x for _, at in found for x in (at, at, math.nan)], [y for place, _ in found for y in (place + 0.05, place + 0.42, math.nan)], color=MEAN, linewidth=1.3,
-              solid_capstyle="butt")
+    axis.plot([x for _, at in found for x in (at, at, math.nan)], [y for place, _ in found for y in (place + 0.05, place + 0.42, math.nan)], color=MEAN,
+              linewidth=1.3, solid_capstyle="butt")
 
 
 def beside(axis, place, text):

@@ -41,8 +41,8 @@ def draw_lines(results, key, value_of, label, why_none):
                 if not is_embree:
                     own_boxes.add(box)
                 fast = box == "fast" and not is_embree
-                axis.plot(list(sorted(line)), [scale(line[x], zero) for x in sorted(line)], color=intersector_colour(intersector), linewidth=(2.4 if fast else 1.3) + min(1.1 * beneath, 3.3),
-                          alpha=0.55 if fast else 1.0, linestyle=box_line(box),
+                axis.plot(list(sorted(line)), [scale(line[x], zero) for x in sorted(line)], color=intersector_colour(intersector),
+                          linewidth=(2.4 if fast else 1.3) + min(1.1 * beneath, 3.3), alpha=0.55 if fast else 1.0, linestyle=box_line(box),
                           marker="D" if is_embree else "o", markersize=5 if is_embree else 3.5, markerfacecolor="white" if is_embree else None, clip_on=False)
             xs = sorted({x for line in lines.values() for x in line})
             (log_with_zero if xs and xs[0] == 0 else log_axis)(axis, "x", xs)
@@ -94,7 +94,8 @@ class LeakScale:
                 lower, upper = (high + k * (self.first - high) for k in (0.3, 0.7))
                 axis.plot([0, 0], [lower, upper], color="white", linewidth=3, clip_on=False, transform=axis.get_yaxis_transform(), zorder=5)
                 for y in (lower, upper):
-                    axis.plot([0], [y], marker=[(-1, -0.6), (1, 0.6)], markersize=9, color="black", linestyle="", clip_on=False, transform=axis.get_yaxis_transform(), zorder=6)
+                    axis.plot([0], [y], marker=[(-1, -0.6), (1, 0.6)], markersize=9, color="black", linestyle="", clip_on=False,
+                              transform=axis.get_yaxis_transform(), zorder=6)
         axis.set_ylim(low if self.has_zero else self.first, max(high, self.last))
         axis.yaxis.set_major_locator(FixedLocator(([(low + high) / 2] if self.has_zero else []) + ticks))
         axis.yaxis.set_minor_locator(NullLocator())

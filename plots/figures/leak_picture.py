@@ -8,9 +8,9 @@ from results import CAMERA_EDGES, NoData, axis_sort_key, ordered
 from style import box_colour, boxes_in_order, legends_right, panels, short
 
 TITLE = "Where the leaks are"
-CAPTION = ("Rays from the camera at points of edges and at vertices (workload camera_edges): grey where they are aimed, as far as the camera sees it, "
-           "in colour where a ray passes through the surface unnoticed. What leaks with padded boxes too, the triangle test loses; what "
-           "leaks with fast boxes alone, the boxes lose. The first two scenes are shown. A panel shows at most 4000 leaks a box test; the numbers count all, per million rays.")
+CAPTION = ("Rays from the camera at points of edges and at vertices (workload camera_edges): grey where they are aimed, as far as the camera sees it, in "
+           "colour where a ray passes through the surface unnoticed. What leaks with padded boxes too, the triangle test loses; what leaks with fast boxes "
+           "alone, the boxes lose. The first two scenes are shown. A panel shows at most 4000 leaks a box test; the numbers count all, per million rays.")
 LARGEST, SMALLEST = 5.0, 2.2  # points: a leak of the box test that is drawn first, and last, above the others
 MOST_SCENES = 2
 
@@ -31,7 +31,8 @@ def draw(results):
         seen = seen_points(results.folder, scene)
         for axis, key in zip(row, keys):
             panel(axis, seen, scene, key, found[scene][key], boxes, len(scenes) > 1)
-    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=box_colour(box), label=f"{box} boxes")
+    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5,
+                                                                     color=box_colour(box), label=f"{box} boxes")
                                            for box, size in boxes.items()])])
     return figure
 

@@ -9,5 +9,5 @@ CAPTION = ("The scene is stretched along one axis; a triangle's aspect is its lo
 
 
 def draw(results):
-    return draw_lines(results, "stretch", lambda cell: cell.value("triangle_aspect_median"), lambda family, of: "longest edge over height of a triangle, median",
-                      "no scene is stretched in several ways and met by hard rays")
+    return draw_lines(results, "stretch", lambda cell: cell.value("triangle_aspect_median"),
+                      lambda family, of: "longest edge over height of a triangle, median", "no scene is stretched in several ways and met by hard rays")

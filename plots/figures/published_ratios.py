@@ -14,9 +14,10 @@ from style import WRONG, colour, hatch, is_wrong, legends_right, log_axis, panel
 from tables import STRUCTURE_COLUMNS
 
 TITLE = "Beside published figures"
-CAPTION = ("Bars: ratios of the medians of this run, or the median itself where a panel sets no two things side by side, with what their intervals leave, each {interval}. Diamonds, "
-           "of a span one at each end, of several bars with dashes across them: the published figures, from other machines and mostly other scenes (the sources stand below the figure); a panel "
-           "without them shows a claim that was published in words. The line is 1: no difference. A red number: some of the answers of its cells are wrong (the table has how many).")
+CAPTION = ("Bars: ratios of the medians of this run, or the median itself where a panel sets no two things side by side, with what their intervals leave, each "
+           "{interval}. Diamonds, of a span one at each end, of several bars with dashes across them: the published figures, from other machines and mostly "
+           "other scenes (the sources stand below the figure); a panel without them shows a claim that was published in words. The line is 1: no difference. A "
+           "red number: some of the answers of its cells are wrong (the table has how many).")
 ONLY_WHEN_NAMED = True
 PUBLISHED = Path(__file__).resolve().parent.parent / "published"
 TIME = "time"  # the inverse of the throughput

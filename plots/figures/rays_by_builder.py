@@ -4,7 +4,8 @@ from figures import squares
 from figures.bars import draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short, wrong_legend, wrong_marker, wrong_text
+from style import (MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short, wrong_legend, wrong_marker,
+                   wrong_text)
 from tables import digits
 
 TITLE = "Rays per second by structure and builder"
@@ -62,8 +63,8 @@ def draw(results):
                 axis.plot(cell.estimate(metric).median / 1e6, place, markers[modes.label(cell)], color=edge(cell), markersize=4,
                           markerfacecolor="white", markeredgewidth=0.8)
             if is_wrong(bar):
-                axis.annotate(wrong_text(bar), (value(bar)[2], place), (5 + 6 * len(digits(value(bar)[0])) + 6, 0), textcoords="offset points", va="center", fontsize=8,
-                              color=WRONG)
+                axis.annotate(wrong_text(bar), (value(bar)[2], place), (5 + 6 * len(digits(value(bar)[0])) + 6, 0), textcoords="offset points", va="center",
+                              fontsize=8, color=WRONG)
         axis.set_title(titles[keys[index]])
         axis.set_xlabel(unit)
     legends = [("mode", marker_legend(markers))] if markers else []

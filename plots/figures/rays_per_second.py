@@ -4,13 +4,13 @@ from matplotlib.lines import Line2D
 
 from figures.modes import Modes
 from results import NoData, ordered
-from style import (MARKERS, WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend, wrong_legend,
-                   wrong_marker, wrong_text)
+from style import (MARKERS, WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend,
+                   wrong_legend, wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
-CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}, "
-           "dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
-           "reaches, per million rays. Those of each cell stand in the table.")
+CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}, dots, where modes are more than markers, the medians alone. "
+           "Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar reaches, per million "
+           "rays. Those of each cell stand in the table.")
 DIGIT = 0.032  # of a panel's height, that a character of a number above a bar takes
 
 
@@ -52,7 +52,8 @@ def panel(axis, cells, metric, isas, structures, modes, markers):
                      linewidth=0.5)
             if is_wrong(fastest):
                 top = max(e.high if markers else e.median for _, e in here) / 1e6
-                axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom", fontsize=7.5, color=WRONG)
+                axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom", fontsize=7.5,
+                              color=WRONG)
             if not markers:  # too many modes to tell apart: where they lie is still seen
                 for cell, value in here:
                     axis.plot(x, value.median / 1e6, ".", color=edge(cell), markersize=2.5)

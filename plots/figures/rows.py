@@ -64,7 +64,8 @@ def row_panels(groups, scenes, widths, room=0.0, title_of=short, together=1):
     bands = -(-len(scenes) // max(together, int(WIDEST / one) // together * together))
     beside = -(-len(scenes) // (bands * together)) * together
     columns = beside * len(widths)
-    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True, gridspec_kw={"width_ratios": widths * beside})
+    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True,
+                          gridspec_kw={"width_ratios": widths * beside})
     found = {}
     for place in range(bands * beside):
         first = place % beside * len(widths)
@@ -103,7 +104,8 @@ def bar_rows(groups, scenes, value_of, parts_of, note_of, axis_label, part="part
             axis.barh(place, end, 0.78, edgecolor="white", linewidth=0, **look(cell, parts_of(cell)))
             axis.annotate(note_of(cell), (end, place), (3, 0), textcoords="offset points", va="center", fontsize=FONT - 0.5)
         for name, bars in by_part(here, parts_of).items():
-            axis.barh([place for place, _, _ in bars], [value for _, _, value in bars], 0.78, left=[left for _, left, _ in bars], color=part_colour(name), linewidth=0)
+            axis.barh([place for place, _, _ in bars], [value for _, _, value in bars], 0.78, left=[left for _, left, _ in bars], color=part_colour(name),
+                      linewidth=0)
         axis.set_xlim(0, most or max(ends, default=0) or 1.0)
         axis.set_xlabel(axis_label, fontsize=FONT + 1)
     legends_right(figure, parts_legend(part, [(parts_of(c), value_of(c)[0], c) for _, row in places for c in row.cells.values()]))

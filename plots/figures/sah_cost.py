@@ -5,7 +5,8 @@ from tables import SAH_STEP
 
 TITLE = "SAH cost"
 CAPTION = ("Expected cost of a ray through the root's box, in units of a leaf block test. Lower is better. Structures that "
-           "cannot be looked into, as embree, have none. " + SAH_STEP + " With a step for each child box instead, the cost stands in the report's table of structures.")
+           "cannot be looked into, as embree, have none. " + SAH_STEP + " With a step for each child box instead, the cost stands in the "
+           "report's table of structures.")
 
 
 def draw(results):

@@ -8,9 +8,9 @@ from results import NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_map, panels, plain, short
 
 TITLE = "Leaving a surface"
-CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass through what "
-           "they should meet, against the exact answer of the ray that starts at the hit point itself, its own primitive left out. "
-           "A ray that meets its own surface ends there, and is quick. Zero stands on the left line.")
+CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass "
+           "through what they should meet, against the exact answer of the ray that starts at the hit point itself, its own primitive left out. A ray that "
+           "meets its own surface ends there, and is quick. Zero stands on the left line.")
 WAYS = ("none", "epsilon", "integer_offset", "error_bound", "exclusion")
 FAULTS = (("self_hits_per_million", "own surface met,\nper million"), ("near_hits_per_million", "neighbour met too early,\nper million"),
           ("leaks_per_million", "passed through,\nper million"))
@@ -37,7 +37,8 @@ def draw(results):
                     continue
                 own = intersector_colour(cell["intersector"])
                 place = ways.index(way_of(cell)) + 0.7 * ((slots.index((cell["intersector"], base(cell))) + 0.5) / len(slots) - 0.5)
-                axis.plot(value, place, linestyle="", marker=markers[base(cell)], color=own, markersize=4.5, markerfacecolor="white", markeredgewidth=1.1, clip_on=False)
+                axis.plot(value, place, linestyle="", marker=markers[base(cell)], color=own, markersize=4.5, markerfacecolor="white", markeredgewidth=1.1,
+                          clip_on=False)
             if row == len(scenes) - 1:
                 axis.set_xlabel(label)
             if column == 0:
@@ -55,7 +56,8 @@ def draw(results):
             axes[0][column].xaxis.set_major_formatter(lambda v, _: plain(v))
     if others := [s for s in ordered((c["scene"] for c in results.traces), "scene") if s not in scenes]:
         figure.supxlabel("not shown, as no secondary rays were measured: " + fill(", ".join(others), 90), fontsize=8.5, color="#555555")
-    handles = [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="white", markersize=5, label=w.replace("_", " ")) for w, m in markers.items()]
+    handles = [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="white", markersize=5, label=w.replace("_", " "))
+               for w, m in markers.items()]
     legends_right(figure, [("intersector", intersector_legend(intersectors)), ("workload", handles)])
     return figure
 

@@ -15,7 +15,8 @@ MOST_ROWS_BELOW = 20
 WORDS = {"isa": "instruction set", "threads": "number of threads"}  # of axes, where their names are none
 SPAN = 100  # of the colours
 NOTHING = 1e-6  # of the largest: written as 0
-SHADES = LinearSegmentedColormap.from_list("better", ["#E4EEF8", "#C6DCF1", "#8FBCE6", "#4A8FC9", "#1F5A96"])  # none is white: that is where nothing was measured
+# none is white: that is where nothing was measured
+SHADES = LinearSegmentedColormap.from_list("better", ["#E4EEF8", "#C6DCF1", "#8FBCE6", "#4A8FC9", "#1F5A96"])
 
 
 def are_due(bars_of_panels, varied):
@@ -24,8 +25,8 @@ def are_due(bars_of_panels, varied):
 
 
 def square_panels(cells_of, varied, value_of, text_of, quantity, higher_is_better):
-    """A panel for each (title, cells) of `cells_of`, whose cells structure and the axes `varied` tell apart: builders across (where they are not varied, the axis of most
-    keys), the rest down. `value_of(cell)` gives (median, low, high), `text_of(median)` what stands in a square. Gives the figure, which
+    """A panel for each (title, cells) of `cells_of`, whose cells structure and the axes `varied` tell apart: builders across (where they are not varied, the
+    axis of most keys), the rest down. `value_of(cell)` gives (median, low, high), `text_of(median)` what stands in a square. Gives the figure, which
     has the words for its caption, and [(axis, {(x, y): cell})]."""
     every = [c for _, cells in cells_of for c in cells]
     across = "builder" if "builder" in varied else max(varied, key=lambda a: len({c[a] for c in every}))
@@ -110,8 +111,8 @@ def panel(axis, values, columns, rows, text_of, higher_is_better):
             if value is None:
                 axis.text(x, y, "–", ha="center", va="center", fontsize=8, color="#BBBBBB")
             else:
-                axis.text(x, y, text_of(value) if value > nothing else "0", ha="center", va="center", fontsize=8, color="white" if grid[y, x] > 0.7 else "#222222",
-                          fontweight="bold" if value == best else "normal")
+                axis.text(x, y, text_of(value) if value > nothing else "0", ha="center", va="center", fontsize=8,
+                          color="white" if grid[y, x] > 0.7 else "#222222", fontweight="bold" if value == best else "normal")
     axis.set_yticks(range(len(rows)), rows, fontsize=8.5)
     axis.set_xticks(range(len(columns)), columns, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
     axis.set_xticks([x - 0.5 for x in range(1, len(columns))], minor=True)

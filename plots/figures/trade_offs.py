@@ -11,12 +11,14 @@ from matplotlib.transforms import ScaledTranslation
 
 from figures.names import bar_label, label
 from results import STRUCTURE_AXES, Estimate, NoData, TooMuch, axis_sort_key, ordered, telling_axes
-from style import MORE_MARKERS, WRONG, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend, wrong_marker
+from style import (MORE_MARKERS, WRONG, builder_marker, colour, is_wrong, legends_right, log_axis, most_wrong, panel_grid, structure_legend, wrong_legend,
+                   wrong_marker)
 
 TRACED = (*STRUCTURE_AXES, "workload")
 PLACE = ("scene", "workload", "isa", "threads")
 NAMED_BY = ("builder", "leaf")
-# Inches: of a panel at least; left of its axes; of a line of the names below it, and of a character there; from the axes' left edge to their numbers, markers and words.
+# Inches: of a panel at least; left of its axes; of a line of the names below it, and of a character there; from the axes' left edge to their numbers, markers
+# and words.
 WIDTH, HEIGHT, LEFT, LINE, CHARACTER = 3.3, 2.6, 0.75, 0.145, 0.062
 NUMBER_AT, MARKER_AT, WORDS_AT = -0.47, -0.27, -0.18
 FONT = 7.5
@@ -42,7 +44,8 @@ def of_one_number_of_threads(cells):
 
 
 def fastest_points(cells, metric, x_of, told_apart_by=TRACED):
-    """A point for each structure as built, traced in its fastest mode, of those cells of which `x_of` is known, on each scene, workload, instruction set and number of threads."""
+    """A point for each structure as built, traced in its fastest mode, of those cells of which `x_of` is known, on each scene, workload, instruction set and
+    number of threads."""
     best = {}
     for cell in cells:
         rate, x = cell.estimate(metric), x_of(cell)
@@ -82,8 +85,8 @@ def of_places(points):
 
 
 def draw_panels(places, x_label, y_label, named_of):
-    """A panel for each of `places`, as of_places() gives them. `x_label(threads)` and `y_label(threads)` name the axes; `named_of(points)` gives (point, text) of those
-    that get a number, by x, the text what is said of it."""
+    """A panel for each of `places`, as of_places() gives them. `x_label(threads)` and `y_label(threads)` name the axes; `named_of(points)` gives (point, text)
+    of those that get a number, by x, the text what is said of it."""
     points = [p for here in places.values() for p in here]
     varied = telling_axes([p.cell for p in points], ("scene", "structure", "isa", "threads"), NAMED_BY)
     columns = sorted({place[1:] for place in places}, key=lambda rest: [axis_sort_key(a)(v) for a, v in zip(PLACE[1:], rest)])
@@ -151,14 +154,15 @@ def reinserted(builder):
 def mark(axis, x, y, cell, markers, size=6.0, **more):
     """A point; a white dot in its middle where nodes were reinserted."""
     wrong = is_wrong(cell)
-    axis.plot(x, y, linestyle="", marker=markers[cell["builder"]], color=colour(cell["structure"]), markersize=size, markeredgecolor=WRONG if wrong else "white",
-              markeredgewidth=0.8 if wrong else 0.5, **more)
+    axis.plot(x, y, linestyle="", marker=markers[cell["builder"]], color=colour(cell["structure"]), markersize=size,
+              markeredgecolor=WRONG if wrong else "white", markeredgewidth=0.8 if wrong else 0.5, **more)
     if reinserted(cell["builder"]):
         axis.plot(x, y, "o", color="white", markersize=0.32 * size, markeredgewidth=0, **more)
 
 
 def builder_legend(markers):
-    """Handles, one a marker, named by what shares it: the variants of a builder, a builder and its kin, or the builder where only a reinserted one or Embree's of our trees has it; and what the white dot is."""
+    """Handles, one a marker, named by what shares it: the variants of a builder, a builder and its kin, or the builder where only a reinserted one or Embree's
+    of our trees has it; and what the white dot is."""
     names = {}
     for builder, marker in markers.items():
         names.setdefault(marker, {}).setdefault(kind(builder), builder)
@@ -170,7 +174,8 @@ def builder_legend(markers):
     handles = [Line2D([], [], linestyle="", marker=marker, color="#444444", markeredgewidth=0, markersize=6, label=said(kinds))
                for marker, kinds in names.items()]
     if any(map(reinserted, markers)):
-        handles.append(Line2D([], [], linestyle="", marker="o", markersize=4.5, color="white", markeredgecolor="#444444", markeredgewidth=2, label="…_reinsertion: white dot"))
+        handles.append(Line2D([], [], linestyle="", marker="o", markersize=4.5, color="white", markeredgecolor="#444444", markeredgewidth=2,
+                              label="…_reinsertion: white dot"))
     return handles
 
 
@@ -180,9 +185,11 @@ def names_below(axis, named, varied, markers):
     for line, (point, text) in enumerate(named):
         down = -0.56 - LINE * line
         for x, words, weight in ((NUMBER_AT, str(line + 1), "bold"), (WORDS_AT, bar_label(point.cell, varied), "normal")):
-            axis.annotate(words, (0, 0), (72 * x, 72 * down), xycoords="axes fraction", textcoords="offset points", va="center", fontsize=FONT, fontweight=weight)
+            axis.annotate(words, (0, 0), (72 * x, 72 * down), xycoords="axes fraction", textcoords="offset points", va="center", fontsize=FONT,
+                          fontweight=weight)
         axis.annotate(text, (1, 0), (0, 72 * down), xycoords="axes fraction", textcoords="offset points", ha="right", va="center", fontsize=FONT)
-        mark(axis, 0, 0, point.cell, markers, 5.0, transform=axis.transAxes + ScaledTranslation(MARKER_AT, down, scale), clip_on=False, scalex=False, scaley=False)
+        mark(axis, 0, 0, point.cell, markers, 5.0, transform=axis.transAxes + ScaledTranslation(MARKER_AT, down, scale), clip_on=False, scalex=False,
+             scaley=False)
 
 
 def numbers(axis, named):
@@ -191,11 +198,13 @@ def numbers(axis, named):
     dot = axis.figure.dpi / 72
     taken = [(x, y, 3.5 * dot) for x, y in at]
     for i, (x, y) in enumerate(at):
-        places = [(dx, dy) for far in (8.5, 14, 20) for dx, dy in ((-0.7 * far, -0.7 * far), (0, -far), (-far, 0), (0.7 * far, -0.7 * far), (-0.7 * far, 0.7 * far), (0, far), (far, 0))]
-        free = (p for p in places if x + p[0] * dot > axis.bbox.x0 + 4.5 * dot and y + p[1] * dot > axis.bbox.y0 + 5 * dot and all((x + p[0] * dot - a) ** 2 + (y + p[1] * dot - b) ** 2 > (r + 3.6 * dot) ** 2 for a, b, r in taken))
+        places = [(dx, dy) for far in (8.5, 14, 20) for dx, dy in ((-0.7 * far, -0.7 * far), (0, -far), (-far, 0), (0.7 * far, -0.7 * far),
+                                                                   (-0.7 * far, 0.7 * far), (0, far), (far, 0))]
+        free = (p for p in places if x + p[0] * dot > axis.bbox.x0 + 4.5 * dot and y + p[1] * dot > axis.bbox.y0 + 5 * dot
+                and all((x + p[0] * dot - a) ** 2 + (y + p[1] * dot - b) ** 2 > (r + 3.6 * dot) ** 2 for a, b, r in taken))
         dx, dy = next(free, places[0])
         taken.append((x + dx * dot, y + dy * dot, 4.0 * dot))
-        text = axis.annotate(str(i + 1), (named[i][0].x.median, named[i][0].y.median), (dx, dy), textcoords="offset points", ha="center", va="center", fontsize=8,
-                             fontweight="bold", zorder=6, annotation_clip=False)
+        text = axis.annotate(str(i + 1), (named[i][0].x.median, named[i][0].y.median), (dx, dy), textcoords="offset points", ha="center", va="center",
+                             fontsize=8, fontweight="bold", zorder=6, annotation_clip=False)
         text.set_path_effects([withStroke(linewidth=1.8, foreground="white")])
         text.set_in_layout(False)

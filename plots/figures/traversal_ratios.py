@@ -12,15 +12,17 @@ from results import NoData, ordered
 from style import panels, short
 
 TITLE = "Ways of traversal"
-CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set with as many threads (where the sweep has no Embree: of the structure's "
-           "own single rays: below a workload's name stands which). Medians; blue is faster, orange slower. The last column of a workload is the geometric mean of its scenes. "
-           "Framed red: ways with wrong answers. Where an instruction set would have more than 60 rows, a row is a structure and way of traversal, on each scene by its fastest builder, leaf and tests.")
+CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set with as many threads (where the sweep has "
+           "no Embree: of the structure's own single rays: below a workload's name stands which). Medians; blue is faster, orange slower. The last column of a "
+           "workload is the geometric mean of its scenes. Framed red: ways with wrong answers. Where an instruction set would have more than 60 rows, a row is "
+           "a structure and way of traversal, on each scene by its fastest builder, leaf and tests.")
 MOST_ROWS = 60
 # Blue to orange by way of white: readers with any colour vision can tell the ends apart.
 COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FEE9CF", "#FFFFFF", "#D3E4F3", "#5C9BCF", "#1F5A96"])
 MEAN = "mean"
 LONGEST_SCENE = 30  # characters of a name below or above its column
-COLUMN, CHARACTER, ROW_CHARACTER = 0.52, 0.078, 0.062  # inches: of a column at least; of a character of a workload's name above its columns, of a row's name beside it
+# inches: of a column at least; of a character of a workload's name above its columns, of a row's name beside it
+COLUMN, CHARACTER, ROW_CHARACTER = 0.52, 0.078, 0.062
 SMALL = 0.8  # of that size: above a single column
 KEY = ((0.5, "half or less"), (0.7, "0.7"), (1.0, "1"), (1.4, "1.4"), (2.0, "twice or more"))
 ONLY_WHEN_NAMED = True
@@ -50,7 +52,8 @@ def draw(results):
         image = panel(axis, table, rows[isa], columns, headings[isa], isa + (": fastest builder, leaf and tests of each" if fastest_alone else ""))
         fastest = fastest_cells([c for c in cells if c["isa"] == isa], modes, metric)
         mark_wrong(axis, {(x, y): fastest[row][place] for y, row in enumerate(rows[isa]) for x, place in enumerate(columns) if place in fastest[row]})
-    key = figure.colorbar(image, ax=list(axes.flat), location="right", anchor=(0.0, 1.0), shrink=min(1.0, 2.4 / figure.get_size_inches()[1]), aspect=14, pad=0.01)
+    key = figure.colorbar(image, ax=list(axes.flat), location="right", anchor=(0.0, 1.0), shrink=min(1.0, 2.4 / figure.get_size_inches()[1]), aspect=14,
+                          pad=0.01)
     key.set_ticks([math.log2(value) for value, _ in KEY], labels=[text for _, text in KEY])
     key.ax.set_title("rays a second,\na multiple of …", fontsize=9, loc="left", pad=10)
     key.outline.set_visible(False)
@@ -86,7 +89,8 @@ def ratios(cells, modes, metric):
                 base[owner, place] = max(base.get((owner, place), 0.0), rate)
     table = {}
     for (structure, mode), row in fastest_cells(cells, modes, metric).items():
-        compared = {p: c.estimate(metric).median / b for p, c in row.items() if (b := base.get(("embree", compared_at(c))) or base.get((structure, compared_at(c))))}
+        compared = {p: c.estimate(metric).median / b for p, c in row.items()
+                    if (b := base.get(("embree", compared_at(c))) or base.get((structure, compared_at(c))))}
         if compared:
             table[structure, mode] = compared
     return table
@@ -116,7 +120,8 @@ def headings_of(columns, cells, wide):
     for workload, count in spans_of(columns):
         places = {compared_at(c) for c in cells if c["workload"] == workload}
         with_embree = {compared_at(c) for c in cells if c["workload"] == workload and c["structure"] == "embree"}
-        to = "" if not places else "… Embree's fastest" if with_embree == places else "… Embree's fastest, or own single rays" if with_embree else "… own single rays"
+        to = ("" if not places else "… Embree's fastest" if with_embree == places
+              else "… Embree's fastest, or own single rays" if with_embree else "… own single rays")
         most = max(4, int(count * wide / (CHARACTER * (SMALL if count == 1 else 1.0))))
         found.append("\n".join(wrap(" ".join(words_of(workload)), most, break_long_words=False) + wrap(to, most, break_long_words=False)).replace("= ", "="))
     return found

@@ -7,10 +7,12 @@ from results import Cell, NoData, ordered, telling_axes
 from style import legends_right, log_axis, panel_title
 
 TITLE = "Visits and tests of a ray"
-CAPTION = ("Nodes and leaves that a ray visits, and tests of a ray against child boxes and triangles, counted in a pass of its own, untimed; the numbers beside the points are the same, in the legend's order. "
-           "Fewer are better, but not each costs the same: a node's boxes, or a block's triangles, are tested together, and a visit by rays together (packets, streams) is one of each of them. "
-           "A grid's nodes are the cells that the ray crosses. Of several workloads the figure shows one of coherent rays and one of incoherent ones (the latter alone where there are many rows), of several instruction sets the widest. "
-           "Rows that differ in leaf, tests or threads alone and show the same numbers are one. Structures that cannot be looked into, as embree, have none.")
+CAPTION = ("Nodes and leaves that a ray visits, and tests of a ray against child boxes and triangles, counted in a pass of its own, untimed; the numbers "
+           "beside the points are the same, in the legend's order. Fewer are better, but not each costs the same: a node's boxes, or a block's triangles, are "
+           "tested together, and a visit by rays together (packets, streams) is one of each of them. A grid's nodes are the cells that the ray crosses. Of "
+           "several workloads the figure shows one of coherent rays and one of incoherent ones (the latter alone where there are many rows), of several "
+           "instruction sets the widest. Rows that differ in leaf, tests or threads alone and show the same numbers are one. Structures that cannot be looked "
+           "into, as embree, have none.")
 TESTS = ("leaf", "intersector", "box", "threads")
 AXES = ("builder", "traversal", *TESTS)
 COUNTS = (("nodes_per_ray", "nodes visited", "o", "#332288"), ("leaves_per_ray", "leaves visited", "D", "#117733"),
@@ -84,14 +86,16 @@ def strip(axis, rows):
         found = [(place, values[i]) for place, values in rows if values[i] > 0]
         if not found:
             continue  # an empty line that is not clipped would be given room at the figure's corner
-        axis.plot([v for _, v in found], [place for place, _ in found], marker, color=shade, markersize=3.6, markeredgewidth=0.9 if marker in "|x" else 0, linestyle="", clip_on=False)
+        axis.plot([v for _, v in found], [place for place, _ in found], marker, color=shade, markersize=3.6, markeredgewidth=0.9 if marker in "|x" else 0,
+                  linestyle="", clip_on=False)
     log_axis(axis, "x", [v for _, values in rows for v in values if v > 0])
     axis.set_xlabel("visits and tests a ray", fontsize=FONT + 1)
     for place, values in rows:
         for i, (value, (*_, shade)) in enumerate(zip(values, COUNTS)):
-            axis.annotate(short_number(value), (1, place), (72 * COLUMN * (i + 1), 0), xycoords=("axes fraction", "data"), textcoords="offset points", ha="right", va="center",
-                          fontsize=FONT - 1, color=shade)
+            axis.annotate(short_number(value), (1, place), (72 * COLUMN * (i + 1), 0), xycoords=("axes fraction", "data"), textcoords="offset points",
+                          ha="right", va="center", fontsize=FONT - 1, color=shade)
 
 
 def short_number(value):
-    return "0" if value == 0 else f"{value:.2f}" if value < 1 else f"{value:.1f}" if value < 100 else f"{value:.0f}" if value < 9999.5 else f"{value / 1e3:.0f}k"
+    return ("0" if value == 0 else f"{value:.2f}" if value < 1 else f"{value:.1f}" if value < 100 else f"{value:.0f}" if value < 9999.5
+            else f"{value / 1e3:.0f}k")
