@@ -1,28 +1,27 @@
 #include "experiments/build_job.h"
 
 #include <algorithm>
-#include <cmath>
 
+#include "experiments/passes.h"
 #include "experiments/warm_up.h"
 
 namespace arboretum {
 
 void BuildJob::prepare(Json& facts, StructurePool& pool, const MeasureSettings& measure) {
-  // A build is long beside the clock's grain; one that takes less than this is repeated within the
-  // repetition.
-  constexpr double kEnoughSeconds = 0.02;
-  constexpr double kMostBuilds = 10'000;
   BuildReport report;
   const auto accel = registry_.build(cell_.structure, mesh_, settings_of(cell_), report);
   facts.update(pool.facts(cell_, *accel));
   facts["peak_build_bytes"] = report.peak_bytes;
-  warm_up(0, measure.min_warmup_time, [&] {
+  const auto build = [&] {
     BuildReport again;
     static_cast<void>(registry_.build(cell_.structure, mesh_, settings_of(cell_), again));
-  });
-  const double enough = std::min(kEnoughSeconds, measure.min_time);
-  builds_ =
-      static_cast<std::uint64_t>(std::clamp(std::ceil(enough / std::max(report.seconds, 1e-9)), 1.0, kMostBuilds));
+    return again.seconds;
+  };
+  warm_up(0, measure.min_warmup_time, build);
+  // The first build finds memory cold, but not so cold that this would not tell.
+  constexpr double kLong = 4.0;
+  const double enough = std::min(kEnoughOfBuilds, measure.min_time);
+  if (report.seconds < kLong * enough) builds_ = passes_lasting(enough, kMostBuilds, build);
 }
 
 Repetition BuildJob::measure(TimedLoop& loop) const {

@@ -11,8 +11,9 @@ class BuildJob {
   BuildJob(const Cell& cell, const TriangleMesh& mesh, const Registry& registry)
       : cell_(cell), mesh_(mesh), registry_(registry) {}
 
-  /// The first build is the warm-up: its time says how many builds fill a repetition, its structure gives the
-  /// facts. Throws what the build throws.
+  /// The first build is the warm-up, and its structure gives the facts; those after it say how many builds last
+  /// `min_time` seconds of wall time, or kEnoughOfBuilds, without what is done around them. Throws what the build
+  /// throws.
   void prepare(Json& facts, StructurePool& pool, const MeasureSettings& measure);
   [[nodiscard]] std::uint64_t builds() const noexcept { return builds_; }
   [[nodiscard]] Repetition measure(TimedLoop& loop) const;

@@ -50,7 +50,9 @@ struct MeasureSettings {
   unsigned repetitions = 7;
   unsigned warmup = 1;           ///< untimed passes over all rays before the first repetition
   double min_warmup_time = 0.0;  ///< seconds that the untimed passes last at least
-  double min_time = 0.2;         ///< seconds that one repetition lasts at least
+  /// Seconds that the passes of one repetition last at least; builds, kEnoughOfBuilds where that is less. So long as
+  /// kMostPasses and kMostBuilds allow it (experiments/passes.h).
+  double min_time = 0.2;
   unsigned width = 512, height = 512;
   std::size_t memory = std::size_t{8} << 30;  ///< bytes of structures held at once
   std::uint64_t seed = 1;

@@ -1,9 +1,9 @@
 #include "experiments/render_job.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/timer.h"
+#include "experiments/passes.h"
 #include "experiments/warm_up.h"
 
 namespace arboretum {
@@ -48,12 +48,15 @@ void RenderJob::prepare(Json& facts, SceneData& data, const MeasureSettings& mea
   if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";
 
   warm_up(measure.warmup, measure.min_warmup_time, [&] { static_cast<void>(render()); });
-  const double begin = wall_seconds();
-  const RenderStatistics statistics = render();
-  const double pass = std::max(wall_seconds() - begin, 1e-9);
+  const auto seconds = cell_.threads == 1 ? thread_cpu_seconds : wall_seconds;
+  RenderStatistics statistics;
+  passes_ = passes_lasting(measure.min_time, kMostPasses, [&] {
+    const double begin = seconds();
+    statistics = render();
+    return seconds() - begin;
+  });
   facts["rays"] = statistics.total().rays;
   facts["shading_share"] = statistics.seconds > 0.0 ? 1.0 - statistics.total().seconds / statistics.seconds : 0.0;
-  passes_ = static_cast<std::uint64_t>(std::clamp(std::ceil(measure.min_time / pass), 1.0, 1e6));
 }
 
 Repetition RenderJob::measure(TimedLoop& loop) const {

@@ -224,18 +224,23 @@ std::vector<std::string> run_warnings(const RunOutcome& outcome, const Plan& pla
   std::vector<std::string> warnings;
   const bool cpu = by_cpu_time(outcome);
   std::size_t noisy = 0;
+  std::size_t noisy_builds = 0;
   const CellResult* worst = nullptr;
   for (const CellResult& r : outcome.results) {
     if (relative_spread(r, cpu) <= kWide) continue;
     ++noisy;
+    if (!r.is_trace()) ++noisy_builds;
     if (!worst || relative_spread(r, cpu) > relative_spread(*worst, cpu)) worst = &r;
   }
   if (worst) {
     warnings.push_back(
         fmt::format("noisy machine: the repetitions of {} of {} spread by more than {:.0f} % (most: {:.0f} % in "
-                    "{}); raise min_time or repetitions, or free the machine",
+                    "{}); raise {}, or free the machine",
                     noisy, counted(outcome.results.size(), "cell"), kWide * 100, relative_spread(*worst, cpu) * 100,
-                    worst->cell.name()));
+                    worst->cell.name(),
+                    noisy_builds == noisy ? "repetitions"
+                    : noisy_builds > 0    ? "min_time (builds heed it little) or repetitions"
+                                          : "min_time or repetitions"));
   }
   for (const auto& [scene, rays] : views_of_nothing(outcome))
     warnings.push_back(

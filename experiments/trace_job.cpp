@@ -3,11 +3,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/timer.h"
 #include "experiments/call_axis.h"
 #include "experiments/exclusion.h"
+#include "experiments/passes.h"
 #include "experiments/warm_up.h"
 
 namespace arboretum {
@@ -15,8 +15,7 @@ namespace {
 
 constexpr std::size_t kRaysPerTask = 4096;  // at least: 64 x 64 pixels of the Morton order
 constexpr std::size_t kTasksPerThread = 8;  // at least; `auto` finds out anew in each task how its rays go
-constexpr std::uint64_t kMostPasses = 1'000'000;
-constexpr std::size_t kMostPoints = 4000;  // of a cell's leaks
+constexpr std::size_t kMostPoints = 4000;   // of a cell's leaks
 
 }  // namespace
 
@@ -115,10 +114,12 @@ void TraceJob::prepare(Json& facts, SceneData& data, const MeasureSettings& meas
   if (cell_.kernel->tests) facts["leaf_tests"] = cell_.kernel->leaves_compiled_in ? "compiled in" : "called";
 
   warm_up(measure.warmup, measure.min_warmup_time, [&] { trace(rays); });
-  const double begin = wall_seconds();
-  trace(rays);
-  const double pass = std::max(wall_seconds() - begin, 1e-9);
-  passes_ = static_cast<std::uint64_t>(std::clamp(std::ceil(measure.min_time / pass), 1.0, double(kMostPasses)));
+  const auto seconds = cell_.threads == 1 ? thread_cpu_seconds : wall_seconds;
+  passes_ = passes_lasting(measure.min_time, kMostPasses, [&] {
+    const double begin = seconds();
+    trace(rays);
+    return seconds() - begin;
+  });
 }
 
 Repetition TraceJob::measure(TimedLoop& loop) const {

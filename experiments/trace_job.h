@@ -24,8 +24,8 @@ class TraceJob {
   TraceJob(const Cell& cell, const Accel& accel, const Workload& workload, AnswerBuffers& buffers);
 
   /// Traces all rays once and adds `rays`, `hits` and the check against the exact answers to
-  /// the facts; counts the work with the counting kernel; then warms up and finds how many passes take
-  /// `min_time` seconds.
+  /// the facts; counts the work with the counting kernel; then warms up and finds how many passes last
+  /// `min_time` seconds, by the clock that rates are of: the thread's CPU time, of several threads wall time.
   void prepare(Json& facts, SceneData& data, const MeasureSettings& measure);
   [[nodiscard]] std::uint64_t passes() const noexcept { return passes_; }
   /// One repetition: wall time, and CPU time of the thread (of the process where the cell has several).

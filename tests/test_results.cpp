@@ -289,12 +289,15 @@ TEST_CASE("warnings: repetitions that lie apart, however few; a camera that look
   const Folder folder;
   const Registry registry = paper_registry();
   const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
-  const auto warned = [&](const std::vector<double>& seconds, std::size_t hits, const char* part) {
+  const auto warned = [&](const std::vector<double>& seconds, std::size_t hits, const char* part,
+                          const std::vector<std::size_t>& cells = {1}) {
     RunOutcome outcome;
-    CellResult& result = outcome.results.emplace_back(result_of(plan.cells[1]));
-    result.facts["hits"] = hits;
-    result.repetitions.clear();
-    for (unsigned i = 0; i < seconds.size(); ++i) result.repetitions.push_back(repetition(i, seconds[i]));
+    for (std::size_t cell : cells) {
+      CellResult& result = outcome.results.emplace_back(result_of(plan.cells[cell]));
+      result.facts["hits"] = hits;
+      result.repetitions.clear();
+      for (unsigned i = 0; i < seconds.size(); ++i) result.repetitions.push_back(repetition(i, seconds[i]));
+    }
     const std::vector<std::string> warnings = run_warnings(outcome, plan, 4);
     return std::ranges::any_of(warnings, [&](const std::string& w) { return w.find(part) != std::string::npos; });
   };
@@ -304,6 +307,11 @@ TEST_CASE("warnings: repetitions that lie apart, however few; a camera that look
   for (const std::vector<double>& near :
        {std::vector{1.0}, {1.0, 1.02}, {1.0, 1.02, 0.99}, {1.0, 1.0, 1.01, 1.0, 1.0, 1.0, 1.9}})
     CHECK(!warned(near, 1, "noisy"));
+  CHECK(warned({1.0, 1.1}, 1, "; raise min_time or repetitions, or free the machine"));
+  // Builds last no longer for a longer min_time.
+  REQUIRE(plan.cells[0].metric == Cell::Metric::build);
+  CHECK(warned({1.0, 1.1}, 1, "; raise repetitions, or free the machine", {0}));
+  CHECK(warned({1.0, 1.1}, 1, "; raise min_time (builds heed it little) or repetitions, or free", {0, 1}));
   CHECK(warned({1.0}, 0, "none of the 1000 primary rays hits sphere-500: its camera looks past it"));
   CHECK(!warned({1.0}, 1, "looks past it"));
 }
