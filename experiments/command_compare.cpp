@@ -89,6 +89,7 @@ ExitStatus command_compare(const CompareCommand& command) {
   filter_cells(a, command.filter, command.skip), filter_cells(b, command.filter, command.skip);
   CompareOptions options = command.options;
   options.other_scenes = different_scenes(a, b);
+  options.settings = setting_differences(a.path, b.path);
   Comparison comparison = compare_results(a.cells, b.cells, options);
   if (a.cells.empty() && b.cells.empty() && of_a + of_b > 0)
     comparison.left_nothing =
@@ -96,7 +97,7 @@ ExitStatus command_compare(const CompareCommand& command) {
                     counted(of_a, "cell"), counted(of_b, "cell"));
   const auto [status, why] = verdict(comparison);
   if (command.json != "-" && command.csv != "-") {
-    fmt::print("{}{}", origins_text(a, b), comparison_text(comparison, command.all));
+    fmt::print("{}{}", origins_text(a, b, options.settings), comparison_text(comparison, command.all));
     if (status != ExitStatus::kNothingMeasured) fmt::print("\n{}\n", why);
   }
   // After the text: what fails here takes nothing from it.

@@ -118,6 +118,8 @@ void declare_compare(CLI::App& app, CompareCommand& compare) {
   c->add_flag("--all", compare.all, "Also list indistinguishable cells where there are many");
   c->add_flag("--allow-different-machines", compare.allow_different_machines,
               "Compare although CPU, compiler or flags differ");
+  c->add_flag("--allow-different-settings", compare.options.allow_different_settings,
+              "Compare cells of other parameters, resolution or self-intersection, too");
   c->add_option("--json", compare.json, "Write the comparison to this file as JSON (-: stdout)");
   c->add_option("--csv", compare.csv, "Write the cells to this file as CSV (-: stdout)");
   c->add_option("--plot", compare.plot, "Draw the ratios with their intervals to this file (.png, .svg, .pdf)");

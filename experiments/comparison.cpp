@@ -64,7 +64,10 @@ class Comparer {
       const auto found = of_b.find(name);
       if (found == of_b.end()) {
         out_.only_a.push_back(name);
-      } else if (std::string why = other_work(r, *found->second, out_.options.other_scenes); !why.empty()) {
+      } else if (std::string why = other_settings(r, *found->second, out_.options); !why.empty()) {
+        out_.incomparable.emplace_back(name, std::move(why));
+        ++out_.other_settings;
+      } else if (why = other_work(r, *found->second, out_.options.other_scenes); !why.empty()) {
         out_.incomparable.emplace_back(name, std::move(why));
       } else {
         ComparedCell& cell = out_.cells.emplace_back();
@@ -73,6 +76,18 @@ class Comparer {
     }
     for (const CellResult& r : b)
       if (!of_a.contains(r.cell.name())) out_.only_b.push_back(r.cell.name());
+  }
+
+  /// The first setting by which the two did other work although their names are equal; empty: none.
+  static std::string other_settings(const CellResult& a, const CellResult& b, const CompareOptions& options) {
+    if (options.allow_different_settings) return {};
+    const auto way = [](const CellResult& r) { return r.facts.value("self_intersection", ""); };
+    if (a.has_fact("self_intersection") && b.has_fact("self_intersection") && way(a) != way(b))
+      return fmt::format("self_intersection {} in A, {} in B", way(a), way(b));
+    for (const SettingDifference& d : options.settings)
+      if (concerns(d, a.cell) || (d.name == "rays: epsilon" && way(a) == to_string(SelfIntersection::epsilon)))
+        return fmt::format("{} {} in A, {} in B", d.name, d.a, d.b);
+    return {};
   }
 
   /// Why the two do not compare although their names are equal; empty where they do.

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "experiments/comparison_settings.h"
 #include "experiments/result.h"
 #include "experiments/sampling.h"
 #include "experiments/significance.h"
@@ -26,6 +27,8 @@ struct CompareOptions {
   /// those of builds to its builds'; empty: none
   std::string control = {};
   std::set<std::string> other_scenes = {};  ///< names of scenes that hold something else in B than in A
+  std::vector<SettingDifference> settings = {};
+  bool allow_different_settings = false;  ///< cells that did other work for them, or left surfaces otherwise, compare
   bool strict = false;  ///< an undecided cell whose whole interval is beyond the limit on the slow side is a regression
 };
 
@@ -70,6 +73,7 @@ struct Comparison {
   std::vector<ComparedCell> cells;                                ///< in A's order
   std::vector<std::string> only_a, only_b;                        ///< names
   std::vector<std::pair<std::string, std::string>> incomparable;  ///< in both, but not the same work: name and reason
+  std::size_t other_settings = 0;                                 ///< of these, those that settings tell apart
   std::vector<MeanRatio> means;
   std::vector<StructureChange> structures;
   /// What left nothing to compare: "--filter 'zzz' leaves none of A's 12 cells nor of B's 12 cells".

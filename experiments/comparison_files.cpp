@@ -62,10 +62,12 @@ std::string comparison_json(const Comparison& comparison, const ResultFolder& a,
   json["options"] = {{"min_difference_percent", o.min_difference},
                      {"significance", o.significance},
                      {"control", o.control},
-                     {"strict", o.strict}};
+                     {"strict", o.strict},
+                     {"allow_different_settings", o.allow_different_settings}};
   json["a"] = folder_json(a), json["b"] = folder_json(b);
   Json& differences = json["differences"] = Json::array();
   for (const std::string& line : machine_differences(a.context, b.context)) differences.push_back(line);
+  for (const SettingDifference& d : o.settings) differences.push_back(d.text());
   Json& cells = json["cells"] = Json::array();
   for (const ComparedCell& c : comparison.cells) cells.push_back(cell_json(c));
   Json& means = json["geometric_means"] = Json::array();

@@ -307,7 +307,7 @@ std::string busy_text(const ResultFolder& a, const ResultFolder& b) {
 
 }  // namespace
 
-std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
+std::string origins_text(const ResultFolder& a, const ResultFolder& b, const std::vector<SettingDifference>& settings) {
   std::string text = origin("A", a) + origin("B", b);
   std::error_code ignored;
   if (std::filesystem::equivalent(a.path, b.path, ignored)) text += "A and B are one folder: nothing can differ\n";
@@ -323,6 +323,7 @@ std::string origins_text(const ResultFolder& a, const ResultFolder& b) {
     text +=
         "differs: configuration (effective.yaml); cells are matched by name, and compared where rays and triangles are "
         "as many\n";
+  for (const SettingDifference& setting : settings) text += fmt::format("differs: {}\n", setting.text());
   return text + busy_text(a, b);
 }
 
@@ -334,7 +335,10 @@ std::string comparison_text(const Comparison& comparison, bool all) {
   }
   std::vector<std::string> other;
   for (const auto& [name, why] : comparison.incomparable) other.push_back(fmt::format("{}: {}", name, why));
-  return text + name_list(other, "in both that did other work, not compared:") +
+  const std::string how = comparison.other_settings == 0
+                              ? ""
+                              : " (--allow-different-settings compares those that did it for other settings)";
+  return text + name_list(other, fmt::format("in both that did other work, not compared{}:", how)) +
          name_list(comparison.only_a, "only in A:") + name_list(comparison.only_b, "only in B:");
 }
 

@@ -9,8 +9,9 @@
 
 namespace arboretum {
 
-/// Where A and B come from, and by what of configuration or machine they differ.
-[[nodiscard]] std::string origins_text(const ResultFolder& a, const ResultFolder& b);
+/// Where A and B come from, and by what of configuration (`settings` by name) or machine they differ.
+[[nodiscard]] std::string origins_text(const ResultFolder& a, const ResultFolder& b,
+                                       const std::vector<SettingDifference>& settings = {});
 /// Tables of cells, means, wrong answers and structures. Many indistinguishable cells are left out unless `all`.
 [[nodiscard]] std::string comparison_text(const Comparison& comparison, bool all);
 /// kDone, kRegression or kNothingMeasured, and one line that says why.

@@ -318,6 +318,64 @@ TEST_CASE("cells are matched by name; other work is not compared; nothing in com
   CHECK(verdict(compare_results({a.front()}, {b.back()}, {})).first == ExitStatus::kNothingMeasured);
 }
 
+TEST_CASE("cells of other settings that stand in no name are other work, and only those that the setting concerns") {
+  std::vector<CellResult> a = run(1), b = run(1);
+  for (CellResult& r : b) slow_down(r, 2.0);
+  const auto compared = [&](const CompareOptions& options) {
+    std::map<std::string, std::string> why;
+    const Comparison c = compare_results(a, b, options);
+    for (const auto& [name, reason] : c.incomparable) why.emplace(name, reason);
+    CHECK(c.other_settings == c.incomparable.size());
+    CHECK(c.cells.size() + why.size() == a.size());
+    return why;
+  };
+  const auto name = [](const char* structure, Cell::Metric metric = Cell::Metric::trace) {
+    return cell_named(structure, metric).name();
+  };
+  CHECK(compared({}).empty());
+  // The kd-tree's builder knows no width that is collapsed to: bvh8 reads it for its nodes and the build cell as well.
+  const SettingDifference collapse{"parameters: collapse", "[sah]", "[greedy]"};
+  const auto of_collapse = compared({.settings = {collapse}});
+  CHECK(of_collapse.at(name("bvh8")) == "parameters: collapse [sah] in A, [greedy] in B");
+  CHECK(of_collapse.contains(name("bvh8", Cell::Metric::build)));
+  CHECK(!of_collapse.contains(name("kdtree")));
+  CHECK(compared({.settings = {collapse}, .allow_different_settings = true}).empty());
+  // What is swept is in the names.
+  CHECK(compared({.settings = {{"parameters: bins", "[4]", "[4, 64]"}, {"measure: repetitions", "3", "7"}}}).empty());
+  CHECK(compared({.settings = {{"measure: resolution", "[512, 256]", "[256, 512]"}}}).size() == 4);  // no builds
+  CHECK(compared({.settings = {{"parameters: hybrid_threshold", "[2]", "[3]"}}}).empty());
+  for (CellResult* r : {find(a, "bvh4"), find(b, "bvh4")}) r->cell.traversal = "hybrid8";
+  CHECK(compared({.settings = {{"parameters: hybrid_threshold", "[2]", "[3]"}}}).size() == 1);
+  // How rays leave surfaces is a fact of each row; the distance is told by the configuration.
+  find(a, "bvh2")->facts["self_intersection"] = "none";
+  find(b, "bvh2")->facts["self_intersection"] = "exclusion";
+  CHECK(compared({}).at(name("bvh2")) == "self_intersection none in A, exclusion in B");
+  CHECK(compared({.allow_different_settings = true}).empty());
+  for (CellResult* r : {find(a, "bvh2"), find(b, "bvh2")}) r->facts["self_intersection"] = "epsilon";
+  CHECK(compared({.settings = {{"rays: epsilon", "0.001", "0.01"}}}).size() == 1);
+  const Comparison none = compare_results({*find(a, "bvh8")}, {*find(b, "bvh8")}, {.settings = {collapse}});
+  CHECK(verdict(none).first == ExitStatus::kNothingMeasured);
+  CHECK(comparison_text(none, false).find("(--allow-different-settings compares those") != std::string::npos);
+  CHECK(Json::parse(comparison_json(none, {}, {}))["differences"][0] == "parameters: collapse: [sah] against [greedy]");
+}
+
+TEST_CASE("the settings by which two folders differ are read from their effective.yaml") {
+  const Folder a, b;
+  const char* yaml =
+      "scenes:\n  - {{file: {}}}\naxes:\n  isa: [sse]\nparameters:\n  bins: [{}]\n{}rays: {{self_intersection: [{}]}}\n"
+      "measure:\n  structure_cache: {}\n  repetitions: {}\n  resolution: [8, 8]\nmetrics: [trace]\n";
+  (void)a.write("effective.yaml", fmt::format(fmt::runtime(yaml), "/here/x.obj", "4", "", "none", "/a", 3));
+  (void)b.write("effective.yaml",
+                fmt::format(fmt::runtime(yaml), "/there/x.obj", "4, 64", "  later: [1]\n", "none", "/b", 7));
+  std::string text;
+  for (const SettingDifference& d : setting_differences(a.path(), b.path())) text += d.text() + "; ";
+  CHECK(text == "parameters: bins: [4] against [4, 64]; measure: repetitions: 3 against 7; ");
+  CHECK(setting_differences(a.path(), a.path()).empty());
+  CHECK(setting_differences(a.path(), a.path() / "nothing").empty());
+  (void)b.write("effective.yaml", "measure: [");
+  CHECK(setting_differences(a.path(), b.path()).empty());
+}
+
 TEST_CASE("a machine that was slower as a whole: a control takes it out, and embree's cells tell it") {
   std::vector<CellResult> a = run(1), b = run(900);
   a.push_back(measured(cell_named("embree"), 0.1, 0.02, 77)),

@@ -160,6 +160,21 @@ class ResultFolders(CommandLineCase):
         incomparable = json.loads((self.folder / "c.json").read_text())["incomparable"]
         self.assertEqual(len(incomparable), len(self.cells(*FEW)))
 
+    def test_other_settings_of_equal_names_are_other_work(self):
+        sweep = "scenes: [sphere:400]\naxes: {structure: [bvh4], isa: scalar, workload: [primary, diffuse]}\nparameters: {bins: [%s]}\nrays: {self_intersection: [%s]}\nmeasure: {repetitions: 3, min_time: 0.001, resolution: [16, 16]}\n"
+        for out, bins, way in (("few", 4, "none"), ("many", 64, "none"), ("left_out", 4, "exclusion")):
+            self.assertIn(self.call("run", self.write("sweep.yaml", sweep % (bins, way)), "--no-plots", "--out", out).returncode, (0, 1))
+        result = self.call("compare", "few", "many", "--json", "c.json")
+        self.assert_error(result, "nothing to compare", status=4)
+        self.assertIn("differs: parameters: bins: [4] against [64]\n", result.stdout)
+        self.assertEqual(json.loads((self.folder / "c.json").read_text())["differences"], ["parameters: bins: [4] against [64]"])
+        self.assertIn(self.call("compare", "few", "many", "--allow-different-settings").returncode, (0, 3))
+        result = self.call("compare", "few", "left_out", "--json", "c.json")
+        self.assertIn("differs: rays: self_intersection: [none] against [exclusion]\n", result.stdout)
+        incomparable = json.loads((self.folder / "c.json").read_text())["incomparable"]
+        self.assertEqual([cell["reason"] for cell in incomparable], ["self_intersection none in A, exclusion in B"])
+        self.assertIn("/diffuse/", incomparable[0]["name"])
+
     def test_a_filter_says_what_is_measured_now_and_takes_nothing_from_what_was(self):
         out = self.folder / "results/small"
         every = self.cells(*FEW)
