@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "experiments/commands.h"
+#include "experiments/config_scenes.h"
 #include "experiments/json_text.h"
 #include "experiments/result.h"
 #include "scenes/inspect.h"
@@ -36,7 +37,7 @@ Json as_json(const std::string& name, const SceneInfo& info) {
 }  // namespace
 
 ExitStatus command_info(const std::string& word, bool json) {
-  const Scene scene = load_scene(parse_scene_word(word));
+  const Scene scene = load_scene(scene_spec_of_word(word));
   const SceneInfo info = inspect_scene(scene);
   if (json) {
     fmt::print("{}\n", to_text(as_json(scene.name, info), 1));

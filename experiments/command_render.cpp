@@ -17,6 +17,7 @@
 #include "experiments/append_file.h"
 #include "experiments/axis_words.h"
 #include "experiments/commands.h"
+#include "experiments/config_scenes.h"
 #include "experiments/progress.h"
 #include "rendering/heat_map.h"
 #include "rendering/render.h"
@@ -235,7 +236,7 @@ ExitStatus command_render(const RenderCommand& command) {
   if (!command.exposure.empty() && out.extension() == ".pfm")
     throw UserError(fmt::format("--exposure has no effect: {} holds the radiance itself; take it out, or write a .png",
                                 out.string()));
-  const Scene scene = load_scene(parse_scene_word(command.scene));
+  const Scene scene = load_scene(scene_spec_of_word(command.scene));
   const std::vector<Effect> effects = effects_of(scene);
   RenderSettings settings = command.settings;
   settings.integrator = chosen_integrator(command.integrator, effects);

@@ -25,6 +25,15 @@ SceneSpec named(const std::string& name) {
   return spec;
 }
 
+/// The file in the folder of ARBORETUM_SCENES; empty where it is not there, or no folder is named.
+std::filesystem::path in_scenes_folder(const std::filesystem::path& file) {
+  const char* scenes = std::getenv("ARBORETUM_SCENES");
+  if (!scenes || !*scenes || file.empty()) return {};
+  std::error_code error;
+  std::filesystem::path path = std::filesystem::path(scenes) / file;
+  return std::filesystem::is_regular_file(path, error) ? path : std::filesystem::path();
+}
+
 /// Where the file is; with `optional` `missing` says why it is nowhere.
 std::filesystem::path find_file(const YamlReader& yaml, const YAML::Node& node, std::string_view what,
                                 const std::filesystem::path& folder, bool optional, std::string& missing) {
@@ -34,8 +43,7 @@ std::filesystem::path find_file(const YamlReader& yaml, const YAML::Node& node, 
   if (std::filesystem::is_regular_file(path, error)) return path;
   const char* scenes = std::getenv("ARBORETUM_SCENES");
   const bool has_folder = scenes && *scenes;
-  if (has_folder && std::filesystem::is_regular_file(std::filesystem::path(scenes) / text, error))
-    return std::filesystem::path(scenes) / text;
+  if (std::filesystem::path there = in_scenes_folder(text); !there.empty()) return there;
   if (!optional) {
     yaml.fail(node, fmt::format("{} '{}' is no file; paths are relative to the configuration, or to the folder "
                                 "that ARBORETUM_SCENES names",
@@ -175,8 +183,18 @@ std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& n
   return scenes;
 }
 
-SceneChoice scene_of_word(const std::string& word) {
+SceneSpec scene_spec_of_word(const std::string& word) {
   SceneSpec spec = parse_scene_word(word);
+  for (std::filesystem::path* file : {&spec.file, &spec.scene}) {
+    std::error_code error;
+    if (file->empty() || std::filesystem::exists(*file, error)) continue;
+    if (std::filesystem::path there = in_scenes_folder(*file); !there.empty()) *file = std::move(there);
+  }
+  return spec;
+}
+
+SceneChoice scene_of_word(const std::string& word) {
+  SceneSpec spec = scene_spec_of_word(word);
   if (!spec.generator.empty()) check_generated(spec.generator, spec.triangles, spec.seed);
   std::string name = cell_word(spec.name());
   const bool moves = scene_moves(spec);

@@ -16,7 +16,10 @@ namespace arboretum {
 /// UserError; no two scenes may share a name.
 [[nodiscard]] std::vector<SceneChoice> read_scenes(const YamlReader& yaml, const YAML::Node& node,
                                                    const std::filesystem::path& folder);
-/// A scene named on the command line.
+/// A scene named on the command line: what parse_scene_word takes; a file with a relative path that is not there is
+/// looked for in the folder of ARBORETUM_SCENES as well.
+[[nodiscard]] SceneSpec scene_spec_of_word(const std::string& word);
+/// The same as a scene of an experiment.
 [[nodiscard]] SceneChoice scene_of_word(const std::string& word);
 
 }  // namespace arboretum

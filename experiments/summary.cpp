@@ -16,6 +16,8 @@ namespace {
 
 using Row = TableRow;
 
+constexpr std::ptrdiff_t kBesideEmbree = 10;  ///< place of the column that compares with Embree, where there is one
+
 double rate_of(const CellResult& r, bool cpu) { return median(r.rates(cpu)); }
 
 /// The fastest embree cell of the same scene, workload, ISA and threads.
@@ -89,12 +91,13 @@ std::string interval_words(const std::vector<const CellResult*>& results) {
 /// Of the rays whose answers were checked.
 double wrong_share(const CellResult& r) { return r.fact("wrong_answers") / std::max(r.checked_rays(), 1.0); }
 
-Row trace_row(const CellResult& r, const std::vector<CellResult>& all, bool cpu) {
+/// `beside`: with the column that compares with Embree.
+Row trace_row(const CellResult& r, const std::vector<CellResult>& all, bool cpu, bool beside) {
   const Cell& c = r.cell;
   const Interval rate = median_interval(r.rates(cpu));
   const CellResult* embree = embree_beside(r, all, cpu);
   const std::optional<double> build = build_milliseconds(r, all);
-  return {c.structure,
+  Row row{c.structure,
           c.builder_name(),
           c.leaf,
           c.intersector,
@@ -104,10 +107,13 @@ Row trace_row(const CellResult& r, const std::vector<CellResult>& all, bool cpu)
           std::to_string(c.threads),
           figure(rate.median * 1e-6, 2),
           interval_text({rate.median * 1e-6, rate.low * 1e-6, rate.high * 1e-6}, r.repetitions.size()),
-          embree ? figure(rate_of(r, cpu) / std::max(rate_of(*embree, cpu), 1e-9), 2) : "-",
           r.has_fact("wrong_answers") ? figure(1e6 * wrong_share(r), 1) : "unchecked",
           optional_figure(r, "sah_cost", "{:.1f}"),
           build ? figure(*build, 1) : "-"};
+  if (beside)
+    row.insert(row.begin() + kBesideEmbree,
+               embree ? figure(rate_of(r, cpu) / std::max(rate_of(*embree, cpu), 1e-9), 2) : "-");
+  return row;
 }
 
 /// What became of rays that leave their surface in one of several ways.
@@ -187,20 +193,23 @@ std::string result_tables(const RunOutcome& outcome) {
   std::string text;
   std::vector<const CellResult*> traces;
   const bool cpu = by_cpu_time(outcome);
+  const bool beside = std::ranges::any_of(
+      outcome.results, [](const CellResult& r) { return r.is_trace() && r.cell.structure == "embree"; });
   for (const auto& [title, results] : groups) {
     traces.insert(traces.end(), results.begin(), results.end());
     std::vector<Row> rows{{"structure", "builder", "leaf", "intersector", "box", "traversal", "isa", "threads",
-                           rate_unit(cpu), interval_head(results), "x embree", "wrong/1e6", "SAH", "build ms"}};
-    for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results, cpu));
+                           rate_unit(cpu), interval_head(results), "wrong/1e6", "SAH", "build ms"}};
+    if (beside) rows[0].insert(rows[0].begin() + kBesideEmbree, "x embree");
+    for (const CellResult* r : results) rows.push_back(trace_row(*r, outcome.results, cpu, beside));
     if (!results.front()->cell.start_label.empty()) add_starts(rows, results);
     const CellResult& first = *results.front();
     text += fmt::format("\n{}: {:.0f} rays, {:.0f} triangles\n{}", title, first.fact("rays"), first.fact("triangles"),
                         format_table(rows, 8));
   }
   if (!groups.empty()) {
-    text += fmt::format("\n{}: {}, by {}. x embree: against the fastest embree cell of the same ISA and threads.\n",
-                        rate_unit(cpu), interval_words(traces),
-                        cpu ? "thread CPU time" : "wall time, as some cells have several threads");
+    text += fmt::format("\n{}: {}, by {}.{}\n", rate_unit(cpu), interval_words(traces),
+                        cpu ? "thread CPU time" : "wall time, as some cells have several threads",
+                        beside ? " x embree: against the fastest embree cell of the same ISA and threads." : "");
   }
   if (groups.empty()) text = build_table(outcome.results);
   const auto is_stream = [](const Cell& c) { return c.structure == "embree" && c.traversal.starts_with("stream"); };

@@ -127,7 +127,8 @@ std::size_t YamlReader::bytes(const YAML::Node& node, std::string_view what) con
   for (const auto& [name, shift] : kUnits) {
     if (s.empty() || error != std::errc{} || unit != name) continue;
     const double total = value * static_cast<double>(std::size_t{1} << shift);
-    if (total >= 1.0 && total < 0x1p60) return static_cast<std::size_t>(total);
+    if (total >= 0x1p60) fail(node, fmt::format("{} must be a size below 1048576TiB, not {}", what, s));
+    if (total >= 1.0) return static_cast<std::size_t>(total);
   }
   fail(node, fmt::format("{} must be a size above zero such as 8GiB or 512MiB, not {}", what, shown(node)));
 }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iostream>
+#include <sstream>
 #include <tuple>
 
 #include "core/random.h"
@@ -362,6 +364,15 @@ TEST_CASE("wrong answers are of the rays that were checked, which of renderers a
   const std::string why = verdict(outcome).second;
   INFO(why);
   CHECK(why.find("most: 1 of 100 rays in " + outcome.results[0].cell.name()) != std::string::npos);
+}
+
+TEST_CASE("nothing to interleave is nothing to say") {
+  std::ostringstream said;
+  std::streambuf* const before = std::cerr.rdbuf(said.rdbuf());
+  run_interleaved({});
+  run_interleaved({{.name = "done before", .indices = {}, .measure = {}, .ended = {}}});
+  std::cerr.rdbuf(before);
+  CHECK(said.str().empty());
 }
 
 TEST_CASE("what is slow or small is not 0 in a table") {
