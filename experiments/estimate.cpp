@@ -26,9 +26,10 @@ double triangles_per_second(std::string_view builder) {
     std::string_view builder;
     double rate;
   };
-  static constexpr Rate kRates[] = {{"embree_high", 1.5e5}, {"high", 2e5},     {"embree_", 1e6}, {"sweep_sah", 3.5e5},
-                                    {"ploc", 8e5},          {"morton", 4e6},   {"low", 6e6},     {"octants", 4e5},
-                                    {"uniform", 2e6},       {"two_level", 1e6}};
+  static constexpr Rate kRates[] = {{"embree_high", 1.5e5}, {"high", 2e5},      {"embree_", 1e6},
+                                    {"sweep_sah", 3.5e5},   {"ploc", 8e5},      {"morton", 4e6},
+                                    {"low", 6e6},           {"octants", 4e5},   {"uniform", 2e6},
+                                    {"two_level", 1e6},     {"binned_sah", 4e6}};
   for (const Rate& r : kRates)
     if (builder.starts_with(r.builder)) return r.rate;
   return 1.5e6;
