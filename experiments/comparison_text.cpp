@@ -321,8 +321,8 @@ std::string origins_text(const ResultFolder& a, const ResultFolder& b, const std
       text += fmt::format("differs: {}: {} against {}\n", title, a.context_text(key), b.context_text(key));
   if (a.configuration_hash != b.configuration_hash)
     text +=
-        "differs: configuration (effective.yaml); cells are matched by name, and compared where rays and triangles are "
-        "as many\n";
+        "differs: configuration (effective.yaml); cells are matched by name, and compared where they did the same "
+        "work\n";
   for (const SettingDifference& setting : settings) text += fmt::format("differs: {}\n", setting.text());
   return text + busy_text(a, b);
 }
