@@ -45,7 +45,8 @@ Ray spoilt(Ray ray, std::uint64_t way) {
 
 }  // namespace
 
-/// The random choices of one ray.
+/// The random choices of one ray. Each draw is a statement or declarator of its own: within one expression the order
+/// is the compiler's, and rays would differ from compiler to compiler.
 class HardRayMaker::Draw {
  public:
   Draw(const HardRayMaker& maker, std::uint64_t seed, std::uint64_t index, float time)
@@ -56,7 +57,7 @@ class HardRayMaker::Draw {
   float uniform(float low = -1.0f, float high = 1.0f) {
     return low + (high - low) * random_float(seed_, index_, next_++);
   }
-  Vec3f point() {  // of the cube [-1, 1]^3; one after the other, in this order with every compiler
+  Vec3f point() {  // of the cube [-1, 1]^3
     const float x = uniform(), y = uniform(), z = uniform();
     return {x, y, z};
   }
@@ -94,7 +95,10 @@ class HardRayMaker::Draw {
   Vec3f start(Vec3f p) {
     const Bounds3f& box = maker_.bounds_;
     const std::size_t where = below(4);
-    if (where == 0) return p + unit() * std::ldexp(maker_.radius_, -static_cast<int>(below(18)));
+    if (where == 0) {
+      const float distance = std::ldexp(maker_.radius_, -static_cast<int>(below(18)));
+      return p + unit() * distance;
+    }
     const Vec3f middle = box.lower * 0.5f + box.upper * 0.5f;
     if (where == 1) return middle + unit() * (3 * maker_.radius_);
     Vec3f inside;
@@ -128,8 +132,10 @@ class HardRayMaker::Draw {
   Ray grazing() {
     const auto c = corners(triangle());
     const Vec3f e1 = c[1] - c[0], e2 = c[2] - c[0];
-    const Vec3f p = c[0] + e1 * uniform(0, 1) + e2 * uniform(0, 1), along = e1 * uniform() + e2 * uniform();
-    const float lift = std::ldexp(uniform(), -static_cast<int>(below(26)));
+    const float v = uniform(0, 1), u = uniform(0, 1), along_v = uniform(), along_u = uniform();
+    const Vec3f p = c[0] + e1 * u + e2 * v, along = e1 * along_u + e2 * along_v;
+    const int smaller = static_cast<int>(below(26));
+    const float lift = std::ldexp(uniform(), -smaller);
     const Vec3f n = normalize(cross(e1, e2));
     const float size = std::max(length(along), maker_.radius_ * 0x1p-20f);
     const Vec3f o = p - along * uniform(0, 4) + (is_finite(n) ? n * (lift * size) : Vec3f{});
@@ -153,7 +159,10 @@ class HardRayMaker::Draw {
     o[axis] = at[axis] = p[axis];
     Ray ray = aimed(o, at);
     if (ray.direction[axis] != 0.0f || below(2)) ray.direction[axis] = below(2) ? 0.0f : -0.0f;
-    if (tiny == 0) ray.direction[axis] = std::ldexp(uniform(), -70 - static_cast<int>(below(70)));
+    if (tiny == 0) {
+      const int exponent = -70 - static_cast<int>(below(70));
+      ray.direction[axis] = std::ldexp(uniform(), exponent);
+    }
     if (ray.direction == Vec3f{}) ray.direction[(axis + 1) % 3] = 1.0f;
     return ray;
   }
@@ -170,7 +179,8 @@ class HardRayMaker::Draw {
   }
   Ray from_far() {
     const Vec3f p = target();
-    return aimed(p + unit() * std::ldexp(maker_.radius_, 2 + static_cast<int>(below(26))), p);
+    const float distance = std::ldexp(maker_.radius_, 2 + static_cast<int>(below(26)));
+    return aimed(p + unit() * distance, p);
   }
   Ray ending() {
     const Vec3f p = target(), o = start(p);
@@ -217,7 +227,10 @@ class HardRayMaker::Draw {
       case HardKind::surface: return from_surface(source);
       case HardKind::far: return from_far();
       case HardKind::interval: return ending();
-      case HardKind::invalid: return spoilt(aimed(target()), bits());
+      case HardKind::invalid: {
+        const std::uint64_t way = bits();
+        return spoilt(aimed(target()), way);
+      }
       case HardKind::given: break;
     }
     return {};

@@ -13,6 +13,7 @@ namespace {
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
+/// No two rolls in one expression: their order would be the compiler's.
 class Dice {
  public:
   Dice(std::uint64_t seed, std::uint64_t index) : seed_(seed), index_(index) {}
@@ -52,8 +53,10 @@ void add(TriangleMesh& mesh, Vec3f a, Vec3f b, Vec3f c) {
 
 void soup(TriangleMesh& mesh, Dice& dice) {
   const int range = 1 + static_cast<int>(dice.below(20));
-  for (std::size_t n = 2 + dice.below(40); n > 0; --n)
-    add(mesh, dice.wide(-range, range), dice.wide(-range, range), dice.wide(-range, range));
+  for (std::size_t n = 2 + dice.below(40); n > 0; --n) {
+    const Vec3f c = dice.wide(-range, range), b = dice.wide(-range, range), a = dice.wide(-range, range);
+    add(mesh, a, b, c);
+  }
 }
 
 /// Two fans base to base: closed, with two vertices of many triangles.

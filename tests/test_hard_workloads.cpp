@@ -8,9 +8,11 @@
 #include "experiments/plan.h"
 #include "experiments/runner.h"
 #include "experiments/scene_data.h"
+#include "oracle/random_cases.h"
 #include "rendering/hard_workload.h"
 #include "scenes/camera.h"
 #include "tests/catch.h"
+#include "tests/golden_hash.h"
 #include "tests/scene_files.h"
 
 using namespace arboretum;
@@ -70,6 +72,45 @@ TEST_CASE(
   // one alone.
   for (const Ray& ray : make_hard_workload("hard_axis", closed, view).rays)
     CHECK((ray.direction.x != 0) + (ray.direction.y != 0) + (ray.direction.z != 0) == 1);
+}
+
+// Golden hashes: seeds that were written down, in cases files and reports, would stand for other rays.
+TEST_CASE("hard rays and random subjects have the same bits with every compiler") {
+  const TriangleMesh open = scene_of("fractal_terrain:300").mesh, moving = scene_of("waving_cloth:300").mesh;
+  std::vector<HardKind> kinds;
+  for (std::size_t k = 0; k < kMadeKinds; ++k) kinds.push_back(static_cast<HardKind>(k));
+  const auto rays_of = [&](const TriangleMesh& mesh, std::span<const HardKind> of) {
+    GoldenHash h;
+    h.add(HardRayMaker(mesh).make(1, 0, 1000, of));
+    return h.value;
+  };
+  CHECK(rays_of(open, kinds) == 0xc20b36437ff50fabu);
+  CHECK(rays_of(moving, kinds) == 0x374dc468aaf0b4a3u);
+  constexpr std::uint64_t kOfKind[kMadeKinds] = {0x6034869c766b2f88u, 0x247ead6b1d83d943u, 0x6a8de56408e84d9bu,
+                                                 0x489e4477ff46beabu, 0xa30369c4e20fe1e3u, 0x3e20e415b0c8a967u,
+                                                 0x4d79284765eeb69cu, 0x0f3acf435a53a319u, 0xbd98039b0fc2bc18u,
+                                                 0x4fa8dc4c8b3ad396u, 0x19ae15fc872fbd72u};
+  for (std::size_t k = 0; k < kMadeKinds; ++k) {
+    INFO(to_string(kinds[k]));
+    CHECK(rays_of(open, std::span(&kinds[k], 1)) == kOfKind[k]);
+  }
+  constexpr std::uint64_t kSubjects[10] = {
+      0x438922ef93e63c52u, 0x4daa7fcf3a44164au, 0xb94c2436cd87c183u, 0xf3fc846ff57ca93bu, 0xa83533ec4c525abdu,
+      0x716c51f8f172feedu, 0x20fc7e8a5d100033u, 0xd66970b157916f7eu, 0x92f30321738f1ce6u, 0xe41f846fd5069a0eu};
+  for (std::uint64_t i = 0; i < std::size(kSubjects); ++i) {
+    INFO(i);
+    const RandomSubject subject = random_subject(1, i, 100);
+    GoldenHash h;
+    h.add(subject.mesh), h.add(subject.rays);
+    CHECK(h.value == kSubjects[i]);
+  }
+  GoldenHash mutations;
+  const RandomSubject given = random_subject(1, 0, 1);
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    const RandomSubject subject = mutated_subject(given.mesh, given.rays.rays[0], 1, i, 10);
+    mutations.add(subject.mesh), mutations.add(subject.rays);
+  }
+  CHECK(mutations.value == 0x5a0d981039365619u);
 }
 
 TEST_CASE(

@@ -28,7 +28,8 @@ Scene generate_city(std::size_t triangles, std::uint64_t seed) {
     const std::size_t storeys = std::min<std::size_t>(left, 1 + std::size_t(draw(0.0, 3.0)));
     const double x = place(column) + 0.5 - half, z = place(row) + 0.5 - half;
     const double from_center = std::min(1.0, (x * x + z * z) / (half * half));
-    double height = draw(0.4, 1.2) + draw(0.0, 1.0) * 5.0 * (1.0 - from_center) * (1.0 - from_center);
+    const double least = draw(0.4, 1.2);
+    double height = least + draw(0.0, 1.0) * 5.0 * (1.0 - from_center) * (1.0 - from_center);
     // Lots that come round again (the grid is full, boxes are left) get roof structures that start higher up.
     double base = lot < side * side ? -0.02 : 0.3, width = lot < side * side ? draw(0.36, 0.47) : draw(0.05, 0.2);
     const std::uint16_t material = std::uint16_t(1 + std::uint64_t(draw(0.0, 3.0)));
