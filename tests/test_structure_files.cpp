@@ -79,7 +79,6 @@ BuildSettings settings_for(const StructureInfo& info, std::string_view leaf) {
 TEST_CASE("a structure that was saved and loaded answers and measures as it did") {
   const Folder folder;
   const fs::path file = folder / "saved";
-  std::size_t saved = 0;
   for (const std::size_t count : {0u, 1u, 700u}) {
     const TriangleMesh mesh = random_triangles(count, 0.2f, 11);
     // The vertices of the loaded one lie elsewhere: an index leaf must not point to those of the mesh that was built
@@ -94,12 +93,7 @@ TEST_CASE("a structure that was saved and loaded answers and measures as it did"
         const BuildSettings settings = settings_for(entry.info, leaf);
         BuildReport report;
         const auto built = build_structure(entry.info.name, mesh, settings, report);
-        try {
-          save_structure(*built, mesh, settings, file);
-        } catch (const UserError&) {
-          break;  // "cannot be saved": the structures that must be able to are named below
-        }
-        ++saved;
+        save_structure(*built, mesh, settings, file);
         const auto loaded = load_structure(entry.info.name, again, settings, file);
         CHECK(loaded->bytes() == built->bytes());
         const BuilderParameters costs;
@@ -117,7 +111,6 @@ TEST_CASE("a structure that was saved and loaded answers and measures as it did"
       }
     }
   }
-  CHECK(saved >= 3 * 5 * 12);
 }
 
 TEST_CASE("every structure of the project but Embree can be saved") {
