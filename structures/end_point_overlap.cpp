@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "core/random.h"
+#include "structures/clipped_triangle.h"
 
 namespace arboretum {
 namespace {
@@ -17,53 +18,6 @@ namespace {
 constexpr std::size_t kLargest = 64;  ///< records that are never left out
 constexpr std::size_t kPilot = 64;    ///< records that the work is estimated from
 constexpr double kClipWork = 16.0;    ///< of a clip, in box steps
-
-using Point = std::array<double, 3>;
-
-/// A triangle cut by six planes has at most nine corners.
-struct Polygon {
-  std::array<Point, 10> points;
-  int count = 0;
-};
-
-/// Sutherland-Hodgman: leaves the part with sign * (x[axis] - plane) <= 0.
-void clip(Polygon& polygon, std::size_t axis, double plane, double sign) {
-  bool all_in = true;
-  for (int i = 0; i < polygon.count; ++i) {
-    all_in = all_in && sign * (polygon.points[static_cast<std::size_t>(i)][axis] - plane) <= 0;
-  }
-  if (all_in) return;
-  const Polygon in = polygon;
-  Polygon& out = polygon;
-  out.count = 0;
-  for (int i = 0; i < in.count; ++i) {
-    const Point& p = in.points[static_cast<std::size_t>(i)];
-    const Point& q = in.points[static_cast<std::size_t>((i + 1) % in.count)];
-    const double dp = sign * (p[axis] - plane), dq = sign * (q[axis] - plane);
-    if (dp <= 0) out.points[static_cast<std::size_t>(out.count++)] = p;
-    if ((dp < 0 && dq > 0) || (dp > 0 && dq < 0)) {
-      const double w = dp / (dp - dq);
-      Point cut;
-      for (std::size_t k = 0; k < 3; ++k) cut[k] = p[k] + w * (q[k] - p[k]);
-      cut[axis] = plane;
-      out.points[static_cast<std::size_t>(out.count++)] = cut;
-    }
-  }
-}
-
-double area_of(const Polygon& polygon) {
-  Point sum{0, 0, 0};
-  const Point& o = polygon.points[0];
-  for (int i = 1; i + 1 < polygon.count; ++i) {
-    Point a, b;
-    for (std::size_t k = 0; k < 3; ++k) {
-      a[k] = polygon.points[static_cast<std::size_t>(i)][k] - o[k];
-      b[k] = polygon.points[static_cast<std::size_t>(i + 1)][k] - o[k];
-    }
-    for (std::size_t k = 0; k < 3; ++k) sum[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-  }
-  return 0.5 * std::hypot(sum[0], sum[1], sum[2]);
-}
 
 bool overlap(const Bounds3f& a, const Bounds3f& b) {
   return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
@@ -191,15 +145,15 @@ Sample choose(std::span<const TreeRecord> records, const Measure& measure, std::
 }  // namespace
 
 double clipped_area(const std::array<Vec3f, 3>& corners, const Bounds3f& box) {
-  Polygon polygon;
-  polygon.count = 3;
-  for (std::size_t i = 0; i < 3; ++i) polygon.points[i] = {corners[i].x, corners[i].y, corners[i].z};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    clip(polygon, axis, box.lower[axis], -1.0);
-    clip(polygon, axis, box.upper[axis], 1.0);
-    if (polygon.count < 3) return 0.0;
+  const ClippedTriangle part(corners, box);
+  const auto points = part.corners();
+  ClippedTriangle::Point sum{0, 0, 0};
+  for (std::size_t i = 1; i + 1 < points.size(); ++i) {
+    ClippedTriangle::Point a, b;
+    for (std::size_t k = 0; k < 3; ++k) a[k] = points[i][k] - points[0][k], b[k] = points[i + 1][k] - points[0][k];
+    for (std::size_t k = 0; k < 3; ++k) sum[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
   }
-  return area_of(polygon);
+  return 0.5 * std::hypot(sum[0], sum[1], sum[2]);
 }
 
 EndPointOverlap end_point_overlap(const TriangleMesh& mesh, std::span<const TreeRecord> records,
