@@ -1,7 +1,6 @@
 #include "library/arboretum.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <string_view>
 #include <thread>

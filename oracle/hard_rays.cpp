@@ -13,10 +13,10 @@
 namespace arboretum {
 namespace {
 
-constexpr float kInf = std::numeric_limits<float>::infinity();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 float step(float x, std::uint64_t choice) {
-  return choice % 3 == 0 ? x : std::nextafter(x, choice % 3 == 1 ? kInf : -kInf);
+  return choice % 3 == 0 ? x : std::nextafter(x, choice % 3 == 1 ? kInfinity : -kInfinity);
 }
 
 /// Rounded once for each coordinate.
@@ -33,12 +33,12 @@ Ray spoilt(Ray ray, std::uint64_t way) {
   switch (way % 8) {
     case 0: ray.origin[axis] = nan; break;
     case 1: ray.direction[axis] = nan; break;
-    case 2: ray.origin[axis] = way & 8 ? kInf : -kInf; break;
-    case 3: ray.direction[axis] = way & 8 ? kInf : -kInf; break;
+    case 2: ray.origin[axis] = way & 8 ? kInfinity : -kInfinity; break;
+    case 3: ray.direction[axis] = way & 8 ? kInfinity : -kInfinity; break;
     case 4: ray.direction = way & 8 ? Vec3f{0, -0.0f, 0} : Vec3f{0, 0, 0}; break;
     case 5: (way & 8 ? ray.tnear : ray.tfar) = nan; break;
-    case 6: ray.tnear = 1.0f, ray.tfar = way & 8 ? 0.5f : -kInf; break;
-    default: ray.tnear = kInf, ray.tfar = way & 8 ? -kInf : 1.0f; break;
+    case 6: ray.tnear = 1.0f, ray.tfar = way & 8 ? 0.5f : -kInfinity; break;
+    default: ray.tnear = kInfinity, ray.tfar = way & 8 ? -kInfinity : 1.0f; break;
   }
   return ray;
 }
@@ -107,7 +107,7 @@ class HardRayMaker::Draw {
   }
   /// A ray from `o` at `p`; its t there is about 1, or the distance.
   Ray aimed(Vec3f o, Vec3f p) {
-    Ray ray{o, 0.0f, p - o, kInf};
+    Ray ray{o, 0.0f, p - o, kInfinity};
     if (ray.direction == Vec3f{}) ray.direction = unit();
     if (below(4) == 0) {
       const Vec3f d = normalize(ray.direction);
@@ -126,7 +126,7 @@ class HardRayMaker::Draw {
       o[a] = p[a] - d[a];
       if (double(p[a]) - double(d[a]) != double(o[a])) return aimed(p);
     }
-    return d == Vec3f{} ? aimed(p) : Ray{o, 0.0f, d, kInf};
+    return d == Vec3f{} ? aimed(p) : Ray{o, 0.0f, d, kInfinity};
   }
 
   Ray grazing() {
@@ -140,14 +140,14 @@ class HardRayMaker::Draw {
     const float size = std::max(length(along), maker_.radius_ * 0x1p-20f);
     const Vec3f o = p - along * uniform(0, 4) + (is_finite(n) ? n * (lift * size) : Vec3f{});
     return below(2) == 0 ? aimed(o, below(2) == 0 ? c[below(3)] : p)
-                         : Ray{o, 0.0f, along == Vec3f{} ? unit() : along, kInf};
+                         : Ray{o, 0.0f, along == Vec3f{} ? unit() : along, kInfinity};
   }
   Ray along_axis() {
     const Vec3f p = target();
     const std::size_t axis = below(3);
     const float sign = below(2) ? 1.0f : -1.0f;
     const bool negative_zero = below(2);
-    Ray ray{p, 0.0f, negative_zero ? Vec3f{-0.0f, -0.0f, -0.0f} : Vec3f{}, kInf};
+    Ray ray{p, 0.0f, negative_zero ? Vec3f{-0.0f, -0.0f, -0.0f} : Vec3f{}, kInfinity};
     ray.origin[axis] = p[axis] - sign * maker_.radius_ * uniform(0, 4);
     ray.direction[axis] = sign * (below(2) ? 1.0f : maker_.radius_);
     return ray;
@@ -175,7 +175,7 @@ class HardRayMaker::Draw {
       const float size = largest_coordinate(p) * 0x1p-20f;
       if (is_finite(n)) p = p + n * (dot(n, d) < 0 ? -size : size);
     }
-    return {p, 0.0f, d, kInf};
+    return {p, 0.0f, d, kInfinity};
   }
   Ray from_far() {
     const Vec3f p = target();
@@ -184,7 +184,7 @@ class HardRayMaker::Draw {
   }
   Ray ending() {
     const Vec3f p = target(), o = start(p);
-    Ray ray{o, 0.0f, p - o, kInf};
+    Ray ray{o, 0.0f, p - o, kInfinity};
     if (ray.direction == Vec3f{}) ray.direction = unit();
     (below(2) ? ray.tnear : ray.tfar) = step(1.0f, below(3));
     return ray;

@@ -11,7 +11,7 @@
 namespace arboretum {
 namespace {
 
-constexpr float kInf = std::numeric_limits<float>::infinity();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// No two rolls in one expression: their order would be the compiler's.
 class Dice {
@@ -129,7 +129,7 @@ void shells(TriangleMesh& mesh, Dice& dice) {
                   y = middle + Vec3f{0, octant & 2 ? size : -size, 0};
       add(mesh, x, y, middle + Vec3f{0, 0, octant & 4 ? size : -size});
     }
-    size = dice.below(2) ? std::nextafter(size, kInf) : size * (1 + std::fabs(dice.exponential(-23, 1)));
+    size = dice.below(2) ? std::nextafter(size, kInfinity) : size * (1 + std::fabs(dice.exponential(-23, 1)));
   }
 }
 
@@ -160,7 +160,7 @@ namespace {
 /// x next to itself, times about 1, negated or nothing.
 float mutated(float x, Dice& dice) {
   switch (dice.below(4)) {
-    case 0: return std::nextafter(x, dice.below(2) ? kInf : -kInf);
+    case 0: return std::nextafter(x, dice.below(2) ? kInfinity : -kInfinity);
     case 1: return -x;
     case 2: return x * (1 + dice.exponential(-22, -1));
     default: return dice.below(2) ? 0.0f : -0.0f;
@@ -230,8 +230,8 @@ std::vector<Ray> in_company(const Ray& ray, std::uint64_t seed, std::size_t coun
     constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
     switch (dice.below(5)) {
       case 0: other.direction = {0, -0.0f, 0}; break;
-      case 1: other.direction[dice.below(3)] = kInf; break;
-      case 2: other.origin[dice.below(3)] = dice.below(2) ? kNaN : -kInf; break;
+      case 1: other.direction[dice.below(3)] = kInfinity; break;
+      case 2: other.origin[dice.below(3)] = dice.below(2) ? kNaN : -kInfinity; break;
       case 3: other.direction[dice.below(3)] = kNaN; break;
       default: other.tnear = 1.0f, other.tfar = 0.0f; break;
     }

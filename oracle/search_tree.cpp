@@ -68,7 +68,7 @@ SearchTree::SearchTree(const TriangleMesh& mesh) {
   }
   if (state.order.empty()) return;
   all.end = static_cast<std::uint32_t>(state.order.size());
-  nodes_.reset(new Node[state.order.size() + 1]);
+  nodes_ = std::make_unique_for_overwrite<Node[]>(state.order.size() + 1);
 
   // The root is a node whose second child does not exist unless it can be split.
   if (all.end <= kMaxLeaf) {

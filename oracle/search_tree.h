@@ -11,7 +11,6 @@
 
 #include "core/mesh.h"
 #include "core/ray.h"
-#include "core/exact/exact_integer.h"
 
 namespace arboretum {
 
@@ -38,7 +37,7 @@ class SearchTree {
     std::uint32_t count[2];
   };
   struct Leaf {
-    Corners corners;
+    std::array<Vec3f, 3> corners;
     std::uint32_t id;
   };
   struct BuildState;

@@ -165,9 +165,14 @@ void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildRe
     lists.begin.assign(2, 0);
   } else {
     with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
-      const CollapseSettings how{
-          2,    unsigned(Block::kWidth), p.max_leaf_blocks, p.traversal_cost, p.intersection_cost,
-          true, 2 * sizeof(Node),        sizeof(Block)};
+      const CollapseSettings how{.branching = 2,
+                                 .block_width = unsigned(Block::kWidth),
+                                 .max_leaf_blocks = p.max_leaf_blocks,
+                                 .traversal_cost = p.traversal_cost,
+                                 .intersection_cost = p.intersection_cost,
+                                 .optimal = true,
+                                 .node_bytes = 2 * sizeof(Node),
+                                 .block_bytes = sizeof(Block)};
       BinaryTree tree;
       build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report,
                         {2, [&](const BinaryTree& t) { return sah_cost_of(t, how); }});

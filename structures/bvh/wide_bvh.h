@@ -140,15 +140,15 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   require_triangles(kName, mesh.size());
   const LeafForm& form = require_leaf_form(kName, settings.leaf);
 
-  const CollapseSettings how{unsigned(kBranching),
-                             form.width,
-                             p.max_leaf_blocks,
-                             p.traversal_cost,
-                             p.intersection_cost,
-                             p.collapse == "optimal",
-                             sizeof(typename Format::Node),
-                             form.bytes,
-                             Format::kGranule};
+  const CollapseSettings how{.branching = unsigned(kBranching),
+                             .block_width = form.width,
+                             .max_leaf_blocks = p.max_leaf_blocks,
+                             .traversal_cost = p.traversal_cost,
+                             .intersection_cost = p.intersection_cost,
+                             .optimal = p.collapse == "optimal",
+                             .node_bytes = sizeof(typename Format::Node),
+                             .block_bytes = form.bytes,
+                             .granule = Format::kGranule};
   BinaryTree tree;
   LeafBlocks blocks(form, round_up<Format>(sizeof(typename Format::Node)));
   // Indices are filled without a look at vertices, so nothing is gained, and more held beside their small blocks.
