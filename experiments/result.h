@@ -44,7 +44,7 @@ struct Repetition {
 struct CellResult {
   Cell cell;
   std::vector<Repetition> repetitions;  ///< by index
-  /// What does not change between repetitions, under the contract's names: `rays`, `sah_cost`,
+  /// What does not change between repetitions, under the names of docs/results.md: `rays`, `sah_cost`,
   /// `wrong_answers`, ...
   Json facts = Json::object();
 

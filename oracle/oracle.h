@@ -30,7 +30,7 @@ struct ExactHit {
   bool tie = false;  ///< more than one primitive shares the exact nearest t
 };
 
-/// Wrong answers of a batch, as the contract defines them, and the error of t where the surface is right.
+/// Wrong answers of a batch, as docs/numerics.md defines them, and the error of t where the surface is right.
 struct AnswerCheck {
   std::uint64_t rays = 0, hits = 0;  ///< `hits`: of the answers given
   std::uint64_t missed_hits = 0;     ///< exact hit, reported miss

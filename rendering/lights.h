@@ -31,8 +31,8 @@ struct LightSample {
 class LightTable {
  public:
   LightTable() = default;
-  /// Emitters without power are left out. Without `multi_light` the strongest is taken alone; which that is among
-  /// triangles, the surfaces' emission is put out elsewhere by emits().
+  /// Emitters without power are left out. Without `multi_light` the strongest alone is kept: no other triangle
+  /// emits then (emission()), and if it is a light without an extent, none does.
   LightTable(const TriangleMesh& mesh, const std::vector<Surface>& surfaces, const std::vector<Light>& lights,
              EffectSet effects);
 

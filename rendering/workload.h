@@ -1,4 +1,5 @@
-// Workloads: the rays of the contract's `workload` axis, made once for a scene, view and seed, and shared by all cells.
+// Workloads: the rays of the `workload` axis (docs/command-line.md), made once for a scene, view and seed, and shared
+// by all cells.
 #pragma once
 
 #include <array>
@@ -43,7 +44,7 @@ struct View {
   SurfaceStart start{};  ///< how secondary rays leave their surface
 };
 
-/// The names that make_workload takes, in the contract's order.
+/// The names that make_workload takes, in the order of docs/command-line.md.
 [[nodiscard]] std::span<const std::string_view> workload_names();
 /// Whether the workload starts at the primary rays' hits. Throws UserError for a name that make_workload does not take.
 [[nodiscard]] bool is_secondary(std::string_view workload);

@@ -82,7 +82,7 @@ struct Scene {
   LoadReport report;
 };
 
-/// How a configuration names a scene: exactly one of the four forms of the contract.
+/// How a configuration names a scene: exactly one of four forms (docs/command-line.md).
 struct SceneSpec {
   std::string catalogue;        ///< `bunny`
   std::filesystem::path file;   ///< `{file: model.obj}`

@@ -14,7 +14,7 @@
 using namespace arboretum;
 using namespace arboretum::test;
 
-TEST_CASE("cells are the product, in names that the contract fixes; auto follows the rest") {
+TEST_CASE("cells are the product, in names that docs/results.md fixes; auto follows the rest") {
   const Folder folder;
   const Registry registry = paper_registry();
   const Plan plan = planned(folder, registry, R"(

@@ -51,10 +51,12 @@ class SpatialSah {
   /// A split that would add fewer references is left to object splits, which take a few large ones apart from the rest.
   static constexpr std::size_t kFewest = 32;
   static constexpr float kReferenceCost = 2.0f;  ///< a reference's box: its leaf and the nodes around it
-  static constexpr float kLevelCost = 0.8f;      ///< the areas of a level of a tree over surfaces, of the root's
-  /// of the references' boxes in the estimate, for a spatial split to be tried
+  /// Total box area of one level of a tree, as a share of the root's; typical of surfaces.
+  static constexpr float kLevelCost = 0.8f;
+  /// A spatial split is tried only if the references' boxes make up at least this share of the estimate.
   static constexpr float kLeastShare = 0.2f;
-  static constexpr float kMostCost = 1.25f;  ///< of a spatial split by SAH, of the object split's
+  /// A spatial split is rejected if its SAH cost is not below this multiple of the object split's.
+  static constexpr float kMostCost = 1.25f;
 
   /// Where the left child's room ends when the children have so many references.
   static std::size_t divide(const Range& range, std::size_t left, std::size_t right) {
