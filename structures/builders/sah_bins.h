@@ -196,6 +196,28 @@ struct BlocksFor {
   }
 };
 
+/// The cheapest planes of the three axes so far, in lanes; of equal ones the first.
+struct CheapestPlanes {
+  vf<4> cost;
+  vi<4> bin;
+  ARBORETUM_INLINE CheapestPlanes() : cost(std::numeric_limits<float>::infinity()), bin(0) {}
+  ARBORETUM_INLINE void offer(vf<4> costs, unsigned b) {
+    const vm<4> better = costs < cost;
+    cost = select(better, costs, cost);
+    bin = select(better, vi<4>(std::int32_t(b)), bin);
+  }
+  /// Cost, axis and bin of the cheapest of all; `best`, made anew, stays as it is where there is none.
+  template <class S>
+  ARBORETUM_INLINE void pick(S& best) const {
+    alignas(16) float costs[4];
+    alignas(16) std::int32_t bins[4];
+    cost.store(costs), bin.store(bins);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (costs[axis] < best.cost) best.cost = costs[axis], best.axis = axis, best.bin = decltype(best.bin)(bins[axis]);
+    }
+  }
+};
+
 /// The cheapest plane: area times blocks on both sides, a block holding leaf_width references; the three axes in lanes.
 /// Whole blocks: what a block's last lanes could hold costs the same, and splits that fill blocks save nodes and bytes.
 template <class B>
@@ -212,23 +234,15 @@ Split best_split(const B& bins, unsigned n, std::size_t total, unsigned leaf_wid
   }
   for (Box& side : box) side = empty_box();
   count = vf<4>(0.0f);
-  vf<4> best_cost = none;
-  vi<4> best_bin(0);
+  CheapestPlanes planes;
   for (unsigned b = 1; b < n; ++b) {
     for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.bin[b - 1].box[axis], box[axis]);
     count = count + counts_of(bins, b - 1);
     const vf<4> cost = select(count > zero, half_areas(box) * blocks(count) + right_cost[b], none);
-    const vm<4> better = cost < best_cost;
-    best_cost = select(better, cost, best_cost);
-    best_bin = select(better, vi<4>(std::int32_t(b)), best_bin);
+    planes.offer(cost, b);
   }
-  alignas(16) float costs[4];
-  alignas(16) std::int32_t planes[4];
-  best_cost.store(costs), best_bin.store(planes);
   Split best;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (costs[axis] < best.cost) best = {costs[axis], axis, unsigned(planes[axis]), 0};
-  }
+  planes.pick(best);
   if (best.axis < 0) return best;
   for (unsigned b = 0; b < best.bin; ++b) best.left_count += std::uint32_t(bins.bin[b].count[best.axis]);
   if (best.left_count == total) best.axis = -1;

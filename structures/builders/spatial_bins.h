@@ -192,25 +192,17 @@ inline SpatialSplit best_split(const SpatialBins& bins, unsigned n, std::size_t 
   }
   for (Box& side : box) side = empty_box();
   count = vf<4>(0.0f);
-  vf<4> best_cost = none;
-  vi<4> best_bin(0);
+  CheapestPlanes planes;
   for (unsigned b = 1; b < n; ++b) {
     for (int axis = 0; axis < 3; ++axis) box[axis] = max_x86(bins.box[axis][b - 1], box[axis]);
     count = count + to_float(vi<4>::load(bins.enter4[b - 1]));
     const vf<4> cost =
         select(fits(count) & (count + right_count[b] <= most), half_areas(box) * blocks(count) + right_cost[b], none);
-    const vm<4> better = cost < best_cost;
-    best_cost = select(better, cost, best_cost);
-    best_bin = select(better, vi<4>(std::int32_t(b)), best_bin);
+    planes.offer(cost, b);
   }
-  alignas(16) float costs[4];
-  alignas(16) std::int32_t planes[4];
-  best_cost.store(costs), best_bin.store(planes);
   SpatialSplit best;
   best.left = best.right = empty_box();
-  for (int axis = 0; axis < 3; ++axis) {
-    if (costs[axis] < best.cost) best.cost = costs[axis], best.axis = axis, best.bin = planes[axis];
-  }
+  planes.pick(best);
   if (best.axis < 0) return best;
   best.saved = bins.saved4[best.bin][best.axis];
   for (std::int32_t b = 0; b < std::int32_t(n); ++b) {
