@@ -423,7 +423,9 @@ TEST_CASE("misuse is told in one line that names the mend") {
   over_grid.parameters.below = "grid";
   CHECK(Tracer(sphere(4), over_grid).settings().traversal == "single");
   over_grid.traversal = "packet8";
-  CHECK_THAT(message_of(over_grid), Catch::Contains("two_level over grid: grid has no packet8"));
+  CHECK(Tracer(sphere(4), over_grid).settings().traversal == "packet8");
+  over_grid.parameters.below = "brute_force";
+  CHECK_THAT(message_of(over_grid), Catch::Contains("two_level over brute_force: brute_force has no packet8"));
 
   const std::string line = message_of(with(&TracerSettings::structure, "bvh8\n\x1b[2J" + std::string(100000, 'x')));
   CHECK_THAT(line, Catch::Contains("unknown structure 'bvh8\\n\\x1b[2Jxxx") && Catch::Contains("(100009 characters)"));
