@@ -5,6 +5,8 @@ hatched, so that it stays apart in print too.
 """
 
 import math
+from collections import Counter
+from textwrap import fill
 
 import matplotlib
 from matplotlib import font_manager
@@ -241,13 +243,38 @@ def short(scene, most=24):
     return scene if len(scene) <= most else scene[: most // 2 - 1] + "…" + scene[-most // 2 :]
 
 
+def short_names(scenes, most=24):
+    """{scene: its name as short() has it}: of names that would be the same as another's, or be cut within a number, so many characters more as they need not to be."""
+    lengths = dict.fromkeys(scenes, most)
+    while True:
+        found = {scene: short(scene, length) for scene, length in lengths.items()}
+        times = Counter(found.values())
+        unclear = [scene for scene, name in found.items() if name != scene and (times[name] > 1 or cuts_a_number(scene, name))]
+        if not unclear:
+            return found
+        for scene in unclear:
+            lengths[scene] += 1
+
+
+def cuts_a_number(scene, name):
+    """Whether `name`, a short one of `scene`, ends or begins again within a number of it."""
+    before, _, after = name.partition("…")
+    return any(scene[place - 1 : place + 1].isdigit() and scene[place - 1 : place + 1][1:] for place in (len(before), len(scene) - len(after)))
+
+
+def letters(width):
+    """How many a title above a panel `width` inches wide may have in a line."""
+    return int(11.5 * width)
+
+
 def panel_title(scene, workload, width):
-    """Scene and workload on as many lines as a panel `width` inches wide needs: broken between the two, then before the workload's variant."""
-    most = int(11.5 * width)
-    scene, workload = short(scene), workload.replace("_", " ")
+    """Scene, shortened already, and workload on as many lines as a panel `width` inches wide needs: broken between the two, then within a name before a variant."""
+    most, workload = letters(width), workload.replace("_", " ")
     if len(f"{scene}, {workload}") <= most:
         return f"{scene}, {workload}"
-    return f"{scene},\n" + (workload if len(workload) <= most else workload.replace(":", ":\n", 1))
+    lines = f"{scene},\n{workload}".split("\n")
+    broken = "\n".join(line if len(line) <= most + 1 else line.replace(":", ":\n", 1) for line in lines)
+    return "\n".join(fill(line, most + 1) for line in broken.split("\n"))
 
 
 def panel_grid(shown, places, width, height, most_columns, least_width=None):
@@ -262,11 +289,11 @@ def panel_grid(shown, places, width, height, most_columns, least_width=None):
         width = min(width, WIDEST / most_columns)
         lines, columns, beside = lines_of(own, width, most_columns)
     figure, axes = panels(-(-len(lines) // beside), beside * columns, width, height)
-    found = {}
+    found, names = {}, short_names(own, max(24, letters(width) - 4))
     for i, (scene, line) in enumerate(lines):
         for k, place in enumerate(line):
             axis = found[scene, place] = axes[i // beside][i % beside * columns + k]
-            axis.set_title(panel_title(scene, places[place], width))
+            axis.set_title(panel_title(names[scene], places[place], width))
     for axis in set(axes.flat) - set(found.values()):
         axis.set_visible(False)
     return figure, found

@@ -3,7 +3,7 @@
 from figures import squares
 from figures.names import bar_label
 from results import Cell, NoData, axis_sort_key, ordered, telling_axes
-from style import REST_COLOUR, colour, hatch, interval_legend, legends_right, panels, part_colour, part_legend, short, structure_legend
+from style import REST_COLOUR, colour, hatch, interval_legend, legends_right, panels, part_colour, part_legend, short_names, structure_legend
 from tables import digits
 
 
@@ -21,12 +21,12 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
     """
     cells, varied = distinct(results, lambda c: value_of(c) and (value_of(c), note_of(c)), label_axes)
     scenes = ordered((c["scene"] for c in cells), "scene")
+    names = short_names(scenes)
     bars = {scene: scene_bars([c for c in cells if c["scene"] == scene], varied) for scene in scenes}
     if squares.are_due(bars.values(), varied):
         every = [c for c in results.structures if value_of(c)]
         varied = telling_axes(every, ("scene", "structure"), label_axes)
-        return squares.square_panels([(short(scene), [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label,
-                                     higher_is_better=False)[0]
+        return squares.square_panels([(names[scene], [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label, higher_is_better=False)[0]
 
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
@@ -39,7 +39,7 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
             axis.set_visible(False)
             continue
         draw_panel(axis, bars[scenes[index]], value_of, note_of, varied, parts_of)
-        axis.set_title(short(scenes[index]))
+        axis.set_title(names[scenes[index]])
         axis.set_xlabel(axis_label)
     legends = parts_legend("part", [(parts_of(cell), value_of(cell)[0], cell) for cell in cells]) if parts_of else []
     legends_right(figure, legends + (interval_legend(map(estimate_of, cells)) if estimate_of else []))

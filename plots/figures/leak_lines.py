@@ -6,7 +6,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from results import HARD_PREFIX, NoData, ordered
-from style import Palette, boxes_in_order, intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, panels, plain, short
+from style import Palette, boxes_in_order, intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, panels, plain, short_names
 
 CAPTION = (" Lines in the shaded band are at zero, side by side so that all can be seen; above it the scale is logarithmic. Where lines lie on each "
            "other, those beneath are wider.")
@@ -28,6 +28,7 @@ def draw_lines(results, key, value_of, label, why_none):
     families = list(dict.fromkeys(family for family, _ in points))
     workloads = ordered({workload for _, workload in points}, "workload")
     figure, axes = panels(len(families), len(workloads), 4.8, 3.4, sharey="row")
+    names = short_names(families, 34)
     intersectors, own_boxes, embree = set(), set(), False
     for row, family in enumerate(families):
         scale = LeakScale([leaks for (f, _), lines in points.items() if f == family for line in lines.values() for leaks in line.values()])
@@ -51,7 +52,7 @@ def draw_lines(results, key, value_of, label, why_none):
                 axis.xaxis.set_major_locator(FixedLocator(xs))
             axis.xaxis.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
             scale.apply(axis)
-            axis.set_title(f"{short(family)}, {workload.replace('_', ' ')}")
+            axis.set_title(f"{names[family]}, {workload.replace('_', ' ')}")
             axis.set_xlabel(label(family, results))
         axes[row][0].set_ylabel("leaks per million rays")
     boxes = [Line2D([], [], color="#333333", linestyle=box_line(box), linewidth=2.4 if box == "fast" else 1.3, alpha=0.55 if box == "fast" else 1.0, label=box)

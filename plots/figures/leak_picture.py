@@ -5,7 +5,7 @@ import json
 from matplotlib.lines import Line2D
 
 from results import CAMERA_EDGES, NoData, axis_sort_key, ordered
-from style import box_colour, boxes_in_order, legends_right, panels, short
+from style import box_colour, boxes_in_order, legends_right, panels, short_names
 
 TITLE = "Where the leaks are"
 CAPTION = ("Rays from the camera at points of edges and at vertices (workload camera_edges): grey where they are aimed, as far as the camera sees it, in "
@@ -27,12 +27,12 @@ def draw(results):
     figure, axes = panels(len(rows), columns, 2.9, 3.05)
     for axis in axes.flat:
         axis.set_axis_off()
+    names = short_names(scenes)
     for row, (scene, keys) in zip(axes, rows):
         seen = seen_points(results.folder, scene)
         for axis, key in zip(row, keys):
-            panel(axis, seen, scene, key, found[scene][key], boxes, len(scenes) > 1)
-    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5,
-                                                                     color=box_colour(box), label=f"{box} boxes")
+            panel(axis, seen, names[scene] if len(scenes) > 1 else "", key, found[scene][key], boxes)
+    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=box_colour(box), label=f"{box} boxes")
                                            for box, size in boxes.items()])])
     return figure
 
@@ -53,8 +53,8 @@ def by_test(cells):
     return dict(sorted(found.items()))
 
 
-def panel(axis, seen, scene, key, cells, boxes, name_scene):
-    """`cells`: {box: cell}; `boxes`: {box: size}, of all panels."""
+def panel(axis, seen, name, key, cells, boxes):
+    """`name`: of the scene, where there are several; `cells`: {box: cell}; `boxes`: {box: size}, of all panels."""
     points = seen["points"]
     # Dots as pixels: thousands of them would make a drawing of megabytes.
     axis.plot([p[0] for p in points], [p[1] for p in points], ",", color="#AAAAAA", rasterized=True, zorder=1)
@@ -69,7 +69,7 @@ def panel(axis, seen, scene, key, cells, boxes, name_scene):
     axis.set_xlim(min(xs) - 6, max(xs) + 6)
     axis.set_ylim(max(ys) + 6, min(ys) - 6)
     axis.set_aspect("equal")
-    head = " ".join(([short(scene) + ","] if name_scene else []) + [word for word in key if word])
+    head = " ".join(([name + ","] if name else []) + [word for word in key if word])
     axis.set_title(f"{head}\n{', '.join(counts)}", fontsize=9.5)
 
 

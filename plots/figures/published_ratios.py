@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from results import AXES, STRUCTURE_AXES, NoData, ordered
-from style import WRONG, colour, hatch, is_wrong, legends_right, log_axis, panels, short
+from style import WRONG, colour, hatch, is_wrong, legends_right, log_axis, panels, short_names
 from tables import STRUCTURE_COLUMNS
 
 TITLE = "Beside published figures"
@@ -95,6 +95,7 @@ def label_of(results, comparison):
 def rows_of(results, comparison):
     """The rows of a comparison: of each published place those scenes and workloads of which a series was measured; a place that names none stands for all."""
     rows, series = [], series_of(comparison)
+    names = short_names([c["scene"] for c in results.structures + results.traces], 17)
     for place in comparison["published"]:
         quantity, inverted = quantity_of(results, {**comparison, **place})
         cells = [c for c in (results.structures if quantity in BUILT else results.traces) if value_of(c, quantity, place)]
@@ -105,7 +106,7 @@ def rows_of(results, comparison):
                 here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
                 ours = {s["name"]: found for s in series if (found := ours_of(here, s, quantity, inverted, place))}
                 if ours:
-                    name = "\n".join(n for n in (place.get("label", ""), short(scene, 17), workload.replace("_", " ")) if n)
+                    name = "\n".join(n for n in (place.get("label", ""), names.get(scene), workload.replace("_", " ")) if n)
                     rows.append(Row(name, published_of(place), ours))
     return rows
 

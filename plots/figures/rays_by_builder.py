@@ -4,8 +4,7 @@ from figures import squares
 from figures.bars import draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import (MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short, wrong_legend, wrong_marker,
-                   wrong_text)
+from style import MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short_names, wrong_legend, wrong_marker, wrong_text
 from tables import digits
 
 TITLE = "Rays per second by structure and builder"
@@ -39,7 +38,8 @@ def draw(results):
         rate = cell.estimate(metric)
         return rate.median / 1e6, rate.low / 1e6, rate.high / 1e6
 
-    titles = {key: f"{short(key[0])}, {key[1].replace('_', ' ')}, {key[2]}" for key in keys}
+    names = short_names(scene for scene, *_ in keys)
+    titles = {key: f"{names[key[0]]}, {key[1].replace('_', ' ')}, {key[2]}" for key in keys}
     if squares.are_due(shown.values(), varied):
         figure, drawn = squares.square_panels([(titles[key], shown[key]) for key in keys], varied, value, digits, unit, higher_is_better=True)
         for axis, places in drawn:

@@ -7,7 +7,7 @@ from figures import squares
 from figures.bars import look, parts_legend
 from figures.names import label
 from results import axis_sort_key, ordered
-from style import legends_right, panels, part_colour, short
+from style import legends_right, panels, part_colour, short_names
 
 # Inches: of a row; above and below a panel's rows; of a character of a label; that scenes side by side may take.
 ROW, AROUND, CHARACTER, WIDEST = 0.15, 0.95, 0.062, 13.5
@@ -54,7 +54,7 @@ def places_of(groups):
     return [(place, line) for place, line in enumerate(lines_of(groups)) if isinstance(line, Row)]
 
 
-def row_panels(groups, scenes, widths, room=0.0, title_of=short, together=1):
+def row_panels(groups, scenes, widths, room=0.0, titles=None, together=1):
     """For each scene as many panels side by side as there are `widths` (inches, at least; `room` besides, of each, for what stands to its right), all with
     the same rows; so many neighbours as are `together` stay in one band of them. Gives the figure and {scene: [axis, ...]}."""
     lines = lines_of(groups)
@@ -64,9 +64,8 @@ def row_panels(groups, scenes, widths, room=0.0, title_of=short, together=1):
     bands = -(-len(scenes) // max(together, int(WIDEST / one) // together * together))
     beside = -(-len(scenes) // (bands * together)) * together
     columns = beside * len(widths)
-    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True,
-                          gridspec_kw={"width_ratios": widths * beside})
-    found = {}
+    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True, gridspec_kw={"width_ratios": widths * beside})
+    found, titles = {}, titles or short_names(scenes)
     for place in range(bands * beside):
         first = place % beside * len(widths)
         own = list(axes[place // beside][first:first + len(widths)])
@@ -76,7 +75,7 @@ def row_panels(groups, scenes, widths, room=0.0, title_of=short, together=1):
             else:
                 axis.set_visible(False)
         if place < len(scenes):
-            own[0].set_title(title_of(scenes[place]), loc="left")
+            own[0].set_title(titles[scenes[place]], loc="left")
             found[scenes[place]] = own
     return figure, found
 

@@ -5,7 +5,7 @@ from textwrap import fill
 from matplotlib.lines import Line2D
 
 from results import NoData, ordered
-from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_map, panels, plain, short
+from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_map, panels, plain, short_names
 
 TITLE = "Leaving a surface"
 CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass "
@@ -28,6 +28,7 @@ def draw(results):
     columns = [f for f in FAULTS if any(c.value(f[0]) is not None for c in cells)] + [(None, f"time, ns a ray\n({results.clock()})")]
     figure, axes = panels(len(scenes), len(columns), 2.7, 0.9 + 0.4 * len(ways), sharey=True, sharex="col")
     slots = [(i, w) for i in intersectors for w in workloads]
+    names = short_names(scenes, 60)
     for row, scene in enumerate(scenes):
         for column, (name, label) in enumerate(columns):
             axis = axes[row][column]
@@ -42,7 +43,7 @@ def draw(results):
             if row == len(scenes) - 1:
                 axis.set_xlabel(label)
             if column == 0:
-                axis.set_title(short(scene), loc="left")
+                axis.set_title(names[scene], loc="left")
             axis.set_yticks(range(len(ways)), [w.replace("_", " ") for w in ways])
             axis.set_ylim(len(ways) - 0.5, -0.5)
             axis.grid(axis="y", visible=False)

@@ -9,7 +9,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from figures.modes import Modes
 from figures.squares import headings_above, mark_wrong
 from results import NoData, ordered
-from style import panels, short
+from style import panels, short_names
 
 TITLE = "Ways of traversal"
 CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set with as many threads (where the sweep has "
@@ -153,7 +153,8 @@ def panel(axis, table, rows, columns, headings, title):
                 axis.text(x, y, f"{v:.2f}", ha="center", va="center", fontsize=8, color="white" if dark else "#222222",
                           fontweight="bold" if columns[x][1] == MEAN else "normal")
     axis.set_yticks(range(len(rows)), map(row_label, rows), fontsize=8.5)
-    names = [short(s, LONGEST_SCENE) for _, s in columns]
+    short_of = short_names([s for _, s in columns], LONGEST_SCENE)
+    names = [short_of[s] for _, s in columns]
     axis.set_xticks(range(len(columns)), names, rotation=30, ha="right", rotation_mode="anchor", fontsize=8)
     axis.tick_params(length=0)
     above = 8 + 2.4 * max(map(len, names)) if headings_above(axis, len(rows)) else 4  # points that the names take

@@ -4,7 +4,7 @@ from matplotlib.lines import Line2D
 
 from figures.rows import FONT, groups_of, places_of, row_panels, rows_are_due
 from results import Cell, NoData, ordered, telling_axes
-from style import legends_right, log_axis, panel_title
+from style import legends_right, letters, log_axis, panel_title, short_names
 
 TITLE = "Visits and tests of a ray"
 CAPTION = ("Nodes and leaves that a ray visits, and tests of a ray against child boxes and triangles, counted in a pass of its own, untimed; the numbers "
@@ -28,7 +28,9 @@ def draw(results):
     isa = ordered((c["isa"] for c in cells), "isa")[-1]
     workloads = chosen(ordered((c["workload"] for c in cells), "workload"))
     cells = [c for c in cells if c["isa"] == isa and c["workload"] in workloads]
-    titles = {panel_of(s, w): panel_title(s, w, WIDTH + COLUMN * len(COUNTS)) for s in ordered((c["scene"] for c in cells), "scene") for w in workloads}
+    room = WIDTH + COLUMN * len(COUNTS)
+    names = short_names(ordered((c["scene"] for c in cells), "scene"), max(24, letters(room) - 4))
+    titles = {panel_of(s, w): panel_title(name, w, room) for s, name in names.items() for w in workloads}
     cells = without_doubles([Cell({**c.axes, "scene": panel_of(c["scene"], c["workload"])}, c.rows) for c in cells])
     if rows_are_due(cells):
         cells = without_doubles([c for c in cells if c["workload"] == workloads[-1]])
@@ -36,7 +38,7 @@ def draw(results):
     groups = groups_of(cells, varied, shown)
     places = places_of(groups)
     used = {c["scene"] for c in cells}
-    figure, axes = row_panels(groups, [p for p in titles if p in used], [WIDTH], COLUMN * len(COUNTS) + 0.1, titles.get, len({c["workload"] for c in cells}))
+    figure, axes = row_panels(groups, [p for p in titles if p in used], [WIDTH], COLUMN * len(COUNTS) + 0.1, titles, len({c["workload"] for c in cells}))
     for panel, (axis,) in axes.items():
         strip(axis, [(place, counts(row.cells[panel])) for place, row in places if panel in row.cells])
     handles = [Line2D([], [], linestyle="", marker=marker, color=shade, markersize=5, label=label) for _, label, marker, shade in COUNTS]

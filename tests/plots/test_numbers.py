@@ -203,6 +203,27 @@ class Numbers(Drawn):
         self.assertEqual(style.short("bunny:offset=1e4"), "bunny:offset=1e4")
         self.assertEqual(style.short("a_scene_of_a_name_without_any_place"), "a_scene_of_…ut_any_place")
 
+    def test_scenes_that_differ_are_called_differently(self):
+        for scenes in ([f"random_triangles-{n}00000-seed12" for n in (1, 2)], [f"fractal_terrain-{n}000000-seed7" for n in (1, 5)],
+                       [f"sphere-4000:stretch={s}:offset={o:g}" for s in (1, 20, 100) for o in (1, 1e4, 1e6)], [f"{'a' * 12}{x}{'b' * 14}" for x in "xy"]):
+            names = style.short_names(scenes)
+            self.assertEqual(list(names), scenes)
+            self.assertEqual(len(set(names.values())), len(scenes), names)
+            self.assertTrue(all(len(name) <= len(scene) for scene, name in names.items()))
+            rows = [other("primary", s, structure=b, traversal=t, wrong_answers=0) for s in scenes for b in ("bvh4", "bvh8") for t in ("single", "packet8")]
+            figure = self.draw(rays_per_second, load(Folder(rows).path))
+            figure.draw_without_rendering()
+            boxes = [a.title.get_window_extent() for a in figure.axes if a.get_visible()]
+            self.assertEqual(len({a.get_title() for a in figure.axes if a.get_visible()}), len(scenes))
+            self.assertFalse([(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)])
+            built = [build("bvh8", scene=s) | {"name": f"build/{s}/bvh8/b/l/-/-/-/avx2/-/threads:1"} for s in scenes]
+            self.assertEqual(len({a.get_title() for a in self.draw(sah_cost, load(Folder(built).path)).axes if a.get_visible()}), len(scenes))
+            labels = self.draw(traversal_ratios, load(Folder(rows).path)).axes[0].get_xticklabels()
+            self.assertEqual(len({t.get_text() for t in labels}), len(scenes) + 1)
+        for scene, name in (("bunny", "bunny"), ("random_triangles-100000-seed12", "random_tria…100000-seed12"), ("sphere-4000:stretch=10:offset=100", "sphere-4000…10:offset=100"),
+                            ("a_scene_of_a_name_without_any_place", "a_scene_of_…ut_any_place")):
+            self.assertEqual(style.short_names([scene]), {scene: name})
+
     def test_a_fit_is_that_of_one_scene(self):
         points = [(Cell({"scene": s, "structure": "bvh8", "workload": "primary", "isa": "avx2"}, []), x, y * (1 + x), None) for s, y in (("bunny", 1.0), ("city", -3.0)) for x in (1.0, 2.0, 3.0)]
         figure, axis = style.plt.subplots()
