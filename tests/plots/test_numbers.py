@@ -306,12 +306,16 @@ class Numbers(Drawn):
         self.assertEqual(squares.shades([0.0, 0.0], higher_is_better=False)(0.0), 0)
 
     def test_phases_of_a_build_make_up_the_median(self):
-        # One disturbed repetition: the means add up to 44, the median is 20.
-        repetitions = [(0.02, 0.015, 0.005), (0.02, 0.01, 0.01), (0.092, 0.059, 0.033)]
+        repetitions = [(0.02, 0.015, 0.004), (0.022, 0.0165, 0.0044), (0.092, 0.015, 0.076)]  # the last was disturbed in its leaves
         cell = Cell({}, [{"build_seconds": total, "phase_seconds": {"splits": a, "leaves": b}} for total, a, b in repetitions])
         found = dict(build_time.phases(cell))
-        self.assertAlmostEqual(sum(found.values()), 20.0)
-        self.assertAlmostEqual(found["splits"], 20.0 * 84 / 132)
+        self.assertAlmostEqual(found["splits"], 22.0 * 0.75)
+        self.assertAlmostEqual(found["leaves"], 22.0 * 0.2)
+        apart = [(1.0, 0.6, 0.4), (1.0, 0.5, 0.5), (1.0, 0.9, 0.1), (1.0, 0.55, 0.45), (1.0, 0.1, 0.7)]  # medians 0.55, 0.45 and nothing
+        uneven = [*apart[:4], (1.0, 0.9, 0.0)]
+        for these in (apart, uneven):
+            cell = Cell({}, [{"build_seconds": total, "phase_seconds": {"splits": a, "leaves": b}} for total, a, b in these])
+            self.assertAlmostEqual(sum(milliseconds for _, milliseconds in build_time.phases(cell)), 1000.0)
         self.assertEqual(build_time.phases(Cell({}, [{"build_seconds": 0.0, "phase_seconds": {"splits": 0.0}}])), [])
         self.assertEqual(build_time.phases(Cell({}, [{"build_seconds": 1.0}])), [])
 
