@@ -2,21 +2,24 @@
 
 from matplotlib.lines import Line2D
 
+from figures import trade_offs
 from figures.modes import Modes
 from results import NoData, ordered
 from style import (MARKERS, WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend,
                    wrong_legend, wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
-CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}, dots, where modes are more than markers, the medians alone. "
-           "Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar reaches, per million "
-           "rays. Those of each cell stand in the table.")
+CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}, "
+           "dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
+           "reaches, per million rays. Those of each cell stand in the table. Of several numbers of threads the figure shows the fewest.")
 DIGIT = 0.032  # of a panel's height, that a character of a number above a bar takes
 
 
 def draw(results):
     metric, unit = results.throughput()
-    cells = [c for c in results.traces if c.estimate(metric)]
+    cells, threads = trade_offs.of_one_number_of_threads([c for c in results.traces if c.estimate(metric)])
+    if threads:
+        unit = f"Mray/s\n({results.clock()}{threads})".replace("; ", ";\n")
     if not cells:
         raise NoData("no cell has a throughput")
     workloads = ordered((c["workload"] for c in cells), "workload")
@@ -29,7 +32,7 @@ def draw(results):
     for (scene, workload), axis in axes.items():
         here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
         panel(axis, here, metric, isas, structures, modes, markers)
-        axis.set_ylabel(unit)
+        axis.set_ylabel(unit, **({"fontsize": 8.5} if threads else {}))
     legends = [("structure", structure_legend(structures))]
     dot = Line2D([], [], linestyle="", marker=".", color="#222222", markersize=2.5, label=f"each of {len(modes.labels)}")
     legends += [("mode", marker_legend(markers) or [dot])] if len(modes.labels) > 1 else []

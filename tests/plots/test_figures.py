@@ -83,6 +83,11 @@ class Hard(Drawn):
                 self.assertEqual({a.get_xlabel() for a in axes}, {f"{words}\n{clock}"})
                 self.assertEqual(sum(line.get_marker() != "None" for line in axes[0].lines), 1)
 
+    def test_bars_are_of_one_number_of_threads(self):
+        for threads, label in (((1,), "Mray/s, thread CPU time"), ((2,), "Mray/s, wall time"), ((1, 2, 8), "Mray/s\n(wall time, 1 thread;\nnot shown: 2, 8)"), ((4, 2), "Mray/s\n(wall time, 2 threads;\nnot shown: 4)")):
+            (axis,) = self.draw(rays_per_second, load(Folder([other("primary", threads=t, rate=1e6 * t) for t in threads]).path)).axes
+            self.assertEqual((axis.get_ylabel(), [p.get_height() for p in axis.patches]), (label, [min(threads)]))
+
     def test_every_structure_has_a_sign_of_its_own(self):
         for more in ((), [other("hard", structure=s) for s in style.COLOURS]):
             figure = self.draw(accuracy_vs_time, load(Folder([other("primary", structure=s) for s in style.COLOURS] + list(more)).path))
