@@ -312,7 +312,7 @@ def legends_right(figure, legends):
     height, top = figure.get_size_inches()[1], 0.98
     for title, handles in legends:
         figure.legend(handles=handles, title=title, loc="upper left", bbox_to_anchor=(1.0, top), alignment="left")
-        top -= (0.20 * len(handles) + 0.45) / height
+        top -= (0.20 * sum(handle.get_label().count("\n") + 1 for handle in handles) + 0.45) / height
 
 
 def panels(rows, columns, width, height, **options):

@@ -15,7 +15,7 @@ import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
 import warned  # noqa: E402
-from figures import ALL, accuracy_vs_time, leak_picture, leaks_vs_aspect, leaks_vs_distance, published_ratios, rays_per_second, self_intersection, squares  # noqa: E402
+from figures import ALL, accuracy_vs_time, lane_utilization, leak_picture, leaks_vs_aspect, leaks_vs_distance, published_ratios, rays_per_second, self_intersection, squares  # noqa: E402
 from figures.accuracy_vs_time import draw_workloads, hard_points, measure_of  # noqa: E402
 from figures.leak_lines import slots, wider, without  # noqa: E402
 from figures.leak_picture import by_test, sizes  # noqa: E402
@@ -87,6 +87,26 @@ class Hard(Drawn):
         for threads, label in (((1,), "Mray/s, thread CPU time"), ((2,), "Mray/s, wall time"), ((1, 2, 8), "Mray/s\n(wall time, 1 thread;\nnot shown: 2, 8)"), ((4, 2), "Mray/s\n(wall time, 2 threads;\nnot shown: 4)")):
             (axis,) = self.draw(rays_per_second, load(Folder([other("primary", threads=t, rate=1e6 * t) for t in threads]).path)).axes
             self.assertEqual((axis.get_ylabel(), [p.get_height() for p in axis.patches]), (label, [min(threads)]))
+
+    def test_lanes_are_of_one_builder_and_leaf_which_is_said(self):
+        def counted(lanes, **more):
+            return other("primary", lane_utilization_by_depth=[lanes, 0.5], visits_by_depth=[1.0, 0.5], **more)
+
+        def legend(figure):
+            return [t.get_text() for t in figure.legends[-1].get_texts()]
+
+        rows = [counted(0.1 * n, structure=s, builder=b, box=box) for s in ("bvh4", "bvh8") for n, (b, box) in enumerate((("ploc", "padded"), ("morton", "padded"), ("ploc", "fast")), 1)]
+        for order in (rows, [*rows[3:], *rows[:3]]):
+            figure = self.draw(lane_utilization, load(Folder(order).path))
+            self.assertEqual([round(line.get_ydata()[0]) for line in figure.axes[0].lines], [10, 10])
+            text = " ".join(" ".join(legend(figure)).split())
+            self.assertIn("builder ploc; not shown: morton", text)
+            self.assertIn("box padded; not shown: fast", text)
+            self.assertNotIn("leaf", text)
+        self.assertEqual(legend(self.draw(lane_utilization, load(Folder(rows[:1]).path))), ["one mode"])
+        # Where the first has no cell, nothing else takes its place.
+        figure = self.draw(lane_utilization, load(Folder([*rows[:2], counted(0.4, scene="city", structure="bvh4", builder="morton")]).path))
+        self.assertEqual([[round(line.get_ydata()[0]) for line in axis.lines] for axis in figure.axes if axis.get_visible()], [[10]])
 
     def test_every_structure_has_a_sign_of_its_own(self):
         for more in ((), [other("hard", structure=s) for s in style.COLOURS]):
