@@ -244,10 +244,10 @@ def short(scene, most=24):
 
 
 def short_names(scenes, most=24):
-    """{scene: its name as short() has it}: of names that would be the same as another's, or be cut within a number, so many characters more as they need not to be."""
+    """{scene: its name as short() has it}: of names that would be the same as another's, or be cut within a number, so many characters more as they need not to be. What stands on lines of their own below a name stays."""
     lengths = dict.fromkeys(scenes, most)
     while True:
-        found = {scene: short(scene, length) for scene, length in lengths.items()}
+        found = {scene: "\n".join([short(name, length), *more]) for scene, length in lengths.items() for name, *more in [scene.split("\n")]}
         times = Counter(found.values())
         unclear = [scene for scene, name in found.items() if name != scene and (times[name] > 1 or cuts_a_number(scene, name))]
         if not unclear:
@@ -270,7 +270,7 @@ def letters(width):
 def panel_title(scene, workload, width):
     """Scene, shortened already, and workload on as many lines as a panel `width` inches wide needs: broken between the two, then within a name before a variant."""
     most, workload = letters(width), workload.replace("_", " ")
-    if len(f"{scene}, {workload}") <= most:
+    if max(map(len, f"{scene}, {workload}".split("\n"))) <= most:
         return f"{scene}, {workload}"
     lines = f"{scene},\n{workload}".split("\n")
     broken = "\n".join(line if len(line) <= most + 1 else line.replace(":", ":\n", 1) for line in lines)

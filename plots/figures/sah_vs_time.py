@@ -3,24 +3,25 @@ share panels where there would be many of them and costs are near each other."""
 
 import numpy as np
 
-from figures import trade_offs
+from figures import costs, trade_offs
 from results import NoData, estimate, is_aimed, ordered
 from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker_map, most_wrong, panel_grid, panels, structure_legend,
                    wrong_legend, wrong_marker)
 from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
-CAPTION = ("A point is a structure as built, by one builder, on a scene, with its fastest leaf traced in its fastest mode; of several numbers of threads the "
-           "figure shows the fewest. A line is the least-squares fit through the points of one scene in a panel, R² its share of the variance explained (where "
-           "scenes share a panel, in the legend's order; of more than three the least and the most); with EPO: that of the plane through SAH cost and "
-           "end-point overlap, which never explains less, so small differences say nothing. brute_force, which has no tree and whose cost and time are many "
-           "times those of all others, is left out: it alone would decide the fit. So are rays that are aimed at edges and vertices (hard ones, camera_edges). "
-           "A red edge: the mode has wrong answers. "
-           + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
+CAPTION = ("A point is a structure as built, by one builder, on a scene, with its fastest leaf traced in its fastest mode; of several numbers of threads the figure shows the fewest. A line is the least-squares fit through the points of one scene "
+           "in a panel, R² its share of the variance explained (where scenes share a panel, in the legend's order; of more than three the least and the most); with EPO: that of the plane "
+           "through SAH cost and end-point overlap, which never explains less, so small differences say nothing. There is no fit where fewer than four costs are more than 2 % apart. brute_force, which has no tree and whose cost and time are many times those of all others, is left out: it alone would decide the fit. "
+           "So are rays that are aimed at edges and vertices (hard ones, camera_edges). A red edge: the mode has wrong answers. "
+           + costs.CAPTION[1:] + " " + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
 
 MOST_PANELS = 24  # of scenes apart
 FAR_APART = 4.0  # scenes whose costs differ by more never share panels
 NO_TREE = "brute_force"
+FEWEST_POINTS = 3  # of a panel
+FEWEST_COSTS = 4  # of a fit: through three a line goes as it may
+SAME = 0.02  # costs that differ by no larger share are one: measured times then tell the rest
 BUILT = ("scene", "structure", "builder", "isa", "workload")
 
 
@@ -28,9 +29,11 @@ def draw(results):
     points, threads = fastest_points(results)
     if not points:
         raise NoData("no traced cell has a SAH cost")
-    points = fitted(points)
+    numbers = {id(cell): rest for cell, *rest in points}
+    cells, said = costs.split([cell for cell, *_ in points], results)
+    points = compared([(apart_by_costs, *numbers[id(cell)]) for cell, apart_by_costs in cells])
     if not points:
-        raise NoData("nowhere are three structures as built, brute_force apart, of different SAH costs to fit a line through")
+        raise NoData("nowhere are three structures as built, brute_force apart, of different SAH costs to set against time")
     y_label = f"time, ns a ray\n({results.clock()}{threads})".replace("; ", ";\n")
     workloads = ordered((c["workload"] for c, *_ in points), "workload")
     isas = ordered((c["isa"] for c, *_ in points), "isa")
@@ -39,10 +42,10 @@ def draw(results):
 
     if len({place_of(c) for c, *_ in points}) <= MOST_PANELS or far_apart(points):
         markers = {}
-        figure = panels_by_scene(points, {(w, i): f"{w}, {i}" for w in workloads for i in isas}, y_label)
+        figure = panels_by_scene(points, {(w, i): f"{w}, {i}" for w in workloads for i in isas}, y_label, said)
     else:
         markers = marker_map(scenes, "scenes")
-        figure = panels_of_all(points, workloads, isas, markers, y_label)
+        figure = panels_of_all(points, workloads, isas, markers, y_label, said)
     answers = wrong_legend([c for c, *_ in points], wrong_marker(f"edge: some wrong, up to\n{most_wrong([c for c, *_ in points])} per million"))
     legends_right(figure, [("structure", structure_legend(structures)), *([("scene", marker_legend(markers))] if markers else []), *answers])
     return figure
@@ -65,12 +68,12 @@ def fastest_points(results):
     return [(p.cell, p.x.median, p.y.median, results.structure_value(p.cell, "epo")) for p in trade_offs.fastest_points(cells, metric, cost, BUILT)], threads
 
 
-def fitted(points):
-    """Those on whose scene, workload and instruction set there is a line to fit."""
+def compared(points):
+    """Those on whose scene, workload and instruction set there are enough that differ to be set against each other."""
     places = {}
     for point in points:
         places.setdefault(place_of(point[0]), []).append(point)
-    return [p for p in points if linear_fit(*zip(*((cost, time) for _, cost, time, _ in places[place_of(p[0])])))]
+    return [p for p in points if len(here := places[place_of(p[0])]) >= FEWEST_POINTS and len({cost for _, cost, *_ in here}) > 1]
 
 
 def far_apart(points):
@@ -81,7 +84,7 @@ def far_apart(points):
     return max(largest.values()) > FAR_APART * min(largest.values())
 
 
-def panels_by_scene(points, kinds, y_label):
+def panels_by_scene(points, kinds, y_label, said):
     shown = {}  # (scene, (workload, isa)) -> points
     for point in points:
         shown.setdefault((point[0]["scene"], (point[0]["workload"], point[0]["isa"])), []).append(point)
@@ -90,12 +93,12 @@ def panels_by_scene(points, kinds, y_label):
         panel(axis, shown[place], {place[0]: "o"}, axis.get_title())
         axis.set_xlim(0, 1.08 * max(p[1] for p in shown[place]))
         axis.set_ylim(0, 1.08 * max(p[2] for p in shown[place]))
-        axis.set_xlabel("SAH cost")
+        axis.set_xlabel(f"SAH cost{said}")
         axis.set_ylabel(y_label)
     return figure
 
 
-def panels_of_all(points, workloads, isas, markers, y_label):
+def panels_of_all(points, workloads, isas, markers, y_label, said):
     figure, axes = panels(len(workloads), len(isas), 3.3, 3.05, sharex=True, sharey="row")
     for row, workload in enumerate(workloads):
         for column, isa in enumerate(isas):
@@ -105,7 +108,7 @@ def panels_of_all(points, workloads, isas, markers, y_label):
         axes[row][0].set_ylim(0, 1.08 * max(p[2] for p in points if p[0]["workload"] == workload))
     axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))
     for axis in axes[-1]:
-        axis.set_xlabel("SAH cost")
+        axis.set_xlabel(f"SAH cost{said}")
     return figure
 
 
@@ -124,7 +127,8 @@ def panel(axis, points, markers, title):
             axis.plot(ends, slope * ends + offset, "-", color="#777777", linewidth=1, zorder=1)
         explained_by.append((fit and fit[2], fit and plane_fit(x, [p[3] for p in here], y)))
     if points:
-        title += f"\n{fits_text(explained_by)} (n = {len(points)})"
+        fits = fits_text(explained_by) if any(alone is not None for alone, _ in explained_by) else f"no fit, fewer than {FEWEST_COSTS} costs"
+        title += f"\n{fits} (n = {len(points)})"
     else:
         axis.text(0.5, 0.5, "no cells", transform=axis.transAxes, ha="center", color="#777777")
     axis.set_title(title)
@@ -136,19 +140,28 @@ def fits_text(explained_by):
         if len(values) <= 3:
             return ", ".join("–" if value is None else f"{value:.2f}" for value in values)
         known = [value for value in values if value is not None]
-        return f"{min(known):.2f} to {max(known):.2f}"
+        return "–" if not known else f"{min(known):.2f} to {max(known):.2f}"
 
     alone, both = zip(*explained_by)
     return f"R² = {said(alone)}" + (f"{', ' if len(both) == 1 else chr(10)}with EPO {said(both)}" if any(value is not None for value in both) else "")
 
 
 def linear_fit(x, y):
-    """(slope, offset, R²) by least squares; None below three points or where a coordinate does not vary."""
+    """(slope, offset, R²) by least squares; None where fewer than FEWEST_COSTS of `x` are apart or `y` does not vary."""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    if x.size < 3 or np.ptp(x) == 0 or np.ptp(y) == 0:
+    if apart(x) < FEWEST_COSTS or np.ptp(y) == 0:
         return None
     slope, offset = np.polyfit(x, y, 1)
     return slope, offset, explained(y, slope * x + offset)
+
+
+def apart(costs):
+    """How many of `costs` there are of which each is more than SAME above the one before."""
+    kept = []
+    for cost in sorted(costs):
+        if not kept or cost > (1 + SAME) * kept[-1]:
+            kept.append(cost)
+    return len(kept)
 
 
 def explained(y, fit):

@@ -16,7 +16,7 @@ import ratios  # noqa: E402
 import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
-from figures import build_time, rays_by_builder, rays_per_second, sah_cost, sah_vs_time, squares, traversal_ratios  # noqa: E402
+from figures import build_time, epo, rays_by_builder, rays_per_second, sah_cost, sah_vs_time, squares, traversal_ratios  # noqa: E402
 from figures.modes import Modes  # noqa: E402
 from figures.sah_vs_time import fits_text, linear_fit, plane_fit  # noqa: E402
 from results import Cell, NoData, Results, TooMuch, axes_of, estimate, interval_name, interval_words, load, ordered, swept_axes, undetermined_axes  # noqa: E402
@@ -78,8 +78,10 @@ class Numbers(Drawn):
         self.assertAlmostEqual(offset, 1)
         self.assertAlmostEqual(r2, 1)
         self.assertLess(linear_fit([1, 2, 3, 4], [1, 9, 1, 9])[2], 0.5)
-        for x, y in (([1, 2], [1, 2]), ([2, 2, 2], [1, 2, 3]), ([1, 2, 3], [5, 5, 5])):
-            self.assertIsNone(linear_fit(x, y))
+        for x, y in (([1, 2], [1, 2]), ([2, 2, 2, 2], [1, 2, 3, 4]), ([1, 2, 3, 4], [5, 5, 5, 5]), ([1, 2, 3], [3, 5, 7]), ([1, 2, 3, 3.03], [3, 5, 7, 7]),
+                     ([10, 10.1, 10.2, 10.3, 10.4, 10.5], [1, 5, 2, 4, 3, 6])):
+            self.assertIsNone(linear_fit(x, y), x)
+        self.assertIsNotNone(linear_fit([1, 2, 3, 3.1], [3, 5, 7, 8]))
 
     def test_ratios_of_traversals(self):
         rates = {("bvh8", "single", "bunny"): 2e6, ("bvh8", "packet8", "bunny"): 6e6, ("embree", "single", "bunny"): 3e6, ("embree", "stream", "bunny"): 4e6,
@@ -225,14 +227,14 @@ class Numbers(Drawn):
             self.assertEqual(style.short_names([scene]), {scene: name})
 
     def test_a_fit_is_that_of_one_scene(self):
-        points = [(Cell({"scene": s, "structure": "bvh8", "workload": "primary", "isa": "avx2"}, []), x, y * (1 + x), None) for s, y in (("bunny", 1.0), ("city", -3.0)) for x in (1.0, 2.0, 3.0)]
+        points = [(Cell({"scene": s, "structure": "bvh8", "workload": "primary", "isa": "avx2"}, []), x, y * (1 + x), None) for s, y in (("bunny", 1.0), ("city", -3.0)) for x in (1.0, 2.0, 2.5, 3.0)]
         figure, axis = style.plt.subplots()
         self.addCleanup(style.plt.close, figure)
         sah_vs_time.panel(axis, points, {"bunny": "o", "city": "s"}, "primary")
-        self.assertEqual(axis.get_title(), "primary\nR² = 1.00, 1.00 (n = 6)")
+        self.assertEqual(axis.get_title(), "primary\nR² = 1.00, 1.00 (n = 8)")
         self.assertEqual(sorted(round(float(line.get_ydata()[-1])) for line in axis.lines if len(line.get_xdata()) == 2), [-12, 4])
-        self.assertEqual([fits_text(of) for of in ([(0.5, 0.75)], [(0.5, None), (None, None)], [(0.5, 0.6)] * 2, [(0.1, 0.2), (0.3, 0.4), (None, None), (0.2, 0.9)])],
-                         ["R² = 0.50, with EPO 0.75", "R² = 0.50, –", "R² = 0.50, 0.50\nwith EPO 0.60, 0.60", "R² = 0.10 to 0.30\nwith EPO 0.20 to 0.90"])
+        self.assertEqual([fits_text(of) for of in ([(0.5, 0.75)], [(0.5, None), (None, None)], [(0.5, 0.6)] * 2, [(0.1, 0.2), (0.3, 0.4), (None, None), (0.2, 0.9)], [(None, None)] * 4)],
+                         ["R² = 0.50, with EPO 0.75", "R² = 0.50, –", "R² = 0.50, 0.50\nwith EPO 0.60, 0.60", "R² = 0.10 to 0.30\nwith EPO 0.20 to 0.90", "R² = –"])
 
     def test_a_point_of_a_fit_is_a_structure_as_built(self):
         def traced(structure, cost, nanoseconds, **more):
@@ -247,6 +249,7 @@ class Numbers(Drawn):
         trees = [traced("bvh8", 10, 100), traced("bvh4", 20, 210), traced("bvh2", 30, 290), traced("bvh2", 40, 300, builder="morton")]
         told = [("bunny, primary, avx2\nR² = 0.90 (n = 4)", [(10, 100), (20, 210), (30, 290), (40, 300)], "time, ns a ray\n(thread CPU time)")]
         self.assertEqual(points(trees), told)
+        self.assertEqual(points(trees[:3]), [("bunny, primary, avx2\nno fit, fewer than 4 costs (n = 3)", told[0][1][:3], told[0][2])])
         slower = [traced("bvh8", 11, 130, leaf="triangle4"), traced("bvh8", 10, 140, intersector="pluecker")]
         aimed = [traced(c["structure"], 10 * k, 50 * k, workload=w) for k, c in enumerate(trees, 1) for w in ("hard", "hard_edge", "camera_edges")]
         alone = [traced("bvh8", 10, 70, scene="city"), traced("bvh4", 20, 80, scene="city")]  # two have no fit
@@ -256,6 +259,32 @@ class Numbers(Drawn):
         for few in (trees[:2], alone, aimed, [trees[0], trees[1], traced("brute_force", 900, 9000)], [traced(f"bvh{n}", 10, 100 * n) for n in (2, 4, 8)]):
             with self.assertRaises(NoData):
                 sah_vs_time.draw(results_of(few))
+
+    def test_structures_of_several_costs_are_in_panels_apart(self):
+        def built(structure, builder, cost):
+            return build(structure, builder, sah_cost=cost) | {"name": f"build/bunny/{structure}/{builder}/triangle8/-/-/-/avx2/-/threads:1"}
+
+        def drawn(module, rows, yaml=""):
+            figure = self.draw(module, load(Folder(rows, files={"effective.yaml": yaml}).path))
+            return [(a.get_title(), a.get_xlabel(), [t.get_text() for t in a.get_yticklabels()]) for a in figure.axes if a.get_visible()]
+
+        swept = [f"{b}:intersection_cost={i}:traversal_cost={t}" for b in ("morton", "ploc:ploc_radius=8") for t in (1, 0.5) for i in (1,)]
+        rows = [built("bvh8", b, 10.0 + k) for k, b in enumerate(swept)] + [built("grid", "uniform", 50.0)]
+        for module, name in ((sah_cost, "SAH cost"), (epo, "EPO")):
+            self.assertEqual([panel[:2] for panel in drawn(module, rows)], [("bunny\n(step 0.5, block 1)", name), ("bunny\n(step 1, block 1)", name)])
+        self.assertEqual([panel[2] for panel in drawn(sah_cost, rows)], [["bvh8 morton", "bvh8 ploc:ploc_radius=8"], ["bvh8 morton", "bvh8 ploc:ploc_radius=8", "grid uniform"]])
+        for yaml, said in (("", ""), ("parameters:\n  traversal_cost: [1]\n  intersection_cost: [2]\n", " (step 1, block 2)"), ("  traversal_cost: 4\n", " (step 4, block 1)"),
+                           ("  traversal_cost: [1, 4]\n", "")):
+            self.assertEqual([panel[:2] for panel in drawn(sah_cost, rows[-1:], yaml)], [("bunny", "SAH cost" + said)])
+        timed = [other("primary", structure=f"bvh{n}", builder=f"morton:traversal_cost={t}", sah_cost=10.0 * n * t, rate=1e8 / n, wrong_answers=0) for n in (2, 4, 8, 16) for t in (1, 4)]
+        self.assertEqual([panel[0].split("\n") for panel in drawn(sah_vs_time, timed)],
+                         [["bunny", f"(step {t}, block 1), primary, avx2", "R² = 1.00 (n = 4)"] for t in (1, 4)])
+
+    def test_what_has_no_tree_does_not_flatten_the_bars_of_others(self):
+        rows = [build(s, "b", sah_cost=cost) | {"name": f"build/bunny/{s}/b/l/-/-/-/avx2/-/threads:1"} for s, cost in (("bvh8", 10.0), ("brute_force", 9000.0))]
+        for these, bars in ((rows, ["bvh8"]), (rows[1:], ["brute_force"])):
+            (axis,) = self.draw(sah_cost, load(Folder(these).path)).axes
+            self.assertEqual([t.get_text() for t in axis.get_yticklabels()], bars)
 
     def test_dots_of_many_modes_are_in_the_legend(self):
         for modes, said in ((3, ["single0", "single1", "single2"]), (11, ["each of 11"])):
