@@ -60,6 +60,7 @@ def main():
     need_matplotlib()
 
     import figures
+    import pages
     import report
     import style
     from results import NoData, ResultError, TooMuch, load
@@ -75,8 +76,12 @@ def main():
             module = importlib.import_module(f"figures.{name}")
             try:
                 with told_in_a_line(name):
-                    figure = module.draw(results)
-                    style.save(figure, results.folder, name)
+                    parts = pages.of(module, results)
+                    style.discard_files(results.folder, name)
+                    pictures = [pages.Picture(f"{name}-{number}" if len(parts) > 1 else name, scenes, getattr(figure, "more_caption", ""))
+                                for number, (scenes, figure) in enumerate(parts, 1)]
+                    for picture, (_, figure) in zip(pictures, parts):
+                        style.save(figure, results.folder, picture.name)
             except OSError:  # the disk's, not the figure's: the next one could not be written either
                 raise
             except NoData as reason:
@@ -84,16 +89,17 @@ def main():
                 print(f"{name}: left out, {reason}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch))
                       else sys.stdout)
                 style.discard(results.folder, name)  # of a drawing before
-                drawn.append((name, module, "", str(reason)))
+                drawn.append((name, module, [], str(reason)))
                 continue
             except Exception as error:  # noqa: BLE001  of a figure: it takes no other with it
                 why = " ".join(f"{type(error).__name__}: {error}".split())
                 style.discard(results.folder, name)
-                drawn.append((name, module, "", f"an error of the figure's own, {why}"))
+                drawn.append((name, module, [], f"an error of the figure's own, {why}"))
                 failed.append(f"{name}: {why}")
                 continue
-            print(f"{results.folder / name}.png .svg")
-            drawn.append((name, module, getattr(figure, "more_caption", ""), None))
+            for picture in pictures:
+                print(f"{results.folder / picture.name}.png .svg")
+            drawn.append((name, module, pictures, None))
         if set(default) <= set(names) and not arguments.no_report:
             print(report.write(results, drawn))
         elif not arguments.no_report:

@@ -14,7 +14,7 @@ LARGEST_SVG = 1_500_000  # bytes; a drawing of more goes into the page as PNG
 
 
 def write(results, drawn):
-    """`drawn`: (name, module, what its caption goes on with, why left out or None). Returns the page's path."""
+    """`drawn`: (name, module, its pictures, why left out or None). Returns the page's path."""
     parts = [f"<h1>{escape(results.name)}</h1>", f'<p class="soft">{escape(subtitle(results))}</p>']
     parts.append('<nav><a href="#fastest-structures">Fastest</a><a href="#figures">Figures</a>'
                  '<a href="#all-cells">All cells</a><a href="#built">Structures</a><a href="#skipped">Skipped</a>'
@@ -73,16 +73,20 @@ def subtitle(results):
     return ", ".join(str(v) for v in found if v)
 
 
-def figure(results, name, module, more_caption, reason):
+def figure(results, name, module, pictures, reason):
     head = f'<h3 id="{escape(name)}">{escape(module.TITLE)}</h3>'
     if reason:
         return f'{head}<p class="soft">Not drawn: {escape(reason)}.</p>'
-    picture, kind = results.folder / f"{name}.svg", "svg+xml"
-    if picture.stat().st_size > LARGEST_SVG:
-        picture, kind = results.folder / f"{name}.png", "png"
-    data = base64.b64encode(picture.read_bytes()).decode("ascii")
-    return (f'{head}<figure><img alt="{escape(module.TITLE)}" src="data:image/{kind};base64,{data}">'
-            f"<figcaption>{escape(caption(results, module) + more_caption)}</figcaption></figure>")
+    shown = []
+    for number, picture in enumerate(pictures, 1):
+        path, kind = results.folder / f"{picture.name}.svg", "svg+xml"
+        if path.stat().st_size > LARGEST_SVG:
+            path, kind = results.folder / f"{picture.name}.png", "png"
+        data = base64.b64encode(path.read_bytes()).decode("ascii")
+        which = f"{number} of {len(pictures)}: {', '.join(picture.scenes)}. " if len(pictures) > 1 else ""
+        words = which + (caption(results, module) if number == 1 else "As above.") + picture.more_caption
+        shown.append(f'<figure><img alt="{escape(which + module.TITLE)}" src="data:image/{kind};base64,{data}"><figcaption>{escape(words)}</figcaption></figure>')
+    return head + "\n".join(shown)
 
 
 def caption(results, module):

@@ -7,7 +7,7 @@ is summed up by the median and the interval that it lies in, so that one disturb
 import json
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -35,6 +35,14 @@ class NoData(Exception):
 
 class TooMuch(NoData):
     """Of what there is more than a figure can show, and how to choose from it."""
+
+
+class TooTall(TooMuch):
+    """The same, of a figure that fewer scenes would make less tall: `pages` are as many as it would fill."""
+
+    def __init__(self, message, pages):
+        super().__init__(message)
+        self.pages = pages
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,15 @@ class Results:
     @property
     def name(self):
         return str(self.context.get("experiment") or self.folder.resolve().name)
+
+    def scenes(self):
+        """In their order."""
+        return ordered((cell["scene"] for cell in self.traces + self.structures), "scene")
+
+    def of_scenes(self, scenes):
+        """The same of some scenes."""
+        traces, structures = ([cell for cell in cells if cell["scene"] in scenes] for cells in (self.traces, self.structures))
+        return replace(self, traces=traces, structures=structures, _structure_index={})
 
     def throughput(self):
         """Which figure stands for speed, and its label: thread CPU time as long as every cell has one thread."""

@@ -5,6 +5,7 @@ hatched, so that it stays apart in print too.
 """
 
 import math
+import re
 from collections import Counter
 from textwrap import fill
 
@@ -18,7 +19,7 @@ from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
-from results import TooMuch, interval_name, ordered  # noqa: E402
+from results import TooMuch, TooTall, interval_name, ordered  # noqa: E402
 from tables import per_million_text  # noqa: E402
 
 COLOURS = {  # structures
@@ -316,10 +317,10 @@ def legends_right(figure, legends):
 
 
 def panels(rows, columns, width, height, **options):
-    """A grid of axes, always two-dimensional. Sizes in inches, one panel's each. TooMuch where that is taller than can be read."""
+    """A grid of axes, always two-dimensional. Sizes in inches, one panel's each. TooTall where that is taller than can be read."""
     if not fits(height * rows):
-        raise TooMuch(f"it would be {DPI * height * rows:.0f} pixels tall ({TALLEST} at most); choose fewer scenes, workloads or builders, in the "
-                      f"configuration or with --filter")
+        raise TooTall(f"it would be {DPI * height * rows:.0f} pixels tall ({TALLEST} at most); choose fewer scenes, workloads or builders, in the configuration or with --filter",
+                      math.ceil(DPI * height * rows / TALLEST))
     figure, axes = plt.subplots(rows, columns, figsize=(width * columns, height * rows), squeeze=False,
                                 layout="constrained", **options)
     return figure, axes
@@ -338,7 +339,12 @@ def save(figure, folder, name):
 
 
 def discard(folder, name):
-    """Closes what is open and removes name.png and name.svg: what is left of a figure that could not be drawn."""
+    """Closes what is open and removes name.png and name.svg, name-1.png and so on: what is left of a figure that could not be drawn, or of one drawn before."""
     plt.close("all")
-    for kind in ("png", "svg"):
-        (folder / f"{name}.{kind}").unlink(missing_ok=True)
+    discard_files(folder, name)
+
+
+def discard_files(folder, name):
+    for path in list(folder.iterdir()):
+        if re.fullmatch(rf"{re.escape(name)}(-\d+)?\.(png|svg)", path.name):
+            path.unlink()

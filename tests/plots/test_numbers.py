@@ -3,6 +3,7 @@
 import json
 import math
 import random
+import re
 import subprocess
 import sys
 import unittest
@@ -12,6 +13,7 @@ sys.dont_write_bytecode = True
 
 from made_results import PLOTS, Drawn, Folder, build, other, results_of, trace  # noqa: E402
 
+import pages  # noqa: E402
 import ratios  # noqa: E402
 import report  # noqa: E402
 import style  # noqa: E402
@@ -157,12 +159,34 @@ class Numbers(Drawn):
             self.assertEqual({t.label2.get_visible() for t in axis.xaxis.get_major_ticks()}, {above})
 
     def test_a_figure_that_would_be_too_tall_is_left_out_and_says_so(self):
-        rows = [other("primary", f"scene{k}", isa=isa) for k in range(60) for isa in ("sse", "avx2", "avx512")]
-        with self.assertRaisesRegex(TooMuch, r"pixels tall \(8000 at most\); choose fewer scenes, .*--filter"):
-            rays_per_second.draw(load(Folder([row | {"structure": f"s{n}"} for row in rows for n in range(9)]).path))
-        named = Folder([build(f"bvh{n}", scene=f"scene{s}") | {"name": f"build/scene{s}/bvh{n}/b/l/-/-/-/avx2/-/threads:1"} for s in range(70) for n in range(9)], {"plots": ["sah_cost"]}).plot()
-        self.assertRegex(named.stderr, r"^sah_cost: left out, it would be \d+ pixels tall .*\n$")
+        rows = [build(f"bvh{n}", build_seconds=0.02 + 1e-4 * n + 1e-5 * t) | {"name": f"build/bunny/bvh{n}/b/l/-/-/-/avx2/-/threads:{t}"} for n in range(100) for t in (1, 2, 4, 8)]
+        named = Folder(rows, {"plots": ["build_phases"]}).plot()
+        self.assertRegex(named.stderr, r"^build_phases: left out, it would be \d+ pixels tall \(8000 at most\); choose fewer scenes, .*--filter\n$")
         self.assertEqual(named.returncode, 0)
+
+    def test_a_figure_that_would_be_too_tall_is_drawn_in_parts(self):
+        def built(scenes):
+            return [build(f"bvh{n}", scene=s) | {"name": f"build/{s}/bvh{n}/b/l/-/-/-/avx2/-/threads:1"} for s in scenes for n in range(9)]
+
+        scenes = [f"scene{s}" for s in range(40)]
+        folder = Folder(built(scenes), {"plots": ["sah_cost"]}, files={"sah_cost.png": "of before", "sah_cost-7.svg": "of before", "sah_cost-a.png": "of nobody's"})
+        done = folder.plot()
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertEqual(sorted(p.name for p in folder.path.glob("*.*g")), ["sah_cost-1.png", "sah_cost-1.svg", "sah_cost-2.png", "sah_cost-2.svg", "sah_cost-a.png"])
+        page = (folder.path / "report.html").read_text()
+        captions = re.findall(r"<figcaption>(.*?)</figcaption>", page)
+        self.assertEqual([c.partition(".")[0] for c in captions], [f"1 of 2: {', '.join(scenes[:20])}", f"2 of 2: {', '.join(scenes[20:])}"])
+        self.assertEqual((page.count("<img"), page.count("Expected cost of a ray")), (2, 1))
+        parts = pages.of(sah_cost, load(folder.path))
+        for (own, figure), expected in zip(parts, (scenes[:20], scenes[20:])):
+            self.addCleanup(style.plt.close, figure)
+            self.assertEqual((own, [a.get_title() for a in figure.axes if a.get_visible()]), (expected, expected))
+            self.assertTrue(style.fits(figure.get_size_inches()[1]))
+        self.assertEqual(pages.shares(list("abcde"), 2), [["a", "b"], ["c", "d", "e"]])
+        results = json.loads((folder.path / "results.json").read_text())
+        (folder.path / "results.json").write_text(json.dumps(results | {"benchmarks": built(scenes[:2])}))
+        self.assertEqual(folder.plot().returncode, 0)  # fewer scenes: one file again
+        self.assertEqual(sorted(p.name for p in folder.path.glob("*.png")), ["sah_cost-a.png", "sah_cost.png"])
 
     def test_ways_of_traversal_of_many_modes_are_those_of_the_fastest(self):
         cells = [Cell({"scene": s, "workload": "primary", "isa": "avx2", "structure": "bvh8", "builder": f"b{b}", "leaf": "l", "intersector": f"i{i}", "box": "fast", "traversal": t,
@@ -199,6 +223,23 @@ class Numbers(Drawn):
             names = [t.get_text() for t in axis.get_xticklabels()]
             self.assertEqual(len(set(names)), count + (count > 1))
             self.assertTrue(names[0].endswith(":stretch=1"))
+
+    def test_headings_of_short_names_of_workloads_do_not_overlap(self):
+        cells = [Cell({"scene": "bunny", "workload": w, "isa": "avx2", "structure": s, "builder": "b", "leaf": "l", "intersector": "i", "box": "fast", "traversal": t, "threads": "1"},
+                      [{"rays_per_second": 1e6}]) for w in ("hard", "path", "primary", "diffuse") for s in ("bvh8", "embree") for t in ("single", "packet8")]
+        figure = self.draw(traversal_ratios, results_of(cells))
+        figure.draw_without_rendering()
+        boxes = [t.get_window_extent() for t in figure.axes[0].texts if "…" in t.get_text()]
+        self.assertEqual(len(boxes), 4)
+        self.assertFalse([(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)])
+
+    def test_counts_of_wrong_answers_of_many_bars_do_not_touch(self):
+        rows = [other("diffuse", isa=isa, structure=s, wrong_answers=700) for isa in ("scalar", "sse", "avx2", "avx512") for s in style.COLOURS]
+        figure = self.draw(rays_per_second, load(Folder(rows).path))
+        figure.draw_without_rendering()
+        boxes = [t.get_window_extent() for t in figure.axes[0].texts]
+        self.assertEqual(len(boxes), 60)
+        self.assertFalse([(a, b) for a, b in zip(boxes, boxes[1:]) if a.overlaps(b)])
 
     def test_names_of_places_stay_whole(self):
         self.assertEqual(style.short("suzanne_of_a_long_name:stretch=0.01"), "suzanne_of…:stretch=0.01")
