@@ -14,6 +14,9 @@ CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode 
            "reaches, per million rays. Those of each cell stand in the table. Of several numbers of threads the figure shows the fewest.")
 DIGIT = 0.032  # of a panel's height, that a character of a number above a bar takes
 
+LARGEST, LEAST, LINE = 7.5, 4.5, 1.2  # points of these numbers; how much wider than its size a line of them is
+AROUND = 1.0  # inches of a panel beside its axes
+
 
 def draw(results):
     metric, unit = results.throughput()
@@ -31,7 +34,8 @@ def draw(results):
     figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, width, 2.9, 3 if width < 4.2 else 2)
     for (scene, workload), axis in axes.items():
         here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
-        panel(axis, here, metric, isas, structures, modes, markers)
+        slot = 72 * (width - AROUND) / len(isas) / (len(structures) + 1)  # points that a bar has
+        panel(axis, here, metric, isas, structures, modes, markers, min(LARGEST, max(LEAST, slot / LINE)))
         axis.set_ylabel(unit, **({"fontsize": 8.5} if threads else {}))
     legends = [("structure", structure_legend(structures))]
     dot = Line2D([], [], linestyle="", marker=".", color="#222222", markersize=2.5, label=f"each of {len(modes.labels)}")
@@ -41,7 +45,7 @@ def draw(results):
     return figure
 
 
-def panel(axis, cells, metric, isas, structures, modes, markers):
+def panel(axis, cells, metric, isas, structures, modes, markers, number_size):
     step = 1.0 / (len(structures) + 1)
     bar = 0.86 * step
     for group, isa in enumerate(isas):
@@ -55,8 +59,7 @@ def panel(axis, cells, metric, isas, structures, modes, markers):
                      linewidth=0.5)
             if is_wrong(fastest):
                 top = max(e.high if markers else e.median for _, e in here) / 1e6
-                axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom", fontsize=7.5,
-                              color=WRONG)
+                axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom", fontsize=number_size, color=WRONG)
             if not markers:  # too many modes to tell apart: where they lie is still seen
                 for cell, value in here:
                     axis.plot(x, value.median / 1e6, ".", color=edge(cell), markersize=2.5)

@@ -20,6 +20,7 @@ MOST_ROWS = 60
 # Blue to orange by way of white: readers with any colour vision can tell the ends apart.
 COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FEE9CF", "#FFFFFF", "#D3E4F3", "#5C9BCF", "#1F5A96"])
 MEAN = "mean"
+TO = "… Embree's fastest, or own single rays"  # the longest of what stands below a workload's name
 LONGEST_SCENE = 30  # characters of a name below or above its column
 # inches: of a column at least; of a character of a workload's name above its columns, of a row's name beside it
 COLUMN, CHARACTER, ROW_CHARACTER = 0.52, 0.078, 0.062
@@ -43,7 +44,7 @@ def draw(results):
     columns = columns_of(cells)
     rows = {isa: row_names(table, modes) for isa, table in tables.items()}
     longest = max(map(len, rows.values()))
-    wide = max([COLUMN] + [SMALL * CHARACTER * len(word) for workload, count in spans_of(columns) if count == 1 for word in words_of(workload)])
+    wide = max([COLUMN] + [(SMALL if count == 1 else 1.0) * CHARACTER * (len(word) + 1) / count for workload, count in spans_of(columns) for word in words_of(workload) + TO.split()])
     beside = 1.4 + ROW_CHARACTER * max(len(row_label(row)) for of_isa in rows.values() for row in of_isa)  # names of rows, and the key
     headings = {isa: headings_of(columns, [c for c in cells if c["isa"] == isa], wide) for isa in tables}
     most = max(heading.count("\n") + 1 for of_isa in headings.values() for heading in of_isa)
@@ -120,8 +121,7 @@ def headings_of(columns, cells, wide):
     for workload, count in spans_of(columns):
         places = {compared_at(c) for c in cells if c["workload"] == workload}
         with_embree = {compared_at(c) for c in cells if c["workload"] == workload and c["structure"] == "embree"}
-        to = ("" if not places else "… Embree's fastest" if with_embree == places
-              else "… Embree's fastest, or own single rays" if with_embree else "… own single rays")
+        to = "" if not places else "… Embree's fastest" if with_embree == places else TO if with_embree else "… own single rays"
         most = max(4, int(count * wide / (CHARACTER * (SMALL if count == 1 else 1.0))))
         found.append("\n".join(wrap(" ".join(words_of(workload)), most, break_long_words=False) + wrap(to, most, break_long_words=False)).replace("= ", "="))
     return found

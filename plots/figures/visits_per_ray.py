@@ -2,6 +2,7 @@
 
 from matplotlib.lines import Line2D
 
+from figures.names import label
 from figures.rows import FONT, groups_of, places_of, row_panels, rows_are_due
 from results import Cell, NoData, ordered, telling_axes
 from style import legends_right, letters, log_axis, panel_title, short_names
@@ -57,13 +58,13 @@ def counts(cell):
 
 
 def chosen(workloads):
-    """At most one of coherent rays and one of incoherent ones; where there is neither, the first."""
-    found = [next((w for w in kind if w in workloads), None) for kind in (COHERENT, INCOHERENT)]
+    """At most one of coherent rays and one of incoherent ones, whatever their variant; where there is neither, the first."""
+    found = [next((w for base in kind for w in workloads if w.partition(":")[0] == base), None) for kind in (COHERENT, INCOHERENT)]
     return [w for w in found if w] or workloads[:1]
 
 
 def without_doubles(cells):
-    """Cells that differ in leaf, tests or threads alone and show the same numbers in every panel are one, which is not called by what they differ in."""
+    """Cells that differ in leaf, tests or threads alone and show the same numbers in every panel are one, which is called by what they differ in only where others differ in it, too."""
     variants = {}
     for cell in cells:
         same = tuple(cell[a] for a in ("structure", "builder", "traversal"))
@@ -74,9 +75,15 @@ def without_doubles(cells):
         for tests, here in own.items():
             alike.setdefault(frozenset((c["scene"], shown(c)) for c in here), []).append(tests)
         for these in alike.values():
-            blank = {a: "" for i, a in enumerate(TESTS) if len({tests[i] for tests in these}) > 1}
+            blank = {a: several({tests[i] for tests in these}, {tests[i] for tests in own}, a) for i, a in enumerate(TESTS) if len({tests[i] for tests in these}) > 1}
             found += [Cell({**c.axes, **blank}, c.rows) for c in own[these[0]]]
     return found
+
+
+def several(keys, of, axis):
+    """What a row of several keys is called by them: nothing where there are no others."""
+    first = ordered(keys, axis)
+    return "" if len(keys) == len(of) else ", ".join(label(axis, key) for key in first[:2]) + (" …" if len(first) > 2 else "")
 
 
 def shown(cell):

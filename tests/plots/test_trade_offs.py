@@ -190,8 +190,16 @@ class Visits(Drawn):
         self.assertTrue(all(row[f"{s}, primary"] == row[f"{s}, diffuse"] for s in ("bunny", "dragon", "city")))
 
     def test_workloads_of_one_kind(self):
-        for given, kept in ((["random"], ["random"]), (["whitted", "path"], ["whitted"]), (["primary"], ["primary"]), (["shadow", "reflection"], ["shadow", "reflection"])):
+        for given, kept in ((["random"], ["random"]), (["whitted", "path"], ["whitted"]), (["primary"], ["primary"]), (["shadow", "reflection"], ["shadow", "reflection"]),
+                            (["primary", *(f"diffuse:self_intersection={way}" for way in ("epsilon", "none"))], ["primary", "diffuse:self_intersection=epsilon"])):
             self.assertEqual(visits_per_ray.chosen(given), kept)
+
+    def test_a_row_of_several_tests_is_called_by_them_where_there_are_others(self):
+        boxes = ("fast", "ize", "padded")
+        (axis,) = self.draw([self.counted(9.5 + (b == "padded"), box=b) for b in boxes]).axes
+        self.assertEqual(self.labels(axis), ["bvh8", "fast, ize", "padded"])
+        (axis,) = self.draw([self.counted(9.5, box=b) for b in boxes]).axes
+        self.assertEqual(self.labels(axis), ["bvh8"])
 
     def test_tests_that_change_no_number_are_one_row(self):
         tests = ({"leaf": "triangle8", "intersector": "moller_trumbore", "box": "fast"}, {"leaf": "triangle8v", "intersector": "watertight"})
