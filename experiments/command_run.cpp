@@ -132,11 +132,26 @@ void write_results(const std::filesystem::path& folder, const RunOutcome& outcom
     fmt::print("{}", text(flags.format, flags.report_aggregates_only || flags.display_aggregates_only));
 }
 
+/// Whether plots draw a file of that name: `sah_cost.png`, or of a figure in several parts `sah_cost-2.png`.
+bool is_figure_file(std::string_view name) {
+  if (!name.ends_with(".png") && !name.ends_with(".svg")) return false;
+  const std::string_view stem = name.substr(0, name.size() - 4);
+  return std::ranges::any_of(plot_names(), [&](std::string_view plot) {
+    if (!stem.starts_with(plot)) return false;
+    const std::string_view part = stem.substr(plot.size());
+    return part.empty() ||
+           (part.size() > 1 && part[0] == '-' && part.find_first_not_of("0123456789", 1) == std::string_view::npos);
+  });
+}
+
 /// What a run concludes with, its figures among it.
-std::vector<std::string> concluding_files() {
+std::vector<std::string> concluding_files(const std::filesystem::path& folder) {
   std::vector<std::string> names{"results.json", "results.csv", "report.html"};
-  for (std::string_view plot : plot_names())
-    for (const char* extension : {".png", ".svg"}) names.push_back(std::string(plot) + extension);
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (is_figure_file(name)) names.push_back(name);
+  }
   return names;
 }
 
@@ -155,7 +170,7 @@ void remove_files(const std::filesystem::path& folder, const std::vector<std::st
 
 /// All that a run writes into its folder.
 std::vector<std::string> files_of_run(const std::filesystem::path& folder) {
-  std::vector<std::string> names = concluding_files();
+  std::vector<std::string> names = concluding_files(folder);
   names.insert(names.end(), {"cells.jsonl", "repetitions.jsonl", "effective.yaml", kPlanFile});
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
@@ -247,7 +262,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   for (const Json& earlier : record.earlier)
     std::ranges::move(differing_conditions(earlier, context), std::back_inserter(changed));
   write_whole(folder / kPlanFile, to_text(record), kGoesOn);
-  remove_files(folder, present(folder, concluding_files()));  // not before something could be written
+  remove_files(folder, present(folder, concluding_files(folder)));  // not before something could be written
   for (const std::string& line : experiment.left_out) fmt::print(stderr, "{}\n", line);
   fmt::print(stderr, "{}: {} ({} done before), {} skipped{}; about {}\n", experiment.name,
              counted(plan.cells.size(), "cell"), journal.done().size(), plan.skipped.size(),

@@ -148,11 +148,11 @@ class CommandLine(CommandLineCase):
     def test_figures_of_an_earlier_run_go_and_other_files_stay(self):
         few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build", "--out", "out")
         (self.folder / "out").mkdir()
-        for name in ("sah_cost.png", "rays_per_second.svg", "mine.png", "sah_cost.png.txt", "report.html"):
+        for name in ("sah_cost.png", "sah_cost-2.png", "rays_per_second.svg", "mine.png", "sah_cost-mine.png", "sah_cost.png.txt", "report.html"):
             self.write(f"out/{name}", "old")
         self.assertEqual(self.run_small(*few).returncode, 0)
         left = {p.name for p in (self.folder / "out").iterdir()}
-        self.assertEqual(left & {"sah_cost.png", "rays_per_second.svg", "mine.png", "sah_cost.png.txt", "report.html"}, {"mine.png", "sah_cost.png.txt"})
+        self.assertEqual(left & {"sah_cost.png", "sah_cost-2.png", "rays_per_second.svg", "mine.png", "sah_cost-mine.png", "sah_cost.png.txt", "report.html"}, {"mine.png", "sah_cost-mine.png", "sah_cost.png.txt"})
 
     def test_a_chosen_interpreter_that_cannot_draw_is_an_error(self):
         few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build")
