@@ -85,7 +85,8 @@ def figure(results, name, module, pictures, reason):
         data = base64.b64encode(path.read_bytes()).decode("ascii")
         which = f"{number} of {len(pictures)}: {', '.join(picture.scenes)}. " if len(pictures) > 1 else ""
         words = which + (caption(results, module) if number == 1 else "As above.") + picture.more_caption
-        shown.append(f'<figure><img alt="{escape(which + module.TITLE)}" src="data:image/{kind};base64,{data}"><figcaption>{escape(words)}</figcaption></figure>')
+        shown.append(f'<figure><img alt="{escape(which + module.TITLE)}" src="data:image/{kind};base64,{data}">'
+                     f'<figcaption>{escape(words)}</figcaption></figure>')
     return head + "\n".join(shown)
 
 

@@ -245,7 +245,8 @@ def short(scene, most=24):
 
 
 def short_names(scenes, most=24):
-    """{scene: its name as short() has it}: of names that would be the same as another's, or be cut within a number, so many characters more as they need not to be. What stands on lines of their own below a name stays."""
+    """{scene: its name as short() has it}: of names that would be the same as another's, or be cut within a number,
+    so many characters more as they need not to be. What stands on lines of their own below a name stays."""
     lengths = dict.fromkeys(scenes, most)
     while True:
         found = {scene: "\n".join([short(name, length), *more]) for scene, length in lengths.items() for name, *more in [scene.split("\n")]}
@@ -269,7 +270,8 @@ def letters(width):
 
 
 def panel_title(scene, workload, width):
-    """Scene, shortened already, and workload on as many lines as a panel `width` inches wide needs: broken between the two, then within a name before a variant."""
+    """Scene, shortened already, and workload on as many lines as a panel `width` inches wide needs: broken between the two, then within a
+    name before a variant."""
     most, workload = letters(width), workload.replace("_", " ")
     if max(map(len, f"{scene}, {workload}".split("\n"))) <= most:
         return f"{scene}, {workload}"
@@ -319,7 +321,8 @@ def legends_right(figure, legends):
 def panels(rows, columns, width, height, **options):
     """A grid of axes, always two-dimensional. Sizes in inches, one panel's each. TooTall where that is taller than can be read."""
     if not fits(height * rows):
-        raise TooTall(f"it would be {DPI * height * rows:.0f} pixels tall ({TALLEST} at most); choose fewer scenes, workloads or builders, in the configuration or with --filter",
+        raise TooTall(f"it would be {DPI * height * rows:.0f} pixels tall ({TALLEST} at most); "
+                      f"choose fewer scenes, workloads or builders, in the configuration or with --filter",
                       math.ceil(DPI * height * rows / TALLEST))
     figure, axes = plt.subplots(rows, columns, figsize=(width * columns, height * rows), squeeze=False,
                                 layout="constrained", **options)

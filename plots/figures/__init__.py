@@ -1,7 +1,8 @@
 """One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, whose `more_caption`, where it has one, the caption goes on with, or
 raises NoData. ONLY_WHEN_NAMED: a configuration draws it only where it names it, and is told where it could not be drawn.
 
-A new figure is a module here, its name in ALL and in experiments/config_plots.cpp. Other modules here (bars, costs, names, rows, squares, trade_offs, modes, leak_lines) are what figures share.
+A new figure is a module here, its name in ALL and in experiments/config_plots.cpp. Other modules here
+(bars, costs, names, rows, squares, trade_offs, modes, leak_lines) are what figures share.
 """
 
 ALL = ("rays_per_second", "traversal_ratios", "rays_by_builder", "sah_cost", "epo", "leaf_histograms", "bytes_per_triangle", "build_time",

@@ -26,7 +26,8 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
     if squares.are_due(bars.values(), varied):
         every = [c for c in results.structures if value_of(c)]
         varied = telling_axes(every, ("scene", "structure"), label_axes)
-        return squares.square_panels([(names[scene], [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label, higher_is_better=False)[0]
+        return squares.square_panels([(names[scene], [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label,
+                                     higher_is_better=False)[0]
 
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)

@@ -8,8 +8,8 @@ from tables import digits
 
 TITLE = "Build time"
 CAPTION = ("Wall time from mesh to a structure ready for rays, with {interval}; "
-           "beside it, triangles a second. The parts are the build's own phases: of each, and of the rest, the median of its shares of the repetitions, all drawn to "
-           "make up the median together; grey is what no phase covers. "
+           "beside it, triangles a second. The parts are the build's own phases: of each, and of the rest, the median of its shares of the repetitions, "
+           "all drawn to make up the median together; grey is what no phase covers. "
            "Lower is better.")
 
 

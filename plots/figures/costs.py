@@ -7,12 +7,13 @@ from results import Cell
 
 NAMES = ("traversal_cost", "intersection_cost")
 ONE = (1.0, 1.0)
-CAPTION = (" Costs are those of the structure's own `traversal_cost` (a step at a node) and `intersection_cost` (a leaf block's test), 1 unless something else is said: "
-           "numbers of other costs are in other units, and are not to be compared.")
+CAPTION = (" Costs are those of the structure's own `traversal_cost` (a step at a node) and `intersection_cost` (a leaf block's test), 1 unless "
+           "something else is said: numbers of other costs are in other units, and are not to be compared.")
 
 
 def costs_of(cell, results):
-    """(of a step, of a block's test) of a structure as built: as its builder's name has them, which it does where several are measured, else the configuration's."""
+    """(of a step, of a block's test) of a structure as built: as its builder's name has them, which it does where several are measured,
+    else the configuration's."""
     named = dict(part.split("=", 1) for part in cell["builder"].split(":")[1:] if "=" in part)
     return tuple(number(named.get(name) or alone(results.effective_yaml, name)) for name in NAMES)
 
@@ -35,7 +36,8 @@ def words(costs):
 
 
 def split(cells, results):
-    """[(cell, the one to draw)]: where there are several costs, scenes are apart by them, and called by them in a second line; and what has to be said of them at an axis."""
+    """[(cell, the one to draw)]: where there are several costs, scenes are apart by them, and called by them in a second line;
+    and what has to be said of them at an axis."""
     every = {costs_of(c, results) for c in cells}
     if len(every) < 2:
         return [(c, c) for c in cells], "".join(" " + words(costs) for costs in every if costs != ONE)

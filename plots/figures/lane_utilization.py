@@ -9,9 +9,11 @@ from results import NoData, TooMuch, ordered
 from style import MARKERS, colour, legends_right, marker_legend, marker_map, panel_grid, structure_legend
 
 TITLE = "Lane utilisation by depth"
-CAPTION = ("Of the SIMD lanes of ray/box tests at nodes of a depth, those that hold a ray and a box: a packet has a child's rays in lanes, a ray that goes alone a "
-           "node's children; registers without a ray are passed over and not counted. Depths of less than one visit in a thousand rays are left out. Counted in a pass of its own, untimed. "
-           "Of several builders, leaves, tests or numbers of threads a line is of those that the configuration has first; the legend says which, and what is not shown.")
+CAPTION = ("Of the SIMD lanes of ray/box tests at nodes of a depth, those that hold a ray and a box: a packet has a child's rays in lanes, a ray that goes "
+           "alone a node's children; registers without a ray are passed over and not counted. Depths of less than one visit in a thousand rays are left "
+           "out. Counted in a pass of its own, untimed. "
+           "Of several builders, leaves, tests or numbers of threads a line is of those that the configuration has first; the legend says which, "
+           "and what is not shown.")
 FEWEST_VISITS = 1e-3
 ONLY_WHEN_NAMED = True
 HIDDEN = ("builder", "leaf", "intersector", "box", "threads")  # axes of which a line is of one key
@@ -34,7 +36,8 @@ def draw(results):
         for cell in (c for c in cells if c["scene"] == scene and c["workload"] == workload):
             points = [(d, 100 * lanes) for d, (lanes, visits) in enumerate(zip(cell.series("lane_utilization_by_depth"), cell.series("visits_by_depth")))
                       if lanes is not None and visits >= FEWEST_VISITS]
-            axis.plot(*zip(*points), color=colour(cell["structure"]), linewidth=1.1, marker=markers[label(modes, cell, isas)], markersize=4, markerfacecolor="white")
+            axis.plot(*zip(*points), color=colour(cell["structure"]), linewidth=1.1, marker=markers[label(modes, cell, isas)], markersize=4,
+                      markerfacecolor="white")
         axis.set_ylim(0, 103)
         axis.set_xlabel("depth of the node (the root's is 0)")
         axis.set_ylabel("lanes in use, %")
@@ -45,7 +48,8 @@ def draw(results):
 
 
 def of_the_first(cells, line_of):
-    """Those cells that have the keys of HIDDEN which the first cell of their line has, and, in a line for each of HIDDEN, what of several is shown and what is not."""
+    """Those cells that have the keys of HIDDEN which the first cell of their line has, and, in a line for each of HIDDEN, what of
+    several is shown and what is not."""
     first = {}
     for cell in cells:
         first.setdefault(line_of(cell), tuple(cell[a] for a in HIDDEN))
@@ -61,7 +65,8 @@ def of_the_first(cells, line_of):
         alike = {}
         for structure, hidden in others.items():
             alike.setdefault((tuple(ordered(shown[structure], axis)), tuple(ordered(hidden - shown[structure], axis))), []).append(structure)
-        told += [f"{', '.join(structures)}: {axis} {', '.join(here)}" + (f"; not shown: {', '.join(hidden)}" if hidden else "") for (here, hidden), structures in alike.items()]
+        told += [f"{', '.join(structures)}: {axis} {', '.join(here)}" +
+                 (f"; not shown: {', '.join(hidden)}" if hidden else "") for (here, hidden), structures in alike.items()]
     return kept, told
 
 

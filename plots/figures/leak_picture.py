@@ -32,7 +32,8 @@ def draw(results):
         seen = seen_points(results.folder, scene)
         for axis, key in zip(row, keys):
             panel(axis, seen, names[scene] if len(scenes) > 1 else "", key, found[scene][key], boxes)
-    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5, color=box_colour(box), label=f"{box} boxes")
+    legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5,
+                                                                     color=box_colour(box), label=f"{box} boxes")
                                            for box, size in boxes.items()])])
     return figure
 

@@ -4,7 +4,8 @@ from figures import squares
 from figures.bars import draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short_names, wrong_legend, wrong_marker, wrong_text
+from style import (MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short_names, wrong_legend,
+                   wrong_marker, wrong_text)
 from tables import digits
 
 TITLE = "Rays per second by structure and builder"

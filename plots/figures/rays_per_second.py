@@ -10,8 +10,9 @@ from style import (MARKERS, WRONG, colour, edge, hatch, interval_legend, is_wron
 
 TITLE = "Rays per second"
 CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}, "
-           "dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong answers; the red number above a bar counts those of the mode that the bar "
-           "reaches, per million rays. Those of each cell stand in the table. Of several numbers of threads the figure shows the fewest.")
+           "dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong "
+           "answers; the red number above a bar counts those of the mode that the bar reaches, per million rays. "
+           "Those of each cell stand in the table. Of several numbers of threads the figure shows the fewest.")
 DIGIT = 0.032  # of a panel's height, that a character of a number above a bar takes
 
 LARGEST, LEAST, LINE = 7.5, 4.5, 1.2  # points of these numbers; how much wider than its size a line of them is
@@ -59,7 +60,8 @@ def panel(axis, cells, metric, isas, structures, modes, markers, number_size):
                      linewidth=0.5)
             if is_wrong(fastest):
                 top = max(e.high if markers else e.median for _, e in here) / 1e6
-                axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom", fontsize=number_size, color=WRONG)
+                axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom",
+                              fontsize=number_size, color=WRONG)
             if not markers:  # too many modes to tell apart: where they lie is still seen
                 for cell, value in here:
                     axis.plot(x, value.median / 1e6, ".", color=edge(cell), markersize=2.5)

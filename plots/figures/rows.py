@@ -64,7 +64,8 @@ def row_panels(groups, scenes, widths, room=0.0, titles=None, together=1):
     bands = -(-len(scenes) // max(together, int(WIDEST / one) // together * together))
     beside = -(-len(scenes) // (bands * together)) * together
     columns = beside * len(widths)
-    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True, gridspec_kw={"width_ratios": widths * beside})
+    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True,
+                          gridspec_kw={"width_ratios": widths * beside})
     found, titles = {}, titles or short_names(scenes)
     for place in range(bands * beside):
         first = place % beside * len(widths)

@@ -7,7 +7,9 @@ from tables import SAH_STEP
 
 TITLE = "SAH cost"
 CAPTION = ("Expected cost of a ray through the root's box. Lower is better. Structures that "
-           "cannot be looked into, as embree, have none; brute_force, which has no tree and whose cost is many times that of all others, is left out where there are others." + costs.CAPTION + " " + SAH_STEP + " With a step for each child box instead, the cost stands in the report's table of structures.")
+           "cannot be looked into, as embree, have none; brute_force, which has no tree and whose cost is many times that of all others, is left out where "
+           "there are others." + costs.CAPTION + " " + SAH_STEP +
+           " With a step for each child box instead, the cost stands in the report's table of structures.")
 
 
 def draw(results):

@@ -10,9 +10,12 @@ from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker
 from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
-CAPTION = ("A point is a structure as built, by one builder, on a scene, with its fastest leaf traced in its fastest mode; of several numbers of threads the figure shows the fewest. A line is the least-squares fit through the points of one scene "
-           "in a panel, R² its share of the variance explained (where scenes share a panel, in the legend's order; of more than three the least and the most); with EPO: that of the plane "
-           "through SAH cost and end-point overlap, which never explains less, so small differences say nothing. There is no fit where fewer than four costs are more than 2 % apart. brute_force, which has no tree and whose cost and time are many times those of all others, is left out: it alone would decide the fit. "
+CAPTION = ("A point is a structure as built, by one builder, on a scene, with its fastest leaf traced in its fastest mode; of "
+           "several numbers of threads the figure shows the fewest. A line is the least-squares fit through the points of one scene in a panel, R² its share "
+           "of the variance explained (where scenes share a panel, in the legend's order; of more than three the least and the most); with EPO: that of the "
+           "plane through SAH cost and end-point overlap, which never explains less, so small differences say nothing. There is no fit where "
+           "fewer than four costs are more than 2 % apart. brute_force, which has no tree and whose cost and time are many times those of all others, is "
+           "left out: it alone would decide the fit. "
            "So are rays that are aimed at edges and vertices (hard ones, camera_edges). A red edge: the mode has wrong answers. "
            + costs.CAPTION[1:] + " " + SAH_STEP + " So a low R² across structures is a finding, not a fault.")
 

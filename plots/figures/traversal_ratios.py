@@ -44,7 +44,8 @@ def draw(results):
     columns = columns_of(cells)
     rows = {isa: row_names(table, modes) for isa, table in tables.items()}
     longest = max(map(len, rows.values()))
-    wide = max([COLUMN] + [(SMALL if count == 1 else 1.0) * CHARACTER * (len(word) + 1) / count for workload, count in spans_of(columns) for word in [*words_of(workload), TO.partition(" fastest")[0]]])
+    wide = max([COLUMN] + [(SMALL if count == 1 else 1.0) * CHARACTER * (len(word) + 1) / count
+                           for workload, count in spans_of(columns) for word in [*words_of(workload), TO.partition(" fastest")[0]]])
     beside = 1.4 + ROW_CHARACTER * max(len(row_label(row)) for of_isa in rows.values() for row in of_isa)  # names of rows, and the key
     headings = {isa: headings_of(columns, [c for c in cells if c["isa"] == isa], wide) for isa in tables}
     most = max(heading.count("\n") + 1 for of_isa in headings.values() for heading in of_isa)

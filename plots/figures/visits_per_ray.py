@@ -64,7 +64,8 @@ def chosen(workloads):
 
 
 def without_doubles(cells):
-    """Cells that differ in leaf, tests or threads alone and show the same numbers in every panel are one, which is called by what they differ in only where others differ in it, too."""
+    """Cells that differ in leaf, tests or threads alone and show the same numbers in every panel are one, which is called by
+    what they differ in only where others differ in it, too."""
     variants = {}
     for cell in cells:
         same = tuple(cell[a] for a in ("structure", "builder", "traversal"))
@@ -75,7 +76,8 @@ def without_doubles(cells):
         for tests, here in own.items():
             alike.setdefault(frozenset((c["scene"], shown(c)) for c in here), []).append(tests)
         for these in alike.values():
-            blank = {a: several({tests[i] for tests in these}, {tests[i] for tests in own}, a) for i, a in enumerate(TESTS) if len({tests[i] for tests in these}) > 1}
+            blank = {a: several({tests[i] for tests in these}, {tests[i] for tests in own}, a) for i, a in enumerate(TESTS)
+                     if len({tests[i] for tests in these}) > 1}
             found += [Cell({**c.axes, **blank}, c.rows) for c in own[these[0]]]
     return found
 
