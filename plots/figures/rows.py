@@ -11,6 +11,7 @@ from style import legends_right, panels, part_colour, short_names
 
 # Inches: of a row; above and below a panel's rows; of a character of a label; that scenes side by side may take.
 ROW, AROUND, CHARACTER, WIDEST = 0.15, 0.95, 0.062, 13.5
+TITLE_LINE = 0.18  # of each line of a title below the first
 MOST_STRETCH = 2.2  # of panels, where few scenes leave them room
 FONT = 7.5
 
@@ -64,9 +65,11 @@ def row_panels(groups, scenes, widths, room=0.0, titles=None, together=1):
     bands = -(-len(scenes) // max(together, int(WIDEST / one) // together * together))
     beside = -(-len(scenes) // (bands * together)) * together
     columns = beside * len(widths)
-    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + ROW * len(lines), sharey=True,
+    titles = titles or short_names(scenes)
+    more = max(titles[scene].count("\n") for scene in scenes)
+    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + TITLE_LINE * more + ROW * len(lines), sharey=True,
                           gridspec_kw={"width_ratios": widths * beside})
-    found, titles = {}, titles or short_names(scenes)
+    found = {}
     for place in range(bands * beside):
         first = place % beside * len(widths)
         own = list(axes[place // beside][first:first + len(widths)])

@@ -2,6 +2,7 @@
 
 import sys
 import unittest
+import warnings
 
 sys.dont_write_bytecode = True
 
@@ -200,6 +201,15 @@ class Visits(Drawn):
         self.assertEqual(self.labels(axis), ["bvh8", "fast, ize", "padded"])
         (axis,) = self.draw([self.counted(9.5, box=b) for b in boxes]).axes
         self.assertEqual(self.labels(axis), ["bvh8"])
+
+    def test_titles_of_several_lines_have_room(self):
+        figure = self.draw([self.counted(scene=f"sphere-4000:stretch={k}0:offset=100", workload=w) for k in range(5) for w in ("primary", "diffuse:self_intersection=epsilon")])
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of a layout that does not fit
+            figure.draw_without_rendering()
+        boxes = [a._left_title.get_window_extent() for a in figure.axes if a.get_visible()]
+        self.assertEqual(len(boxes), 10)
+        self.assertFalse([(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)])
 
     def test_tests_that_change_no_number_are_one_row(self):
         tests = ({"leaf": "triangle8", "intersector": "moller_trumbore", "box": "fast"}, {"leaf": "triangle8v", "intersector": "watertight"})
