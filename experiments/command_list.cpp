@@ -159,8 +159,13 @@ std::string remark(const Json& entry) {
       return name.ends_with(kAgain) &&
              std::ranges::find(every, name.substr(0, name.size() - kAgain.size())) != every.end();
     });
-    line += fmt::format(" [builders: {}{}]", fmt::join(names, " "),
-                        names.size() < all ? fmt::format("; each also as …{}", kAgain) : "");
+    const std::vector<std::string> plain = names;
+    std::erase_if(names, [&](const std::string& name) {
+      return std::ranges::find(every, name + std::string(kAgain)) == every.end();
+    });
+    const std::string which = names.size() == plain.size() ? "each" : fmt::format("{}", fmt::join(names, " "));
+    line += fmt::format(" [builders: {}{}]", fmt::join(plain, " "),
+                        plain.size() < all ? fmt::format("; {} also as …{}", which, kAgain) : "");
   }
   if (entry.contains("generator")) {
     line += !entry["generator"].get<bool>()   ? fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>())

@@ -30,7 +30,8 @@ TEST_CASE("reinsertion lowers the SAH cost of every builder's tree, and raises t
       if (builder.starts_with("embree_high") && scene.mesh.size() > 3000) continue;  // takes seconds
       for (const StructureEntry& entry : all_structures()) {
         const StructureInfo& info = entry.info;
-        if (info.takes_below || info.needs_motion || std::ranges::find(info.builders, builder) == info.builders.end())
+        if (info.takes_below || info.needs_motion || info.flat ||
+            std::ranges::find(info.builders, builder) == info.builders.end())
           continue;
         INFO(info.name << ", " << builder << ", " << scene.name);
         const double before = sah_of(plain, scene.mesh, {}, info.name),

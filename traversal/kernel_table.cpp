@@ -104,6 +104,7 @@ template <int W>
     const bool ours = traversal == "stream" || traversal == "stream_sorted" || traversal == "stream_lists";
     if (ours && !entry->info.no_streams.empty()) return std::string(entry->info.no_streams);
     if (traversal.starts_with("queued") && !entry->info.no_queue.empty()) return std::string(entry->info.no_queue);
+    if (entry->info.library.empty() && !traversal.ends_with("coherent")) return "not built";
   }
   const std::string owners =
       values_of(&KernelRow::structure, [&](const KernelRow& r) { return r.traversal == traversal; });

@@ -11,6 +11,7 @@
 #include "intersectors/blocks.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
+#include "structures/leaves/leaf_form.h"
 #include "structures/leaves/leaf_names.h"
 #include "structures/parameter_limits.h"
 
@@ -67,6 +68,7 @@ const StructureInfo& SortedBoxes::static_info() {
     i.summary = "a flat list of leaf blocks, each with a box: all boxes tested, hit ones visited from near to far";
     i.builders = binary_builder_names();
     i.leaves = all_leaf_names();
+    i.only_single_rays = "every ray tests every box: there is no node to share";
     i.flat = true;
     i.root_is_node = true;
     return i;
@@ -90,7 +92,8 @@ void SortedBoxes::build(const TriangleMesh& mesh, const BuildSettings& settings,
     for (std::size_t i = 0; i < groups() * BoxGroup::kWidth; ++i) {
       const bool exists = i < blocks_;
       write_box(group[i / BoxGroup::kWidth], i % BoxGroup::kWidth, exists ? bounds_of(mesh, list[i]) : Bounds3f{});
-      if (exists) fill_blocks(block + i, mesh, list[i]);
+      // As a leaf form fills it: bytes that no triangle is in are 0, so that saved files are the same each time.
+      if (exists) find_leaf_form(settings.leaf)->fill(reinterpret_cast<std::byte*>(block + i), mesh, list[i]);
     }
     report.phases.emplace_back("blocks", wall_seconds() - start);
   });
