@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "oracle/hard_rays.h"
 #include "oracle/oracle.h"
 #include "structures/accel.h"
 #include "structures/end_point_overlap.h"
@@ -246,6 +247,43 @@ TEST_CASE("scenes as wide as floats go take no more cells than others, and lose 
           CHECK((!truth[i].hit.is_hit() || hits[i].t == truth[i].hit.t));
         }
       }
+    }
+  }
+}
+
+TEST_CASE("a ray that has met an inner grid's last face stays in its last cells until it leaves the outer cell") {
+  // Far from the origin the two faces are rounded apart, and rays that hardly move across them are between them for
+  // long.
+  const TriangleMesh mesh = moved_and_scaled(sphere(42), 1e5, 0);
+  const Bounds3f box = mesh.bounds();
+  std::vector<Ray> rays;
+  for (std::uint64_t i = 0; i < 30000; ++i) {
+    Ray ray;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double low = box.lower[a], high = box.upper[a];
+      ray.origin[a] = float(low + (high - low) * (0.05 + 0.9 * random_double(61, i, unsigned(a))));
+      ray.direction[a] = float(2 * random_double(62, i, unsigned(a)) - 1);
+    }
+    ray.direction[i % 3] *= std::ldexp(1.0f, -int(i / 3 % 24));
+    rays.push_back(ray);
+  }
+  const std::vector<ExactHit> truth = Oracle(mesh).closest_hit(rays);
+  CHECK(std::ranges::count_if(truth, [](const ExactHit& h) { return h.hit.is_hit(); }) > 15000);
+  for (const Isa isa : available_isas()) {
+    const std::string leaf(default_leaf("grid", "exact", isa));
+    const auto accel = build({"grid", "two_level"}, mesh, leaf);
+    for (const char* traversal : {"single", "packet16", "packet64", "hybrid16", "auto"}) {
+      const KernelRow* row = find_kernel("grid", leaf, "exact", "padded", traversal, isa);
+      if (isa == Isa::scalar && !row) continue;
+      REQUIRE(row);
+      INFO(name_of(*row));
+      const std::vector<Hit> hits = closest_hit(*row, *accel, rays);
+      const std::vector<std::uint8_t> occluded = any_hit(*row, *accel, rays);
+      std::size_t wrong = 0, lost = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i)
+        wrong += hits[i].primitive != truth[i].hit.primitive, lost += occluded[i] == 0 && truth[i].hit.is_hit();
+      CHECK(wrong == 0);
+      CHECK(lost == 0);
     }
   }
 }

@@ -18,11 +18,12 @@
 // |o - lower| <= 16 L on each axis, |o| <= M + 16 L and the sum is below
 //   4 u (2 M + 16 L) + 8 u * 17 L + 2 u M = 10 u M + 200 u L < pad.
 // So the cell in which the walk is at t, whichever of two neighbours it takes, holds the triangle that is hit at t. The
-// walk's intervals of t follow each other without a gap, and it ends where best.t lies before the end of the cell's
-// interval: all that could answer with t <= best.t has been tested by then, ties included. `fast` relies on this for
-// any ray. `padded` sends the rays outside these bounds (origins beyond 16 L, directions out of the range in which the
-// constants stay normal) through the same cells as if they were the leaves of a tree with padded boxes
-// (grid_far_single.h).
+// walk's intervals of t follow each other without a gap: where the last face of an inner grid is met before the face of
+// the outer cell, which rounding parts, the ray stays in the last cells of the inner grid until it leaves the outer
+// one. The walk ends where best.t lies before the end of the cell's interval: all that could answer with t <= best.t
+// has been tested by then, ties included. `fast` relies on this for any ray. `padded` sends the rays outside these
+// bounds (origins beyond 16 L, directions out of the range in which the constants stay normal) through the same cells
+// as if they were the leaves of a tree with padded boxes (grid_far_single.h).
 #pragma once
 
 #include <algorithm>

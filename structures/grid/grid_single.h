@@ -54,8 +54,9 @@ ARBORETUM_INLINE bool walk_grid(const grid::Grid& grid, const Ray& ray, float fr
             last = inside;
             if (visits(inside)) return true;
           }
+          if (!(inner_leave < leave)) break;
           if (ends_before(inner_leave)) return false;
-          if (!inner.step(inner_axes)) break;
+          if (!inner.step_within(inner_axes)) break;
         }
       } else if (code != last) {
         last = code;

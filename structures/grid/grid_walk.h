@@ -91,6 +91,19 @@ struct GridWalk {
     return true;
   }
 
+  /// The same in the grid of a cell that the ray has not left yet, though it has met this grid's last face on some
+  /// axis: as the outer walk has that face, it is farther, by as much as roundings are on an axis along which the ray
+  /// hardly moves. Until then the ray is in the last cells of that axis.
+  ARBORETUM_INLINE bool step_within(vm<4> axes) {
+    const F less = rest - F(1.0f);
+    const vm<4> ends = axes & (less < F(0.0f)), steps = axes & (less >= F(0.0f));
+    const unsigned bits = steps.bits();
+    exits = select(steps, nmadd(less, per_cell, far), exits), rest = select(steps, less, rest);
+    exits = select(ends, F(std::numeric_limits<float>::infinity()), exits);
+    cell += std::uint32_t(stride[bits & 7]);
+    return (bits | ends.bits()) != 0;
+  }
+
  private:
   static ARBORETUM_INLINE F last_of(const grid::Level& level) {
     alignas(16) static constexpr std::int32_t lanes[4] = {-1, -1, -1, 0};
