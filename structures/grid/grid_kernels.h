@@ -27,21 +27,11 @@ struct GridSingle {
   }
 };
 
-using GridSingles = ListedLeaves<grid::Grid, GridSingle>;
-
-/// Single rays within `auto`: leaves are called, as in the rows of single rays. Compiled in, they cost 4 to 6 % of
-/// diffuse rays on AVX-512.
-struct GridAlone : GridSingles::Functions {
-  template <class, bool Padded>
-  static RowFunctions timed() {
-    return GridSingles::Functions::timed<CalledLeaves, Padded>();
-  }
-};
-
 inline void add_kernels(std::type_identity<grid::Grid>, KernelRows& rows) {
-  GridSingles::add(rows);
+  using Single = ListedLeaves<grid::Grid, GridSingle>;
+  Single::add(rows);
   add_packet_rows<grid::Grid, GridPacketFamily>(rows, BatchLeaves{});
-  add_rows<grid::Grid, AutoFunctions<GridPacketFamily, BatchLeaves, GridAlone>>(rows, "auto", BatchLeaves{});
+  add_rows<grid::Grid, AutoFunctions<GridPacketFamily, BatchLeaves, Single::Functions>>(rows, "auto", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
