@@ -23,7 +23,7 @@ struct GridSingle {
       if (__builtin_expect(!within_walk_bounds(grid, ray), 0)) return walk_far(grid, ray, best, visits);
     }
     LeafCode last = kEmptyLeaf;
-    return walk_grid<AnyHit>(grid, ray, AnyHit ? best.t : ray.tnear, best, last, counting, visits);
+    return walk_grid<AnyHit>(grid, ray, {AnyHit ? best.t : ray.tnear}, best, last, counting, visits);
   }
 };
 

@@ -103,7 +103,7 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
   void trace_beyond(Mask rays) {
     Base::go_on_alone(rays, [&](int i, auto& visits) {
       if (padded_) return walk_far(grid_, rays_[i], best_[i], visits);
-      return walk_grid<AnyHit>(grid_, rays_[i], AnyHit ? best_[i].t : rays_[i].tnear, best_[i], last_leaf_[i],
+      return walk_grid<AnyHit>(grid_, rays_[i], {AnyHit ? best_[i].t : rays_[i].tnear}, best_[i], last_leaf_[i],
                                counting_, visits);
     });
   }
@@ -252,8 +252,12 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
     const std::uint32_t stride[2] = {strides[across_[0]], strides[across_[1]]};
     const LeafCode* const codes = grid_.codes() + level.first + std::size_t(at) * strides[along_];
     const bool one_cell = slice.low[0] == slice.high[0] && slice.low[1] == slice.high[1];
-    for (std::uint32_t j = slice.low[1]; j <= slice.high[1]; ++j) {
-      for (std::uint32_t i = slice.low[0]; i <= slice.high[0]; ++i) {
+    const std::uint32_t wide = slice.high[0] - slice.low[0], high = slice.high[1] - slice.low[1];
+    for (std::uint32_t v = 0; v <= high; ++v) {
+      for (std::uint32_t u = 0; u <= wide; ++u) {
+        // Backwards where slices are, so that any hit passes all cells in the reverse order of closest hit.
+        const std::uint32_t i = descending_ ? slice.high[0] - u : slice.low[0] + u,
+                            j = descending_ ? slice.high[1] - v : slice.low[1] + v;
         const LeafCode code = codes[i * stride[0] + j * stride[1]];
         if (code == kEmptyLeaf) continue;
         Mask rays = one_cell ? slice.here : in_cell(cells_[Depth], slice.here, i, j);
@@ -296,7 +300,8 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
       const float start = AnyHit ? ray.tfar : ray.tnear;
       const float at = (face - lanes_.rays.origin[along_][i]) * lanes_.r[along_][i];
       const float later = AnyHit ? std::min(start, at) : std::max(start, at);
-      return walk_grid<AnyHit>(grid_, ray, from_start ? start : later, best_[i], last_leaf_[i], counting_, visits);
+      return walk_grid<AnyHit>(grid_, ray, {from_start ? start : later, true}, best_[i], last_leaf_[i], counting_,
+                               visits);
     });
   }
 

@@ -19,23 +19,29 @@ ARBORETUM_INLINE void count_cell([[maybe_unused]] const Counting& counting, [[ma
   if constexpr (Counting::kCounting) counting.box_tests(1, 1), counting.counters.boxes_hit += code != kEmptyLeaf;
 }
 
-/// The ray's way through the cells from the distance `from` on, forwards to best.t, or, any hit, backwards to tnear.
+/// Where a ray's walk begins; `within`: it has come to the grid before, and is only going on.
+struct GridStart {
+  float t;
+  bool within = false;
+};
+
+/// The ray's way through the cells from `from` on, forwards to best.t, or, any hit, backwards to tnear.
 /// Calls visits(code) for leaves; true where that was true. `last`: the leaf that the ray comes from: neighbouring
 /// cells may share one.
 template <bool AnyHit, class Counting, class Visits>
-ARBORETUM_INLINE bool walk_grid(const grid::Grid& grid, const Ray& ray, float from, const NearestHit& best,
+ARBORETUM_INLINE bool walk_grid(const grid::Grid& grid, const Ray& ray, GridStart from, const NearestHit& best,
                                 LeafCode& last, const Counting& counting, Visits& visits) {
   const grid::Level& outer = grid.levels()[0];
   const GridRay lanes(ray, AnyHit);
   // Of the reversed ray where any hit is asked for.
   const float last_t = -ray.tnear;
-  float t = AnyHit ? -from : from, end = AnyHit ? last_t : best.t;
+  float t = AnyHit ? -from.t : from.t, end = AnyHit ? last_t : best.t;
   const auto ends_before = [&](float leave) { return (AnyHit ? last_t : best.t) < leave; };
-  GridWalk::clip(outer, lanes, t, end);
+  GridWalk<false>::clip(outer, lanes, t, end);
   if (!(t <= end)) return false;
   const LeafCode* const codes = grid.codes();
-  GridWalk walk(outer, lanes, t);
-  count_level(counting);
+  GridWalk<false> walk(outer, lanes, t);
+  if (!from.within) count_level(counting);
   for (;;) {
     const LeafCode code = codes[walk.cell];
     vm<4> axes;
@@ -44,7 +50,7 @@ ARBORETUM_INLINE bool walk_grid(const grid::Grid& grid, const Ray& ray, float fr
     if (code != kEmptyLeaf) {
       if ((code & kLeafCountMask) == kNoLeaf) {
         count_level(counting);
-        GridWalk inner(grid.levels()[code >> kLeafShift], lanes, t);
+        GridWalk<true> inner(grid.levels()[code >> kLeafShift], lanes, t);
         for (;;) {
           const LeafCode inside = codes[inner.cell];
           vm<4> inner_axes;
@@ -56,7 +62,7 @@ ARBORETUM_INLINE bool walk_grid(const grid::Grid& grid, const Ray& ray, float fr
           }
           if (!(inner_leave < leave)) break;
           if (ends_before(inner_leave)) return false;
-          if (!inner.step_within(inner_axes)) break;
+          if (!inner.step(inner_axes)) break;
         }
       } else if (code != last) {
         last = code;

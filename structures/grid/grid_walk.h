@@ -32,7 +32,10 @@ struct GridRay {
   }
 };
 
-/// A ray's position in one grid.
+/// A ray's position in one grid. `Within` the cell of an outer one, it is there until it leaves that cell: it has no
+/// exit from the last cells of an axis, whose face is the outer cell's. The two are rounded apart, and a ray that
+/// hardly moves across them is between them for long.
+template <bool Within>
 struct GridWalk {
   using F = vf<4>;
   F far, per_cell, rest, exits;
@@ -62,7 +65,7 @@ struct GridWalk {
     far = select(ray.fixed, select(vm<4>::from_bits(8), F(std::numeric_limits<float>::max()), infinity),
                  select(ray.negative, lower, upper) * ray.reciprocal);
     per_cell = select(ray.fixed, F(0.0f), abs(size * ray.reciprocal));
-    rest = select(ray.negative, i, most - i), exits = nmadd(rest, per_cell, far);
+    rest = select(ray.negative, i, most - i), exits = exits_after(rest);
     const auto row = std::int32_t(level.cells_on(0)), layer = row * std::int32_t(level.cells_on(1));
     std::int32_t k[4];
     index.store(k);
@@ -85,26 +88,23 @@ struct GridWalk {
   ARBORETUM_INLINE bool step(vm<4> axes) {
     const unsigned bits = axes.bits();
     const F less = rest - F(1.0f);
-    exits = select(axes, nmadd(less, per_cell, far), exits), rest = select(axes, less, rest);
+    exits = select(axes, exits_after(less), exits), rest = select(axes, less, rest);
     if ((bits == 0) | ((rest < F(0.0f)).bits() != 0)) return false;
     cell += std::uint32_t(stride[bits & 7]);
     return true;
   }
 
-  /// The same in the grid of a cell that the ray has not left yet, though it has met this grid's last face on some
-  /// axis: as the outer walk has that face, it is farther, by as much as roundings are on an axis along which the ray
-  /// hardly moves. Until then the ray is in the last cells of that axis.
-  ARBORETUM_INLINE bool step_within(vm<4> axes) {
-    const F less = rest - F(1.0f);
-    const vm<4> ends = axes & (less < F(0.0f)), steps = axes & (less >= F(0.0f));
-    const unsigned bits = steps.bits();
-    exits = select(steps, nmadd(less, per_cell, far), exits), rest = select(steps, less, rest);
-    exits = select(ends, F(std::numeric_limits<float>::infinity()), exits);
-    cell += std::uint32_t(stride[bits & 7]);
-    return (bits | ends.bits()) != 0;
+ private:
+  /// Where cells with so many cells behind them are left.
+  ARBORETUM_INLINE F exits_after(F cells) const {
+    const F t = nmadd(cells, per_cell, far);
+    if constexpr (Within) {
+      return select(cells > F(0.0f), t, F(std::numeric_limits<float>::infinity()));
+    } else {
+      return t;
+    }
   }
 
- private:
   static ARBORETUM_INLINE F last_of(const grid::Level& level) {
     alignas(16) static constexpr std::int32_t lanes[4] = {-1, -1, -1, 0};
     return F::from_int_bits(vi<4>::load(level.last) & vi<4>::load(lanes));
