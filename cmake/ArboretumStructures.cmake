@@ -245,14 +245,17 @@ int main(int argc, char** argv) {
   arboretum_add_structures(${target} ${words_STRUCTURES})
 endfunction()
 
-# Arboretum's tests of every kernel and its structure-level cases B01 to B30, over these structures and brute_force, which they are
-# compared with.
+# The tests that hold for any structure, as tests/test_<name>.cpp.
+set(ARBORETUM_KERNEL_TESTS kernels shown_structures saved_structures structure_cases structure_cases_large structure_cases_moved structure_cases_rays)
+
+# These tests, of every kernel, of what structures show and save, and the structure-level cases B01 to B30, over these structures and
+# brute_force, which they are compared with.
 function(arboretum_kernel_tests target)
   arboretum_parse_words(arboretum_kernel_tests)
   if(NOT TARGET arboretum::tests)
     message(FATAL_ERROR "arboretum_kernel_tests(${target}) needs find_package(arboretum REQUIRED COMPONENTS tests)")
   endif()
-  set(sources kernels structure_cases structure_cases_large structure_cases_moved structure_cases_rays)
+  set(sources ${ARBORETUM_KERNEL_TESTS})
   list(TRANSFORM sources REPLACE "(.+)" "${ARBORETUM_TESTS_FOLDER}/test_\\1.cpp")
   add_executable(${target} ${sources})
   target_link_libraries(${target} PRIVATE arboretum::arboretum arboretum::scenes arboretum::oracle arboretum::tests ${words_LIBRARIES})

@@ -66,8 +66,10 @@ set(data ${CMAKE_INSTALL_DATADIR}/arboretum)
 install(FILES scenes/catalogue.yaml DESTINATION ${data}/scenes COMPONENT runtime)
 install(DIRECTORY plots configs DESTINATION ${data} COMPONENT runtime PATTERN __pycache__ EXCLUDE)
 if(TARGET arboretum_catch_main)  # for tests of structures that others write: arboretum_kernel_tests()
-  install(FILES tests/test_kernels.cpp tests/test_structure_cases.cpp tests/test_structure_cases_large.cpp tests/test_structure_cases_moved.cpp
-                tests/test_structure_cases_rays.cpp tests/structure_cases.h tests/kernel_runner.h tests/kernel_scenes.h tests/small_meshes.h tests/catch.h
+  include(ArboretumStructures)
+  set(sources ${ARBORETUM_KERNEL_TESTS})
+  list(TRANSFORM sources REPLACE "(.+)" "tests/test_\\1.cpp")
+  install(FILES ${sources} tests/structure_cases.h tests/kernel_runner.h tests/kernel_scenes.h tests/small_meshes.h tests/folder.h tests/catch.h
           DESTINATION ${data}/tests COMPONENT development)
 endif()
 install(DIRECTORY examples DESTINATION ${data} COMPONENT development PATTERN build* EXCLUDE)

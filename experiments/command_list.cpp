@@ -152,20 +152,15 @@ std::string remark(const Json& entry) {
   std::string line = entry["summary"].get<std::string>();
   if (entry.contains("builders") && !entry["builders"].empty()) {
     constexpr std::string_view kAgain = "_reinsertion";
-    std::vector<std::string> names = entry["builders"];
-    const std::size_t all = names.size();
-    const std::vector<std::string> every = names;
-    std::erase_if(names, [&](const std::string& name) {
-      return name.ends_with(kAgain) &&
-             std::ranges::find(every, name.substr(0, name.size() - kAgain.size())) != every.end();
-    });
-    const std::vector<std::string> plain = names;
-    std::erase_if(names, [&](const std::string& name) {
-      return std::ranges::find(every, name + std::string(kAgain)) == every.end();
-    });
-    const std::string which = names.size() == plain.size() ? "each" : fmt::format("{}", fmt::join(names, " "));
-    line += fmt::format(" [builders: {}{}]", fmt::join(plain, " "),
-                        plain.size() < all ? fmt::format("; {} also as …{}", which, kAgain) : "");
+    const std::vector<std::string> names = entry["builders"];
+    std::vector<std::string> again, once;  // followed by reinsertion as well, which is not named by itself; others
+    for (const std::string& name : names) {
+      const auto is_there = [&](const std::string& other) { return std::ranges::find(names, other) != names.end(); };
+      if (name.ends_with(kAgain) && is_there(name.substr(0, name.size() - kAgain.size()))) continue;
+      (is_there(name + std::string(kAgain)) ? again : once).push_back(name);
+    }
+    const std::string words = again.empty() ? "" : fmt::format("{}, also as …{}", fmt::join(again, " "), kAgain);
+    line += fmt::format(" [builders: {}{}{}]", words, again.empty() || once.empty() ? "" : "; ", fmt::join(once, " "));
   }
   if (entry.contains("generator")) {
     line += !entry["generator"].get<bool>()   ? fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>())

@@ -84,8 +84,13 @@ class Comparer {
     const auto way = [](const CellResult& r) { return r.facts.value("self_intersection", ""); };
     if (a.has_fact("self_intersection") && b.has_fact("self_intersection") && way(a) != way(b))
       return fmt::format("self_intersection {} in A, {} in B", way(a), way(b));
+    const Json in_a = a.facts.value("parameters", Json::object()), in_b = b.facts.value("parameters", Json::object());
+    for (const auto& [name, value] : in_a.items())
+      if (const auto other = in_b.find(name); other != in_b.end() && *other != value)
+        return fmt::format("{} {} in A, {} in B", name, plain_text(value), plain_text(*other));
     for (const SettingDifference& d : options.settings)
-      if (concerns(d, a.cell) || (d.name == "rays: epsilon" && way(a) == to_string(SelfIntersection::epsilon)))
+      if ((d.name == "measure: resolution" && a.is_trace()) ||
+          (d.name == "rays: epsilon" && way(a) == to_string(SelfIntersection::epsilon)))
         return fmt::format("{} {} in A, {} in B", d.name, d.a, d.b);
     return {};
   }

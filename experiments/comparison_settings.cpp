@@ -3,17 +3,10 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <array>
 #include <optional>
-#include <string_view>
-
-#include "experiments/parameters.h"
-#include "experiments/registry.h"
 
 namespace arboretum {
 namespace {
-
-constexpr std::string_view kParameters = "parameters: ";
 
 YAML::Node load(const std::filesystem::path& folder) {
   try {
@@ -41,9 +34,6 @@ void compare_values(const std::string& name, const YAML::Node& a, const YAML::No
   if (of_a && of_b && *of_a != *of_b) out.push_back({name, *of_a, *of_b});
 }
 
-/// "[4]", not "[4, 64]": each value of a sweep is in the names of the cells that it concerns.
-bool is_one_value(const std::string& list) { return list.find(',') == std::string::npos; }
-
 }  // namespace
 
 std::vector<SettingDifference> setting_differences(const std::filesystem::path& a, const std::filesystem::path& b) {
@@ -64,21 +54,6 @@ std::vector<SettingDifference> setting_differences(const std::filesystem::path& 
     }
   }
   return differences;
-}
-
-bool concerns(const SettingDifference& difference, const Cell& cell) {
-  const bool trace = cell.metric == Cell::Metric::trace;
-  if (difference.name == "measure: resolution") return trace;
-  if (!difference.name.starts_with(kParameters) || !is_one_value(difference.a) || !is_one_value(difference.b))
-    return false;
-  const std::string_view parameter = std::string_view(difference.name).substr(kParameters.size());
-  if (is_of_traversal(parameter)) return trace && concerns(parameter, cell.traversal);
-  static const Registry registry = this_registry();
-  // Which structure is below a cell of one value no name tells: it may read what any does.
-  if (registry.structure(cell.structure) == nullptr) return true;
-  for (const StructureEntry& below : registry.structures)
-    if (registry.reads(parameter, cell.structure, cell.builder, below.info.name)) return true;
-  return false;
 }
 
 }  // namespace arboretum

@@ -1,13 +1,10 @@
-// Settings by which two runs differ, as their effective.yaml have them: a parameter of one value stands in no cell's
-// name, so cells of one name may have done other work. Of two revisions a default that has changed looks the same as a
-// value that was asked for.
+// Settings by which two runs differ, as their effective.yaml have them. Of two revisions a default that has changed
+// looks the same as a value that was asked for.
 #pragma once
 
 #include <filesystem>
 #include <string>
 #include <vector>
-
-#include "experiments/cell.h"
 
 namespace arboretum {
 
@@ -22,8 +19,5 @@ struct SettingDifference {
 /// and hashes tell. None where a folder has no effective.yaml that can be read, and of what only one of them knows.
 [[nodiscard]] std::vector<SettingDifference> setting_differences(const std::filesystem::path& a,
                                                                  const std::filesystem::path& b);
-
-/// Whether a cell of both did other work for it, although its name is the same.
-[[nodiscard]] bool concerns(const SettingDifference& difference, const Cell& cell);
 
 }  // namespace arboretum

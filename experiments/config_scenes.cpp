@@ -25,13 +25,18 @@ SceneSpec named(const std::string& name) {
   return spec;
 }
 
-/// The file in the folder of ARBORETUM_SCENES; empty where it is not there, or no folder is named.
+/// The folder that ARBORETUM_SCENES names; empty: none.
+std::filesystem::path scenes_folder() {
+  const char* folder = std::getenv("ARBORETUM_SCENES");
+  return folder ? folder : "";
+}
+
+/// The file in that folder; empty where it is not there.
 std::filesystem::path in_scenes_folder(const std::filesystem::path& file) {
-  const char* scenes = std::getenv("ARBORETUM_SCENES");
-  if (!scenes || !*scenes || file.empty()) return {};
+  const std::filesystem::path folder = scenes_folder();
+  if (folder.empty() || file.empty()) return {};
   std::error_code error;
-  std::filesystem::path path = std::filesystem::path(scenes) / file;
-  return std::filesystem::is_regular_file(path, error) ? path : std::filesystem::path();
+  return std::filesystem::is_regular_file(folder / file, error) ? folder / file : std::filesystem::path();
 }
 
 /// Where the file is; with `optional` `missing` says why it is nowhere.
@@ -41,18 +46,15 @@ std::filesystem::path find_file(const YamlReader& yaml, const YAML::Node& node, 
   const std::filesystem::path path = folder / text;
   std::error_code error;
   if (std::filesystem::is_regular_file(path, error)) return path;
-  const char* scenes = std::getenv("ARBORETUM_SCENES");
-  const bool has_folder = scenes && *scenes;
   if (std::filesystem::path there = in_scenes_folder(text); !there.empty()) return there;
   if (!optional) {
     yaml.fail(node, fmt::format("{} '{}' is no file; paths are relative to the configuration, or to the folder "
                                 "that ARBORETUM_SCENES names",
                                 what, path.string()));
   }
-  missing =
-      has_folder
-          ? fmt::format("optional scene {} is not here: ARBORETUM_SCENES is {}", text, scenes)
-          : fmt::format("optional scene {} is not here: ARBORETUM_SCENES, the folder to find it in, is not set", text);
+  const std::string scenes = scenes_folder().string();
+  missing = fmt::format("optional scene {} is not here: ARBORETUM_SCENES{}", text,
+                        scenes.empty() ? ", the folder to find it in, is not set" : " is " + scenes);
   return text;
 }
 

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <set>
 
 #include "core/error.h"
+#include "experiments/append_file.h"
 #include "experiments/plan_record.h"
 #include "experiments/results_writer.h"
 #include "experiments/scene_data.h"
@@ -32,9 +32,8 @@ std::string without_folder(std::string line) {
 
 /// The settings of an effective.yaml: its lines without indentation, comments and empty lines.
 std::vector<std::string> setting_lines(const ResultFolder& folder) {
-  std::ifstream stream(folder.path / "effective.yaml");
   std::vector<std::string> lines;
-  for (std::string line; std::getline(stream, line);) {
+  for (const std::string& line : read_lines(folder.path / "effective.yaml")) {
     const std::size_t start = line.find_first_not_of(" \t\r");
     if (start != std::string::npos && line[start] != '#') lines.push_back(without_folder(line.substr(start)));
   }

@@ -60,11 +60,18 @@ std::vector<std::string> parameter_names() {
   return names;
 }
 
-std::string default_parameter(std::string_view name) {
-  Parameters defaults;
-  return with(name, defaults, [](const auto& parameter, const auto& set) {
-    if (parameter.has_own) return std::string(kOwn);
-    return std::visit([&](auto member) { return fmt::format("{}", set.*member); }, parameter.member);
+std::string default_parameter(std::string_view name) { return parameter_text({}, name); }
+
+std::string parameter_text(const Parameters& parameters, std::string_view name) {
+  Parameters all = parameters;
+  return with(name, all, []<class Set>(const Parameter<Set>& parameter, const Set& set) {
+    const auto text = [&]<class T>(T Set::*member) {
+      if constexpr (std::is_same_v<T, unsigned>) {
+        if (parameter.has_own && set.*member == Set::kOwn) return std::string(kOwn);
+      }
+      return fmt::format("{}", set.*member);
+    };
+    return std::visit(text, parameter.member);
   });
 }
 

@@ -24,6 +24,8 @@ struct Parameters {
 [[nodiscard]] std::vector<std::string> parameter_names();
 /// The default as text.
 [[nodiscard]] std::string default_parameter(std::string_view name);
+/// A value as text, "auto" where the builder or the way of traversal chooses itself.
+[[nodiscard]] std::string parameter_text(const Parameters& parameters, std::string_view name);
 /// Sets one parameter. Returns why not ("an integer from 4 to 64"), or empty when it is set.
 [[nodiscard]] std::string set_parameter(Parameters& parameters, std::string_view name, const std::string& value);
 /// Whether it is of the ways of traversal, and means something to that one; builders read theirs as they concern them.

@@ -11,10 +11,12 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/parse_number.h"
 #include "experiments/append_file.h"
 #include "experiments/build_job.h"
 #include "experiments/interleave.h"
 #include "experiments/json_text.h"
+#include "experiments/parameters.h"
 #include "experiments/plan_record.h"
 #include "experiments/progress.h"
 #include "experiments/sampling.h"
@@ -216,10 +218,26 @@ class Runner {
     run_interleaved(std::move(interleaved));
   }
 
+  /// The parameters that the cell depends on: those that its builder reads, and of rays those of their traversal.
+  Json parameter_facts(const Cell& cell) const {
+    Json facts = Json::object();
+    for (const std::string& name : parameter_names()) {
+      const bool read = is_of_traversal(name)
+                            ? cell.metric == Cell::Metric::trace && concerns(name, cell.traversal)
+                            : registry_.reads(name, cell.structure, cell.builder, cell.parameters.below);
+      if (!read) continue;
+      const std::string text = parameter_text({cell.parameters, cell.settings}, name);
+      const auto whole = parse_number<std::uint64_t>(text);
+      const auto number = parse_number<double>(text);
+      facts["parameters"][name] = whole ? Json(*whole) : number ? Json(*number) : Json(text);
+    }
+    return facts;
+  }
+
   Running& begin(const Cell& cell) {
     const std::string name = cell.name();
     Running& running = running_[name];
-    running.result = {.cell = cell, .repetitions = journal_.started(name), .facts = Json::object()};
+    running.result = {.cell = cell, .repetitions = journal_.started(name), .facts = parameter_facts(cell)};
     running.wanted = repetitions();
     std::erase_if(running.result.repetitions, [&](const Repetition& r) { return r.index >= running.wanted; });
     progress_.step(name, kPrepareUnits);

@@ -22,11 +22,10 @@
 //    rounding, within 2^-19 R s / |det|.
 // 4. The products that t is a sum of may underflow: by less than 2^-147 / |det| in all. That is more than t's rounding
 //    where |det| (t - tnear) is below 2^-124.
-// 5. Where 3 or 4 could turn t across tnear, 3 only where t is closer to tnear than 2^-10 of s, t is computed again
-// from
-//    the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle that is met only
-//    because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the surface all the
-//    same. What lies clearly before tnear, as the triangle that a ray has just left, is not computed again.
+// 5. Where 3 or 4 could turn t across tnear, 3 only where t is closer to tnear than 2^-10 of s, t is computed again,
+//    from the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle that is met
+//    only because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the surface
+//    all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not computed again.
 #pragma once
 
 #include "intersectors/sheared_packet.h"

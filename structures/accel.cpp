@@ -12,7 +12,6 @@
 #include "structures/build_threads.h"
 #include "structures/parameter_limits.h"
 #include "structures/registry.h"
-#include "structures/untimed_phase.h"
 
 namespace arboretum {
 
@@ -95,14 +94,8 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   const std::size_t before = MemoryMeter::current();
   const double wall = wall_seconds(), cpu = process_cpu_seconds();
   arena.execute([&] { accel->build(mesh, allowed, report); });
-  report.seconds = wall_seconds() - wall;
-  report.cpu_seconds = process_cpu_seconds() - cpu;
-  const auto untimed = std::ranges::find(report.phases, kUntimedPhase, &std::pair<std::string, double>::first);
-  if (untimed != report.phases.end()) {
-    report.seconds -= untimed->second;
-    report.cpu_seconds -= std::min(untimed->second, report.cpu_seconds);  // of one thread
-    report.phases.erase(untimed);
-  }
+  report.seconds = wall_seconds() - wall - report.apart_seconds;
+  report.cpu_seconds = std::max(process_cpu_seconds() - cpu - report.apart_seconds, 0.0);
   report.peak_bytes = MemoryMeter::peak() - before;
   return accel;
 }

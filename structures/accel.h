@@ -61,6 +61,9 @@ struct BuildReport {
   double seconds = 0.0;
   double cpu_seconds = 0.0;    ///< of all threads
   std::size_t peak_bytes = 0;  ///< most memory held at once while building, the structure included, the mesh not
+  /// Wall seconds of one thread within build() that are no part of the times above: a library that is made ready once
+  /// for any number of builds, as Embree's device.
+  double apart_seconds = 0.0;
   std::vector<std::pair<std::string, double>> phases;  ///< name, wall seconds
 };
 

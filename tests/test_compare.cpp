@@ -333,19 +333,21 @@ TEST_CASE("cells of other settings that stand in no name are other work, and onl
     return cell_named(structure, metric).name();
   };
   CHECK(compared({}).empty());
-  // The kd-tree's builder knows no width that is collapsed to: bvh8 reads it for its nodes and the build cell as well.
+  // Rows hold the parameters that they depend on; of one that only one of the two knows nothing can be said.
   const SettingDifference collapse{"parameters: collapse", "[sah]", "[greedy]"};
-  const auto of_collapse = compared({.settings = {collapse}});
-  CHECK(of_collapse.at(name("bvh8")) == "parameters: collapse [sah] in A, [greedy] in B");
-  CHECK(of_collapse.contains(name("bvh8", Cell::Metric::build)));
-  CHECK(!of_collapse.contains(name("kdtree")));
+  const SettingDifference bins{"parameters: bins", "[4]", "[4, 64]"};
+  CHECK(compared({.settings = {collapse, bins, {"measure: repetitions", "3", "7"}}}).empty());
+  find(a, "bvh8")->facts["parameters"] = {{"bins", 16}, {"collapse", "sah"}, {"later", 1}};
+  find(b, "bvh8")->facts["parameters"] = {{"bins", 16}, {"collapse", "greedy"}};
+  CHECK(compared({.settings = {collapse}}) ==
+        std::map<std::string, std::string>{{name("bvh8"), "collapse sah in A, greedy in B"}});
   CHECK(compared({.settings = {collapse}, .allow_different_settings = true}).empty());
-  // What is swept is in the names.
-  CHECK(compared({.settings = {{"parameters: bins", "[4]", "[4, 64]"}, {"measure: repetitions", "3", "7"}}}).empty());
+  find(b, "bvh4")->facts["parameters"] = {{"bins", 16}};
+  CHECK(compared({}).size() == 1);
+  find(b, "bvh8")->facts["parameters"] = {{"bins", 32}, {"collapse", "sah"}};
+  CHECK(compared({}).at(name("bvh8")) == "bins 16 in A, 32 in B");
+  for (CellResult* r : {find(a, "bvh8"), find(b, "bvh8")}) r->facts["parameters"] = {{"bins", 16}};
   CHECK(compared({.settings = {{"measure: resolution", "[512, 256]", "[256, 512]"}}}).size() == 4);  // no builds
-  CHECK(compared({.settings = {{"parameters: hybrid_threshold", "[2]", "[3]"}}}).empty());
-  for (CellResult* r : {find(a, "bvh4"), find(b, "bvh4")}) r->cell.traversal = "hybrid8";
-  CHECK(compared({.settings = {{"parameters: hybrid_threshold", "[2]", "[3]"}}}).size() == 1);
   // How rays leave surfaces is a fact of each row; the distance is told by the configuration.
   find(a, "bvh2")->facts["self_intersection"] = "none";
   find(b, "bvh2")->facts["self_intersection"] = "exclusion";
@@ -353,6 +355,7 @@ TEST_CASE("cells of other settings that stand in no name are other work, and onl
   CHECK(compared({.allow_different_settings = true}).empty());
   for (CellResult* r : {find(a, "bvh2"), find(b, "bvh2")}) r->facts["self_intersection"] = "epsilon";
   CHECK(compared({.settings = {{"rays: epsilon", "0.001", "0.01"}}}).size() == 1);
+  find(b, "bvh8")->facts["parameters"] = {{"bins", 32}};
   const Comparison none = compare_results({*find(a, "bvh8")}, {*find(b, "bvh8")}, {.settings = {collapse}});
   CHECK(verdict(none).first == ExitStatus::kNothingMeasured);
   CHECK(comparison_text(none, false).find("(--allow-different-settings compares those") != std::string::npos);

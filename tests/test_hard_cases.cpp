@@ -99,13 +99,14 @@ constexpr KnownLimit kKnownLimits[] = {
 };
 
 /// Whether a row tests boxes that are flat around these cases' triangles, and tests them fast: BVHs where a leaf is one
-/// triangle, the bounding intervals always (they end where the triangle does, on one axis, whatever the leaf). The
-/// kd-tree's fast planes are padded along axes on which a ray does not move, and cells of grid and octree are wider
-/// than a flat triangle.
+/// triangle; whatever the leaf, the bounding intervals (they end where the triangle does, on one axis) and structures
+/// that have a box even around all triangles of such a case. The kd-tree's fast planes are padded along axes on which a
+/// ray does not move, and cells of grid and octree are wider than a flat triangle.
 bool loses_flat_boxes(const KernelRow& row) {
   if (row.box != "fast" || row.structure == "brute_force") return false;
   if (row.structure == "kdtree" || row.structure == "grid" || row.structure == "octree") return false;
-  return row.structure == "bih" || (row.leaf.starts_with("triangle1") && !row.leaf.starts_with("triangle16"));
+  if (row.structure == "bih" || find_structure(row.structure)->info.root_is_node) return true;
+  return row.leaf.starts_with("triangle1") && !row.leaf.starts_with("triangle16");
 }
 
 /// The fault that the table expects of the row on the case; empty where it expects none.

@@ -14,6 +14,16 @@ constexpr int register_lanes(int rays_each) {
   return Family::kFewerLanes ? std::min(rays_each, kNativeWidth) : kNativeWidth;
 }
 
+/// A family as most structures have it: whole registers. `ForNearRays`: `auto` takes packets for rays that only start
+/// near each other, too (traversal/auto_rows.h).
+template <class S, template <int W, class Leaves, bool AnyHit, class Counting> class P, bool ForNearRays>
+struct PacketFamily {
+  using Structure = S;
+  static constexpr bool kFewerLanes = false, kForNearRays = ForNearRays;
+  template <int W, class Leaves, bool AnyHit, class Counting>
+  using Packets = P<W, Leaves, AnyHit, Counting>;
+};
+
 /// A batch as packets of `rays_each` rays that follow each other. Returns how often a ray went on alone.
 /// `Family::Packets<W, Leaves, AnyHit, Counting>` is the class for packets of W rays a register through a
 /// `Family::Structure`.

@@ -33,7 +33,7 @@ def draw(results):
     if not points:
         raise NoData("no traced cell has a SAH cost")
     numbers = {id(cell): rest for cell, *rest in points}
-    cells, said = costs.split([cell for cell, *_ in points], results)
+    cells, said = costs.split([cell for cell, *_ in points])
     points = compared([(apart_by_costs, *numbers[id(cell)]) for cell, apart_by_costs in cells])
     if not points:
         raise NoData("nowhere are three structures as built, brute_force apart, of different SAH costs to set against time")

@@ -26,6 +26,8 @@ struct BihSingle {
   }
 };
 
+using BihPacketFamily = PacketFamily<bih::Bih, BihPackets, true>;
+
 inline void add_kernels(std::type_identity<bih::Bih>, KernelRows& rows) {
   using Single = ListedLeaves<bih::Bih, BihSingle>;
   Single::add(rows);

@@ -168,14 +168,5 @@ class BihPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, BoxRa
   IntervalStack single_stack_;
 };
 
-/// As traversal/packet_rows.h wants it.
-struct BihPacketFamily {
-  using Structure = bih::Bih;
-  static constexpr bool kFewerLanes = false;
-  static constexpr bool kForNearRays = true;
-  template <int W, class Leaves, bool AnyHit, class Counting>
-  using Packets = BihPackets<W, Leaves, AnyHit, Counting>;
-};
-
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -10,7 +10,6 @@
 #include "core/names.h"
 #include "core/timer.h"
 #include "structures/embree/rtcore.h"
-#include "structures/untimed_phase.h"
 
 namespace arboretum::embree {
 namespace {
@@ -114,7 +113,7 @@ void EmbreeAccel::build(const TriangleMesh& mesh, const BuildSettings& settings,
   // Some 40 us, a fifth of a `low` build of a small scene: a program opens one device for all its scenes.
   const double begin = wall_seconds();
   open_device(settings.isa);
-  report.phases.emplace_back(kUntimedPhase, wall_seconds() - begin);
+  report.apart_seconds = wall_seconds() - begin;
   form_ = Form(std::ranges::find(kLeaves, settings.leaf) - std::begin(kLeaves));
   const RTCBuildQuality quality = quality_of(settings.builder);
   scene_.reset(rtcNewScene(device_.get()));

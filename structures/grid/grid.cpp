@@ -91,10 +91,16 @@ bool Grid::visit(StructureVisitor& visitor) const {
     const auto* blocks = reinterpret_cast<const Block*>(leaves_.blocks());
     std::vector<bool> counted(leaves_.bytes() / sizeof(Block) + 1);  // shared blocks count once
     std::vector<std::uint32_t> primitives;
+    // The grid in a cell has a box of its own, which is the cell's but for rounding.
+    const auto bounds_of = [&](const Level& level, std::uint32_t c) {
+      const LeafCode code = codes_[level.first + c];
+      return (code & kLeafCountMask) == kNoLeaf && code != kEmptyLeaf ? level_bounds(levels_[code >> kLeafShift])
+                                                                      : cell_bounds(level, c);
+    };
     const auto show = [&](const auto& self, const Level& level, unsigned depth) -> void {
       std::vector<Bounds3f> children;
       for (std::uint32_t c = 0; c < level.size(); ++c)
-        if (codes_[level.first + c] != kEmptyLeaf) children.push_back(cell_bounds(level, c));
+        if (codes_[level.first + c] != kEmptyLeaf) children.push_back(bounds_of(level, c));
       visitor.node({level_bounds(level), children, depth, sizeof(Level) + level.size() * sizeof(LeafCode),
                     expected_steps(level)});
       for (std::uint32_t c = 0; c < level.size(); ++c) {

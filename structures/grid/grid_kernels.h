@@ -27,6 +27,8 @@ struct GridSingle {
   }
 };
 
+using GridPacketFamily = PacketFamily<grid::Grid, GridPackets, false>;
+
 inline void add_kernels(std::type_identity<grid::Grid>, KernelRows& rows) {
   using Single = ListedLeaves<grid::Grid, GridSingle>;
   Single::add(rows);

@@ -212,12 +212,22 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
     const F entered_face_at(entered_face(level, at)), left_face_at(left_face(level, at));
     const F infinity(std::numeric_limits<float>::infinity()), pad(grid_.pad());
     F low[2] = {infinity, infinity}, high[2] = {-infinity, -infinity};
+    const float *const origins = lanes_.rays.origin[along_], *const reciprocals = lanes_.r[along_];
+    struct Across {
+      const float *origins, *directions;
+      F lower, scale, most;
+    };
+    const auto across = [&](int a) {
+      return Across{lanes_.rays.origin[a], lanes_.rays.direction[a], F(level.lower[a]), F(level.inverse[a]),
+                    F(level.last[a])};
+    };
+    const Across both[2] = {across(across_[0]), across(across_[1])};
     for (int c = 0; c < chunks_; ++c) {
       const unsigned in = Base::lanes_of(mask, c);
       if (in == 0) continue;
       const int k = c * W;
-      const F o = F::load(lanes_.rays.origin[along_] + k), r = F::load(lanes_.r[along_] + k),
-              tnear = F::load(lanes_.rays.tnear + k), t = F::load(lanes_.t + k);
+      const F o = F::load(origins + k), r = F::load(reciprocals + k), tnear = F::load(lanes_.rays.tnear + k),
+              t = F::load(lanes_.t + k);
       const F entered = (entered_face_at - o) * r, left = (left_face_at - o) * r;
       vm<W> going = vm<W>::from_bits(in);
       if (at != order.first) going = going & (AnyHit ? entered >= tnear : entered <= t);
@@ -225,13 +235,13 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
       if (at != order.last) here = here & (AnyHit ? left <= t : left >= tnear);
       F first[2], last[2];
       for (int i = 0; i < 2; ++i) {
-        const int a = across_[i];
-        const F from = F::load(lanes_.rays.origin[a] + k), d = F::load(lanes_.rays.direction[a] + k);
-        const F p = madd(entered, d, from), q = madd(left, d, from), lower(level.lower[a]), scale(level.inverse[a]),
-                most(level.last[a]);
-        const F least_cell = (min_x86(p, q) - pad - lower) * scale, most_cell = (max_x86(p, q) + pad - lower) * scale;
-        here = here & (most_cell >= F(0.0f)) & (least_cell < most + F(1.0f));
-        const auto whole = [&](F cell) { return to_float(truncate_to_int(min_x86(max_x86(cell, F(0.0f)), most))); };
+        const Across& a = both[i];
+        const F from = F::load(a.origins + k), d = F::load(a.directions + k);
+        const F p = madd(entered, d, from), q = madd(left, d, from);
+        const F least_cell = (min_x86(p, q) - pad - a.lower) * a.scale,
+                most_cell = (max_x86(p, q) + pad - a.lower) * a.scale;
+        here = here & (most_cell >= F(0.0f)) & (least_cell < a.most + F(1.0f));
+        const auto whole = [&](F cell) { return to_float(truncate_to_int(min_x86(max_x86(cell, F(0.0f)), a.most))); };
         first[i] = whole(least_cell), last[i] = whole(most_cell);
         first[i].store(cells_[Depth].low[i] + k), last[i].store(cells_[Depth].high[i] + k);
       }
@@ -325,15 +335,6 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
   int along_ = 0, across_[2] = {1, 2};  ///< axes
   bool descending_ = false;             ///< slices come in the order of falling coordinates
   RayCells cells_[2];
-};
-
-/// As traversal/packet_rows.h wants it.
-struct GridPacketFamily {
-  using Structure = grid::Grid;
-  static constexpr bool kFewerLanes = false;
-  static constexpr bool kForNearRays = false;
-  template <int W, class Leaves, bool AnyHit, class Counting>
-  using Packets = GridPackets<W, Leaves, AnyHit, Counting>;
 };
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

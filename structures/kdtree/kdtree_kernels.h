@@ -12,6 +12,8 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+using KdPacketFamily = PacketFamily<kdtree::KdTree, KdPackets, true>;
+
 inline void add_kernels(std::type_identity<kdtree::KdTree>, KernelRows& rows) {
   add_rows<kdtree::KdTree, SingleRayFunctions<KdKernel>>(rows, "single", UsualLeaves{});
   add_queued_rows<kdtree::KdTree, KdQueued, SingleRayFunctions<KdKernel>>(rows, UsualLeaves{});

@@ -332,15 +332,6 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
   KdStack single_stack_;
 };
 
-/// As traversal/packet_rows.h wants it.
-struct KdPacketFamily {
-  using Structure = kdtree::KdTree;
-  static constexpr bool kFewerLanes = false;
-  static constexpr bool kForNearRays = true;
-  template <int W, class Leaves, bool AnyHit, class Counting>
-  using Packets = KdPackets<W, Leaves, AnyHit, Counting>;
-};
-
 /// What the wider packets have compiled in: one leaf, since each costs a unit seconds to compile.
 using KdPacketLeaves =
     std::conditional_t<kRegisterWidth == 1, TypeList<>,

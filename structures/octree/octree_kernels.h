@@ -25,6 +25,8 @@ struct OctreeSingle {
   }
 };
 
+using OctreePacketFamily = PacketFamily<octree::Octree, OctreePackets, true>;
+
 inline void add_kernels(std::type_identity<octree::Octree>, KernelRows& rows) {
   using Single = ListedLeaves<octree::Octree, OctreeSingle>;
   Single::add(rows);

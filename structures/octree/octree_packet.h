@@ -144,14 +144,5 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
   Entry stack_[kMostOctreeCells];
 };
 
-/// As traversal/packet_rows.h wants it.
-struct OctreePacketFamily {
-  using Structure = octree::Octree;
-  static constexpr bool kFewerLanes = false;
-  static constexpr bool kForNearRays = true;
-  template <int W, class Leaves, bool AnyHit, class Counting>
-  using Packets = OctreePackets<W, Leaves, AnyHit, Counting>;
-};
-
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -29,13 +29,17 @@ class ResultFolders(CommandLineCase):
         return f"results/small-shard-{index}-of-{of}"
 
     def test_docs_results_md_has_every_column_of_results_csv(self):
-        page = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
+        page, of_parameters = ((Path(__file__).parents[2] / "docs" / name).read_text() for name in ("results.md", "command-line.md"))
         self.assertIn(self.call("run", self.write("all.yaml", EVERYTHING), "--no-plots", "--out", "all").returncode, (0, 1))
         with open(self.folder / "all" / "results.csv", newline="") as table:
             columns = next(csv.reader(table))
         self.assertGreater(len(columns), 85)
         for column in columns:
             with self.subTest(column):
+                if column.startswith("parameters."):
+                    self.assertIn("`parameters.…`", page)
+                    self.assertIn(f"`{column.removeprefix('parameters.')}`", of_parameters)
+                    continue
                 self.assertIn(f"`{column.removeprefix('phase_seconds.').removesuffix('_per_million')}`", page)
 
     def edit_cells(self, folder, change, to="edited"):

@@ -302,22 +302,22 @@ class Numbers(Drawn):
                 sah_vs_time.draw(results_of(few))
 
     def test_structures_of_several_costs_are_in_panels_apart(self):
-        def built(structure, builder, cost):
-            return build(structure, builder, sah_cost=cost) | {"name": f"build/bunny/{structure}/{builder}/triangle8/-/-/-/avx2/-/threads:1"}
+        def built(structure, builder, cost, **parameters):
+            return build(structure, builder, sah_cost=cost, parameters=parameters) | {"name": f"build/bunny/{structure}/{builder}/triangle8/-/-/-/avx2/-/threads:1"}
 
-        def drawn(module, rows, yaml=""):
-            figure = self.draw(module, load(Folder(rows, files={"effective.yaml": yaml}).path))
+        def drawn(module, rows):
+            figure = self.draw(module, load(Folder(rows).path))
             return [(a.get_title(), a.get_xlabel(), [t.get_text() for t in a.get_yticklabels()]) for a in figure.axes if a.get_visible()]
 
-        swept = [f"{b}:intersection_cost={i}:traversal_cost={t}" for b in ("morton", "ploc:ploc_radius=8") for t in (1, 0.5) for i in (1,)]
-        rows = [built("bvh8", b, 10.0 + k) for k, b in enumerate(swept)] + [built("grid", "uniform", 50.0)]
+        swept = [(f"{b}:intersection_cost=1:traversal_cost={t}", t) for b in ("morton", "ploc:ploc_radius=8") for t in (1, 0.5)]
+        rows = [built("bvh8", b, 10.0 + k, traversal_cost=t, intersection_cost=1) for k, (b, t) in enumerate(swept)] + [built("grid", "uniform", 50.0)]
         for module, name in ((sah_cost, "SAH cost"), (epo, "EPO")):
             self.assertEqual([panel[:2] for panel in drawn(module, rows)], [("bunny\n(step 0.5, block 1)", name), ("bunny\n(step 1, block 1)", name)])
         self.assertEqual([panel[2] for panel in drawn(sah_cost, rows)], [["bvh8 morton", "bvh8 ploc:ploc_radius=8"], ["bvh8 morton", "bvh8 ploc:ploc_radius=8", "grid uniform"]])
-        for yaml, said in (("", ""), ("parameters:\n  traversal_cost: [1]\n  intersection_cost: [2]\n", " (step 1, block 2)"), ("  traversal_cost: 4\n", " (step 4, block 1)"),
-                           ("  traversal_cost: [1, 4]\n", "")):
-            self.assertEqual([panel[:2] for panel in drawn(sah_cost, rows[-1:], yaml)], [("bunny", "SAH cost" + said)])
-        timed = [other("primary", structure=f"bvh{n}", builder=f"morton:traversal_cost={t}", sah_cost=10.0 * n * t, rate=1e8 / n, wrong_answers=0) for n in (2, 4, 8, 16) for t in (1, 4)]
+        for costs, said in (({}, ""), ({"traversal_cost": 1, "intersection_cost": 2}, " (step 1, block 2)"), ({"traversal_cost": 4}, " (step 4, block 1)"), ({"bins": 4}, "")):
+            self.assertEqual([panel[:2] for panel in drawn(sah_cost, [built("grid", "two_level", 50.0, **costs)])], [("bunny", "SAH cost" + said)])
+        timed = [other("primary", structure=f"bvh{n}", builder=f"morton:traversal_cost={t}", sah_cost=10.0 * n * t, rate=1e8 / n, wrong_answers=0, parameters={"traversal_cost": t})
+                 for n in (2, 4, 8, 16) for t in (1, 4)]
         self.assertEqual([panel[0].split("\n") for panel in drawn(sah_vs_time, timed)],
                          [["bunny", f"(step {t}, block 1), primary, avx2", "R² = 1.00 (n = 4)"] for t in (1, 4)])
 
