@@ -274,6 +274,36 @@ TEST_CASE("edges and vertices of a closed fan are not lost where that is promise
     std::cout << name << ": lost " << l.edges << " at edges, " << l.vertices << " at vertices\n";
 }
 
+TEST_CASE("a ray within a closed mesh as small as floats allow is not lost, and t is right") {
+  const TriangleMesh ball = sphere(6, 12, true);
+  Dice dice(11);
+  std::vector<std::pair<Vec3f, Vec3f>> lines;
+  for (int i = 0; i < 150; ++i) {
+    const Triangle t = ball.triangles[std::size_t(dice.integer(int(ball.size())))];
+    const Vec3f a = ball.vertices[t.a], b = ball.vertices[t.b], c = ball.vertices[t.c], from = dice.point() * 0.3f;
+    const float u = dice.uniform(0.1f, 0.9f);
+    lines.emplace_back(from, a + (b - a) * u + (c - a) * (i % 2 == 0 ? 0.0f : 0.5f * (1.0f - u)) - from);
+  }
+  for (const Tested& tests : all_tests()) {
+    if (!tests.promise.edges) continue;
+    std::vector<float> at_1;
+    for (const int exponent : {0, -40, -56, -70, -100, -140}) {
+      TriangleMesh mesh = ball;
+      for (Vec3f& v : mesh.vertices) v = v * std::ldexp(1.0f, exponent);
+      const Leaf leaf(tests, mesh);
+      for (std::size_t i = 0; i < lines.size(); ++i) {
+        const auto [from, direction] = lines[i];
+        INFO(tests.name() << " at 2^" << exponent << ", ray " << i);
+        const Hit hit = leaf.closest_hit({from * std::ldexp(1.0f, exponent), 0, direction, kFar});
+        REQUIRE(hit.is_hit());
+        if (exponent == 0) at_1.push_back(hit.t);
+        // Below 2^-126 corners are rounded as well.
+        if (exponent >= -100) REQUIRE(std::ldexp(hit.t, -exponent) == Approx(at_1[i]).epsilon(1e-4));
+      }
+    }
+  }
+}
+
 TEST_CASE("a triangle of zero area is never hit") {
   Dice dice(8);
   std::map<std::string, std::size_t> hits;
