@@ -52,8 +52,16 @@ using BlocksOf = std::conditional_t<
     std::conditional_t<(kRegisterWidth >= 8), TypeList<VertexBlock<1>, VertexBlock<4>, VertexBlock<8>, IndexBlock<4>>,
                        TypeList<VertexBlock<1>, VertexBlock<4>, IndexBlock<4>>>>;
 
+template <class Intersector, class... Blocks>
+constexpr bool reads_any_of(TypeList<Blocks...>) {
+  return (kCanRead<Intersector, Blocks> || ...);
+}
+
 template <class Intersector>
 void add_leaf_tests(std::vector<LeafTests>& list) {
+  static_assert(reads_any_of<Intersector>(BlocksOf<Intersector>{}),
+                "It reads none of the blocks that it is compiled for: without kEveryLeaf those are of vertices and "
+                "indices alone.");
   for_each_type(BlocksOf<Intersector>{}, [&]<class Block>(std::type_identity<Block>) {
     if constexpr (kCanRead<Intersector, Block>) {
       using T = CalledTests<Intersector, Block>;
