@@ -46,6 +46,8 @@ Scene read_model(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
   if (extension == ".obj") return read_obj(path);
   if (extension == ".ply") return read_ply(path);
+  if (extension == ".stl") return read_stl(path);
+  if (extension == ".off") return read_off(path);
   check_before_assimp(path, extension);
   return read_assimp(path);
 }

@@ -8,7 +8,7 @@
 
 namespace arboretum {
 
-/// `extension` in lower case, with its dot. Formats other than .off, .stl, .gltf, .glb and .vrm pass. Throws UserError.
+/// `extension` in lower case, with its dot. Formats other than .gltf, .glb and .vrm pass. Throws UserError.
 void check_before_assimp(const std::filesystem::path& path, std::string_view extension);
 
 }  // namespace arboretum

@@ -1,4 +1,4 @@
-// STL, glTF, OFF and the rest through assimp, with no post-processing of its: vertices are not merged,
+// glTF and the rest through assimp, with no post-processing of its: vertices are not merged,
 // polygons are split by our own code, and the node transforms are applied here.
 #include <assimp/DefaultLogger.hpp>
 #include <assimp/GltfMaterial.h>

@@ -17,7 +17,10 @@ namespace arboretum {
 /// PLY, ASCII or binary. A `material_id` of a face indexes the materials of the MTL file of the same stem.
 /// Throws UserError.
 [[nodiscard]] Scene read_ply(const std::filesystem::path& path);
-/// STL, glTF, GLB, OFF and whatever else assimp knows, node transforms applied. Throws UserError.
+/// STL, binary or text, and OFF as text. Throw UserError.
+[[nodiscard]] Scene read_stl(const std::filesystem::path& path);
+[[nodiscard]] Scene read_off(const std::filesystem::path& path);
+/// glTF, GLB and whatever else assimp knows, node transforms applied. Throws UserError.
 [[nodiscard]] Scene read_assimp(const std::filesystem::path& path);
 /// Materials in the file's order. Warnings of the parser are appended, one line each.
 [[nodiscard]] std::vector<Material> read_mtl(const std::filesystem::path& path, std::vector<std::string>& warnings);

@@ -3,6 +3,10 @@
 #include <unistd.h>
 
 #include <clocale>
+#include <cmath>
+#include <cstdlib>
+
+#include <fmt/format.h>
 
 #include "core/random.h"
 #include "scenes/number_text.h"
@@ -83,6 +87,124 @@ TEST_CASE("every format gives the same triangles in the same order") {
   }
 }
 
+TEST_CASE("coordinates written as text are the nearest floats, in every format") {
+  const Folder folder;
+  // Decimals of one to seventeen digits, some with an exponent; three a corner, three corners a triangle.
+  std::vector<std::string> words{"0.1", "+.3", "16777217", "1.00000017881393432617187499",
+                                 "1.00000017881393432617187501"};
+  while (words.size() % 9 != 0 || words.size() < 9000) {
+    std::uint64_t draw = 0;
+    const auto random = [&](std::uint64_t below) { return random_bits(11, words.size(), draw++) % below; };
+    std::string word = random(2) ? "-" : "";
+    word += std::to_string(random(random(2) ? 10 : 1000)) + ".";
+    for (std::uint64_t digits = 1 + random(14); digits > 0; --digits) word += char('0' + random(10));
+    if (random(4) == 0) word += (random(2) ? "e-" : "E+") + std::to_string(random(4));
+    words.push_back(word);
+  }
+  const std::size_t corners = words.size() / 3, triangles = corners / 3;
+  const auto corner = [&](std::size_t i) {
+    return words[3 * i] + " " + words[3 * i + 1] + " " + words[3 * i + 2] + "\n";
+  };
+  std::string obj, off = fmt::format("OFF\n{} {} 0\n", corners, triangles), stl = "solid\n";
+  std::string ply = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty double y\nproperty float z\n"
+      "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      corners, triangles);
+  for (std::size_t i = 0; i < corners; ++i) obj += "v " + corner(i), off += corner(i), ply += corner(i);
+  for (std::size_t t = 0; t < triangles; ++t) {
+    const std::string face = fmt::format("3 {} {} {}\n", 3 * t, 3 * t + 1, 3 * t + 2);
+    off += face, ply += face, obj += fmt::format("f {} {} {}\n", 3 * t + 1, 3 * t + 2, 3 * t + 3);
+    stl += "facet normal 0 0 0\nouter loop\n";
+    for (std::size_t k = 0; k < 3; ++k) stl += "vertex " + corner(3 * t + k);
+    stl += "endloop\nendfacet\n";
+  }
+  const std::pair<const char*, std::string> files[] = {
+      {"a.obj", obj}, {"a.ply", ply}, {"a.off", off}, {"a.stl", stl + "endsolid\n"}};
+  for (const auto& [name, text] : files) {
+    INFO(name);
+    const Scene scene = load_file(folder.write(name, text));
+    REQUIRE(scene.mesh.size() == triangles);
+    std::size_t differ = 0;
+    for (std::size_t i = 0; i < words.size(); ++i)
+      differ += scene.mesh.corners(i / 9)[i / 3 % 3][i % 3] != std::strtof(words[i].c_str(), nullptr);
+    CHECK(differ == 0);
+  }
+
+  // Of glTF the corners are binary; where nodes stand is text, read as doubles. The first corner of each node's pyramid
+  // is (0, 0, 0).
+  folder.write("part.bin", gltf_buffer());
+  constexpr std::size_t kNodes = 900;
+  const auto of = [&](std::size_t node) { return words.data() + 9 + 3 * node; };
+  std::string nodes, names;
+  for (std::size_t i = 0; i < kNodes; ++i) {
+    const char* comma = i > 0 ? "," : "";
+    nodes += fmt::format(R"({}{{"mesh":0,"translation":[{},{},{}]}})", comma, of(i)[0], of(i)[1], of(i)[2]);
+    names += fmt::format("{}{}", comma, i);
+  }
+  std::string gltf = gltf_json(R"(,"uri":"part.bin")");
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    gltf.replace(gltf.find(from), from.size(), to);
+  };
+  replace(R"("nodes":[0])", "\"nodes\":[" + names + "]"), replace(R"({"mesh":0})", nodes);
+  const Scene scene = load_file(folder.write("a.gltf", gltf));
+  REQUIRE(scene.mesh.size() == 4 * kNodes);
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < 3 * kNodes; ++i)
+    differ += scene.mesh.corners(i / 3 * 4)[0][i % 3] != std::strtof(of(i / 3)[i % 3].c_str(), nullptr);
+  CHECK(differ == 0);
+}
+
+TEST_CASE("OFF: comments, empty lines, every keyword, polygons of any size, and what stands behind a position") {
+  const Folder folder;
+  const auto load = [&](const std::string& text) { return load_file(folder.write("a.off", text)); };
+  const std::string square = "0 0 0\n2 0 0\n2 2 0\n0 2 0\n4 0 1 2 3\n";
+  for (const std::string& text : {
+           "OFF\n4 1 0\n" + square,
+           "OFF 4 1 4\n" + square,
+           "OFF4 1 0\n" + square,
+           "4 1 0\n" + square,
+           "OFF\n4 1\n" + square,
+           "OFF\n4\n1\n4\n" + square,
+           "OFF\n4 1\n4\n" + square,
+           "# a square\n\nOFF # text\n # of\n4 1 0 # counts\n" + square,
+           std::string("\xef\xbb\xbfOFF\r\n4 1 0\r\n0 0 0\r\n2 0 0\r\n\r\n# half of it\r\n2 2 0\r\n0 2 0\r\n4 0 1 2 3"),
+           std::string("OFF\r4 1 0\r0 0 0\r2 0 0\r2 2 0\r0 2 0\r4 0 1 2 3\r"),
+           std::string("COFF\n4 1 0\n0 0 0 255 0 0 255\n\t2 0 0 9\n2 2 0# red\n0 2 0\n4 0 1 2 3 0.5 0.5 0.5 # grey\n"),
+           std::string("STCN4OFF\n4 1 0\n0 0 0 1 7\n1 0 0 .5 7\n4 4 0 2 7\n0 2 0 1 7\n4 0 1 2 3\n"),
+           std::string("nOFF\n2\n4 1 0\n0 0\n2 0\n2 2\n0 2\n4 0 1 2 3\n"),
+           std::string("nOFF 3 4 1\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n4 0 1 2 3\n"),
+       }) {
+    INFO(text);
+    const Scene scene = load(text);
+    CHECK(scene.mesh.vertices == std::vector<Vec3f>{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}});
+    CHECK(scene.mesh.triangles == std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}});
+    CHECK(scene.report.polygons_split == 1);
+    CHECK(scene.report.warnings.empty());
+  }
+  std::string circle = "OFF\n100 1 0\n", face = "100";
+  for (int i = 0; i < 100; ++i)
+    circle += fmt::format("{:.6f} {:.6f} 0\n", std::cos(i * 0.0628), std::sin(i * 0.0628)),
+        face += fmt::format(" {}", i);
+  CHECK(load(circle + face + "\n").mesh.size() == 98);
+  const std::string line = "OFF\n3 4 0\n0 0 0\n1 0 0\n0 1 0\n0\n1 2\n2 0 1\n3 0 1 2\n";
+  CHECK(load(line).report.warnings ==
+        std::vector<std::string>{(folder / "a.off").string() + ": 3 faces of fewer than three corners left out"});
+  CHECK(load(line + "# the end\n\n").report.warnings.size() == 1);
+  REQUIRE(load(line + "\n3 2 1 0\n").report.warnings.size() == 2);
+  CHECK_THAT(load(line + "\n3 2 1 0\n").report.warnings[0],
+             Catch::Contains("a.off:11: the header promises 3 vertices and 4 faces; what is from here on is left out"));
+}
+
+TEST_CASE("binary STL is told by its size, whatever its header says") {
+  const Folder folder;
+  check_pyramid(load_file(folder.write("a.stl", "solid pyramid" + stl_binary().substr(13))));
+  // A vertex is as it stands in the file, to the last bit.
+  std::string bytes = stl_binary();
+  const float least = std::nextafter(1.0f, 2.0f);
+  std::memcpy(bytes.data() + 84 + 12, &least, sizeof least);
+  CHECK(load_file(folder.write("b.stl", bytes)).mesh.corners(0)[0].x == least);
+}
+
 TEST_CASE("node transforms of glTF are applied") {
   const Folder folder;
   folder.write("part.bin", gltf_buffer());
@@ -125,8 +247,14 @@ TEST_CASE("STL of text: a name may be any word, and the solid may end where it l
   const std::string stl = stl_ascii(), body = stl.substr(stl.find('\n'), stl.rfind("endsolid") - stl.find('\n'));
   for (const std::string end : {"endsolid vertex\n", "endsolid", "end solid"}) {
     INFO(end);
-    CHECK(error_of([&] { (void)load_file(folder.write("a.stl", "solid vertex" + body + end)); }) == "");
+    check_pyramid(load_file(folder.write("a.stl", "solid vertex" + body + end)));
+    std::string lines = "solid facet\n" + body + end;
+    for (std::size_t at = 0; (at = lines.find('\n', at)) != std::string::npos; at += 2) lines.insert(at, "\r");
+    check_pyramid(load_file(folder.write("a.stl", lines)));
+    std::ranges::replace(lines, '\n', '\r');
+    check_pyramid(load_file(folder.write("a.stl", lines)));
   }
+  CHECK(load_file(folder.write("two.stl", stl + stl)).mesh.size() == 8);
 }
 
 TEST_CASE("MTL: what is no number, or none that can be, is one clear line") {
@@ -446,13 +574,34 @@ TEST_CASE("bad files: one clear line each, that says what and where") {
       {"early.obj", "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",
        "early.obj:1: face index 1 is out of range: no vertex precedes it"},
       {"later.obj", "v 0 0 0 \\\n\nv 1 0 \\\r\n0\nv 0 1 0\nf 1 2 \\\n4\n", "later.obj:6: face index 4 is out of range"},
-      {"cut.off", off_text().substr(0, 60), "cut.off"},
-      {"range.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "range"},
+      {"nested.stl", "solid a\nfacet\nvertex 0 0 0\nfacet\n",
+       "nested.stl:4: a facet begins, and that of line 2 has no"},
+      {"outside.stl", "solid a\nvertex 0 0 0\n", "outside.stl:2: a 'vertex' outside of 'facet' and 'endfacet'"},
+      {"twice.stl", "solid a\rfacet\r\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendfacet\nendfacet\nendsolid\n",
+       "twice.stl:7: an 'endfacet' without its 'facet'"},
+      {"none.stl", "solid a\nendsolid\n", "none.stl: no triangle in it"},
+      {"nothing.stl", std::string(84, '\0'), "nothing.stl: no triangle in it"},
+      {"cut.off", off_text().substr(0, 60),
+       "cut.off: broken or truncated: 2 vertices of the 5 that the header promises"},
+      {"blank.off", "# nothing\n\n", "nothing in it but blanks and comments"},
+      {"word.off", "off\n3 1 0\n", "word.off:1: the number of vertices is 'off'; write 'OFF', then how many"},
+      {"counts.off", "OFF\n3\n", "the number of faces is missing behind the keyword OFF"},
+      {"four.off", "OFF\n3 1 0 0 0 0\n1 0 0\n", "four.off:2: no three counts"},
+      {"negative.off", "OFF\n-3 1 0\n", "negative.off:2: the number of vertices is '-3'"},
+      {"dimension.off", "nOFF\n4\n3 1 0\n", "dimension.off:2: 4 coordinates a vertex; up to 3 are read"},
+      {"binary.off", "OFF BINARY\n\1\2\3", "binary.off:1: a binary OFF, which is not read; save it as text"},
+      {"comma.off", "OFF\n3 1 0\n\n0 0 0\n1 0,5 0\n0 1 0\n3 0 1 2\n",
+       "comma.off:5: vertex 1 has no number for y but '0,5'"},
+      {"plane.off", "OFF\r\n3 1 0\r\n0 0 0\r\n1 0\r\n0 1 0\r\n3 0 1 2\r\n",
+       "plane.off:4: vertex 1 has no number for z; write a vertex a line"},
+      {"minus.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n", "minus.off:6: face 0: '-1' is no vertex index"},
+      {"points.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "points.off: no triangle in it"},
+      {"range.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n",
+       "range.off:6: face 0: vertex index 7 is out of range: there are 3 vertices"},
       {"indices.off", "OFF4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 5\n95\n95\n95\n",
-       "face 0 has 0 corners of the 95 that it promises"},
-      {"few.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 1\n3 0 1 .\n4 0 1 3 2\n", "face 0 has 2 corners of the 3"},
-      {"none.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n0\n3 0 1 2\n", "face 0 does not begin with its number of corners"},
-      {"comment.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n # faces\n3 0 1 2\n", "a comment among the vertices or faces"},
+       "indices.off:6: face 0 has 0 corners of the 95 that it promises"},
+      {"few.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 1\n3 0 1\n4 0 1 3 2\n", "face 0 has 2 corners of the 3"},
+      {"none.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\nx\n3 0 1 2\n", "face 0 does not begin with its number of corners"},
       {"missing.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "1 faces of the 2 that the header promises"},
       {"deep.gltf", std::string(200000, '['), "more than 100 brackets in each other"},
       {"deep.glb", glb_of(std::string(200000, '[')), "more than 100 brackets in each other"},
