@@ -167,6 +167,9 @@ void add_facts(Json& facts, const AnswerCheck& check, bool closest_hit) {
   facts["cracks"] = check.cracks;
   facts["t_error_ulp_median"] = check.t_error_ulp_median, facts["t_error_ulp_p99"] = check.t_error_ulp_p99;
   facts["t_error_ulp_max"] = check.t_error_ulp_max;
+  facts["wrong_uv"] = check.wrong_uv;
+  facts["uv_error_median"] = check.uv_error_median, facts["uv_error_p99"] = check.uv_error_p99;
+  facts["uv_error_max"] = check.uv_error_max;
 }
 
 void add_facts(Json& facts, const StartCheck& check, bool closest_hit) {

@@ -10,6 +10,7 @@
 #include "core/missing_isa.h"
 #include "experiments/sampling.h"
 #include "experiments/table_text.h"
+#include "oracle/oracle.h"
 
 namespace arboretum {
 namespace {
@@ -251,6 +252,13 @@ std::vector<std::string> run_warnings(const RunOutcome& outcome, const Plan& pla
                     : noisy_builds > 0    ? "min_time (builds heed it little) or repetitions"
                                           : "min_time or repetitions"));
   }
+  const auto has_wrong_uv = [](const CellResult& r) { return r.fact("uv_error_median") > kWrongUv; };
+  if (const auto first = std::ranges::find_if(outcome.results, has_wrong_uv); first != outcome.results.end())
+    warnings.push_back(
+        fmt::format("u or v of most hits is off by more than 2^-10 in {} of {} (first: {}): u is to "
+                    "weigh the triangle's second corner, v its third",
+                    std::ranges::count_if(outcome.results, has_wrong_uv), counted(outcome.results.size(), "cell"),
+                    first->cell.name()));
   for (const auto& [scene, rays] : views_of_nothing(outcome))
     warnings.push_back(
         fmt::format("none of the {} primary rays hits {}: its camera looks past it, and the times are of "

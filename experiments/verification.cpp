@@ -64,8 +64,7 @@ class Judge {
     tally.self_hits += source != kNoPrimitive && answer.primitive == source && truth.hit.primitive != source;
     tally.differs += reference && (reference->primitive != answer.primitive || reference->t != answer.t);
     if (j.t_error_ulp >= 0) tally.t_ulp.add(j.t_error_ulp);
-    if (answer.is_hit() && answer.primitive == truth.hit.primitive)
-      tally.uv.add(std::max(std::fabs(double(answer.u) - truth.hit.u), std::fabs(double(answer.v) - truth.hit.v)));
+    if (j.uv_error >= 0) tally.uv.add(j.uv_error);
 
     if (!promise_.any() || !is_within(promise_, ray, largest_)) return;
     std::string what = breach(i, time, j, answer, any);

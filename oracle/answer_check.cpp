@@ -20,7 +20,7 @@ constexpr std::size_t kRaysATask = 4096;
 
 struct Tally {
   AnswerCheck check;
-  std::vector<float> t_errors;  // ulp
+  std::vector<float> t_errors, uv_errors;  // ulp, absolute
 };
 
 void expect_one_size(std::size_t rays, std::size_t truth, std::size_t answers) {
@@ -52,6 +52,13 @@ bool is_behind(const TriangleMesh& mesh, const Ray& ray, FrameTime at, const Exa
   return distance(truth.hit.primitive).upper < distance(answer.primitive).lower;
 }
 
+/// NaN included, which no comparison holds for.
+double uv_error(const Hit& exact, const Hit& answer) {
+  const double u = std::fabs(double(answer.u) - exact.u), v = std::fabs(double(answer.v) - exact.v);
+  constexpr double most = std::numeric_limits<float>::max();
+  return u <= most && v <= most ? std::max(u, v) : most;
+}
+
 /// The smallest value that at least a share `p` of them does not exceed.
 double quantile(std::vector<float>& values, double p) {
   const auto rank = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size())));
@@ -70,6 +77,7 @@ double ulp_of(float x) noexcept {
 AnswerCheck& AnswerCheck::operator+=(const AnswerCheck& other) noexcept {
   rays += other.rays, hits += other.hits, missed_hits += other.missed_hits, false_hits += other.false_hits;
   wrong_surface += other.wrong_surface, wrong_primitive += other.wrong_primitive, cracks += other.cracks;
+  wrong_uv += other.wrong_uv;
   return *this;
 }
 
@@ -95,6 +103,7 @@ Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time
       const double error = std::fabs(difference) / ulp_of(truth.hit.t);
       j.t_error_ulp = std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
     }
+    if (answer.primitive == truth.hit.primitive) j.uv_error = uv_error(truth.hit, answer);
   }
   j.crack = something_behind && adjacency().passes_through(ray, at, truth.hit.primitive, answer.primitive);
   return j;
@@ -113,19 +122,27 @@ AnswerCheck check_closest_hits(const TriangleMesh& mesh, RayBatch rays, std::spa
       check.hits += answers[i].is_hit(), check.missed_hits += j.missed, check.false_hits += j.false_hit;
       check.wrong_surface += j.wrong_surface, check.wrong_primitive += j.wrong_primitive, check.cracks += j.crack;
       if (j.t_error_ulp >= 0) tally.t_errors.push_back(static_cast<float>(j.t_error_ulp));
+      if (j.uv_error >= 0) tally.uv_errors.push_back(static_cast<float>(j.uv_error));
+      check.wrong_uv += j.uv_error > kWrongUv;
     }
   });
   AnswerCheck sum;
-  std::vector<float> errors;
+  std::vector<float> errors, uv_errors;
   for (const Tally& tally : tallies) {
     sum += tally.check;
     errors.insert(errors.end(), tally.t_errors.begin(), tally.t_errors.end());
+    uv_errors.insert(uv_errors.end(), tally.uv_errors.begin(), tally.uv_errors.end());
   }
   sum.rays = rays.size();
   if (!errors.empty()) {
     sum.t_error_ulp_median = quantile(errors, 0.5);
     sum.t_error_ulp_p99 = quantile(errors, 0.99);
     sum.t_error_ulp_max = *std::max_element(errors.begin(), errors.end());
+  }
+  if (!uv_errors.empty()) {
+    sum.uv_error_median = quantile(uv_errors, 0.5);
+    sum.uv_error_p99 = quantile(uv_errors, 0.99);
+    sum.uv_error_max = *std::max_element(uv_errors.begin(), uv_errors.end());
   }
   return sum;
 }

@@ -6,7 +6,8 @@ from html import escape
 from results import STRUCTURE_AXES, axis_sort_key, interval_name, interval_words, ordered
 
 PER_MILLION = (("wrong_answers", "wrong"), ("missed_hits", "missed"), ("false_hits", "false"),
-               ("wrong_surface", "wrong surface"), ("wrong_primitive", "wrong primitive"), ("cracks", "cracks"))
+               ("wrong_surface", "wrong surface"), ("wrong_primitive", "wrong primitive"), ("wrong_uv", "wrong u, v"),
+               ("cracks", "cracks"))
 
 SAH_STEP = ("A visit of a node counts as one step whatever the number of its children (of a grid, each cell crossed), and a leaf block as one test whatever "
             "the number of its triangles: a lower cost of wider nodes or blocks is not less work by as much.")
@@ -158,7 +159,7 @@ def throughput_table(results):
     note = constant_axes(cells, [a for a in THROUGHPUT_AXES if a not in axes])
     return (f'<p class="soft">Throughput: {escape(unit)}, the median of the repetitions, with '
             f'{escape(interval_words(c.estimate(metric).samples for c in cells))}. Wrong answers are missed hits, false '
-            f"hits and wrong surfaces against exact arithmetic; “wrong primitive” counts apart. The fastest "
+            f"hits and wrong surfaces against exact arithmetic; “wrong primitive” and “wrong u, v” (off by more than 2⁻¹⁰) count apart. The fastest "
             f"structure of a scene, workload and ISA is green. {escape('Same for all: ' + note + '.' if note else '')}</p>"
             + table("throughput", heads, rows))
 

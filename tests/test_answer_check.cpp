@@ -153,6 +153,48 @@ TEST_CASE("median, 99th percentile and maximum of the error of t") {
   CHECK(check.t_error_ulp_max == 199);
 }
 
+TEST_CASE("u and v of hits of the right primitive are compared with the exact ones, apart from wrong answers") {
+  TriangleMesh mesh;
+  add_triangle(mesh, {-1, -1, 1}, {1, -1, 1}, {0, 1, 1});
+  const Oracle oracle(mesh);
+  const Ray ray{{0, -0.5f, 0}, 0, {0, 0, 1}, kInf};
+  const ExactHit truth = oracle.closest_hit({&ray, 1})[0];
+  REQUIRE((truth.hit.u == 0.375f && truth.hit.v == 0.25f));
+  const float nan = std::numeric_limits<float>::quiet_NaN(), most = std::numeric_limits<float>::max();
+  const struct {
+    const char* name;
+    Hit answer;
+    std::uint64_t wrong;
+    double error;
+  } cases[] = {{"right", {1, 0.375f, 0.25f, 0}, 0, 0},
+               {"u a little off", {1, 0.375f + 0x1p-20f, 0.25f, 0}, 0, 0x1p-20},
+               {"v off by as much as may be", {1, 0.375f, 0.25f - 0x1p-10f, 0}, 0, 0x1p-10},
+               {"v off by more", {1, 0.375f, 0.25f - 0x1p-9f, 0}, 1, 0x1p-9},
+               {"u and v exchanged", {1, 0.25f, 0.375f, 0}, 1, 0.125},
+               {"u of the wrong corner", {1, 0.375f, 0.375f, 0}, 1, 0.125},
+               {"u left unwritten", {1, nan, 0.25f, 0}, 1, most},
+               {"v infinite", {1, 0.375f, kInf, 0}, 1, most},
+               {"right, though t is off", {1.5f, 0.375f, 0.25f, 0}, 0, 0},
+               {"of another primitive", {1, 0.5f, 0.5f, 77}, 0, 0},
+               {"miss", {}, 0, 0}};
+  for (const auto& c : cases) {
+    INFO(c.name);
+    const AnswerCheck check = oracle.check_closest_hit({&ray, 1}, {&truth, 1}, {&c.answer, 1});
+    CHECK(check.wrong_uv == c.wrong);
+    CHECK(check.uv_error_max == c.error);
+    CHECK(check.uv_error_median == c.error);
+    CHECK(check.wrong_answers() == (c.answer.t == 1.0f ? 0u : 1u));
+  }
+  const std::vector<Ray> rays(200, ray);
+  std::vector<Hit> answers(200, truth.hit);
+  for (std::size_t i = 0; i < answers.size(); ++i) answers[i].u += static_cast<float>(i) * 0x1p-14f;
+  const AnswerCheck check = oracle.check_closest_hit(rays, oracle.closest_hit(rays), answers);
+  CHECK(check.uv_error_median == 99 * 0x1p-14);
+  CHECK(check.uv_error_p99 == 197 * 0x1p-14);
+  CHECK(check.uv_error_max == 199 * 0x1p-14);
+  CHECK(check.wrong_uv == 200 - 17);
+}
+
 TEST_CASE("a miss is a crack where the surface is closed and not at its silhouette or border") {
   struct Case {
     const char* name;

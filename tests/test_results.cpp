@@ -318,6 +318,30 @@ TEST_CASE("warnings: repetitions that lie apart, however few; a camera that look
   CHECK(!warned({1.0}, 1, "looks past it"));
 }
 
+TEST_CASE("u and v that are off on most hits are told, whatever the wrong answers") {
+  const Folder folder;
+  const Registry registry = paper_registry();
+  const Plan plan = make_plan(read_experiment(folder.write("small.yaml", kSmall), registry), registry);
+  AnswerCheck check;
+  check.uv_error_median = kWrongUv, check.uv_error_max = 1.0, check.wrong_uv = 400;
+  RunOutcome outcome;
+  outcome.results.push_back(result_of(plan.cells[1]));
+  const auto warnings = [&] {
+    add_facts(outcome.results[0].facts, check, true);
+    std::vector<std::string> lines = run_warnings(outcome, plan, 64);
+    std::erase_if(lines, [](const std::string& line) { return line.find("u or v") == std::string::npos; });
+    return lines;
+  };
+  CHECK(warnings().empty());
+  check.uv_error_median = 0.25;
+  REQUIRE(warnings().size() == 1);
+  CHECK(warnings()[0] == "u or v of most hits is off by more than 2^-10 in 1 of 1 cell (first: " +
+                             plan.cells[1].name() + "): u is to weigh the triangle's second corner, v its third");
+  CHECK(outcome.results[0].facts["wrong_uv"] == 400);
+  CHECK(outcome.results[0].facts["uv_error_max"] == 1.0);
+  CHECK(outcome.results[0].facts["wrong_answers"] == 0);
+}
+
 TEST_CASE(
     "the warning of noise is by the clock of the tables: wall time of builds, and beside cells of several threads") {
   const Folder folder;
