@@ -160,12 +160,23 @@ class Verify {
       throw UserError(fmt::format("verify: {}: has nothing that rays of these --kinds are aimed at", name));
     StructureShelf shelf(mesh, registry_, threads_);
     const std::size_t batch_size = command_.spread ? spread_batch(rays) : kBatch;
+    const std::uint64_t batches = (rays + batch_size - 1) / batch_size, before = cells_reached_;
+    // A cell's batches follow each other, so that its structure need not be kept for a second round.
+    const std::uint64_t reached = std::min<std::uint64_t>(batches, cells_.size());
+    const auto cell_of = [&](std::uint64_t batch) -> VerifiedCell& {
+      return cells_[(before + batch * reached / batches) % cells_.size()];
+    };
+    if (command_.spread)
+      for (std::uint64_t batch = 0; batch < batches; ++batch) shelf.expect(cell_of(batch).cell, 1);
+    else
+      for (const VerifiedCell& verified : cells_) shelf.expect(verified.cell, batches);
+    cells_reached_ += reached;
     for (std::uint64_t begin = 0; begin < rays; begin += batch_size) {
       const std::size_t count = std::min<std::uint64_t>(batch_size, rays - begin);
       const HardRays made = maker.make(command_.seed, begin, count, kinds);
       const VerifyBatch batch{mesh, oracle, made, oracle.closest_hit(made.batch()), begin};
       if (command_.spread) {
-        VerifiedCell& cell = cells_[next_cell_++ % cells_.size()];
+        VerifiedCell& cell = cell_of(begin / batch_size);
         std::vector<Hit> hits;
         cell.add(variant, verify_cell(cell.cell, shelf.get(cell.cell), batch, hits, {}));
       } else {
@@ -282,7 +293,7 @@ class Verify {
   std::vector<VerifiedCell> cells_;
   std::vector<VerifyVariant> variants_{{}};
   std::string title_;
-  std::size_t next_cell_ = 0;
+  std::uint64_t cells_reached_ = 0;  ///< by rays that are spread, over all variants
   std::uint64_t total_rays_ = 0;
   KeptBreaches breaches_;
 };

@@ -141,17 +141,37 @@ bool is_within(const Promise& promise, const Ray& ray, float largest) noexcept {
   return !is_valid(ray) || (size >= low && size <= high && direction >= low && direction <= high);
 }
 
+Isa StructureShelf::built_for(const Cell& cell) const {
+  return registry_.structure(cell.structure)->info.build_depends_on_isa ? cell.isa : registry_.isas.back();
+}
+
+StructureShelf::Key StructureShelf::key_of(const Cell& cell) const {
+  return {cell.structure, cell.builder_name(), cell.leaf, built_for(cell)};
+}
+
+void StructureShelf::expect(const Cell& cell, std::uint64_t times) { expected_[key_of(cell)] += times; }
+
+void StructureShelf::drop_spent(const Key& but) {
+  std::erase_if(built_, [&](const auto& shelved) {
+    const auto& [key, accel] = shelved;
+    const auto left = expected_.find(key);
+    if (key == but || left == expected_.end() || left->second > 0) return false;
+    bytes_ -= accel->bytes();
+    return true;
+  });
+}
+
 const Accel& StructureShelf::get(const Cell& cell) {
-  const StructureEntry* entry = registry_.structure(cell.structure);
-  BuildSettings settings{cell.builder, cell.leaf, entry->info.build_depends_on_isa ? cell.isa : registry_.isas.back(),
-                         threads_, cell.parameters};
-  std::unique_ptr<Accel>& accel = built_[{cell.structure, cell.builder_name(), cell.leaf, settings.isa}];
-  if (accel) return *accel;
+  const Key key = key_of(cell);
+  drop_spent(key);
+  if (const auto left = expected_.find(key); left != expected_.end() && left->second > 0) --left->second;
+  if (const auto found = built_.find(key); found != built_.end()) return *found->second;
+  const BuildSettings settings{cell.builder, cell.leaf, built_for(cell), threads_, cell.parameters};
   BuildReport report;
   std::unique_ptr<Accel> fresh = registry_.build(cell.structure, mesh_, settings, report);
   if (bytes_ + fresh->bytes() > kMostBytes) built_.clear(), bytes_ = 0;
   bytes_ += fresh->bytes();
-  return *(built_[{cell.structure, cell.builder_name(), cell.leaf, settings.isa}] = std::move(fresh));
+  return *(built_[key] = std::move(fresh));
 }
 
 std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const VerifyBatch& batch,

@@ -2,6 +2,7 @@
 // promise.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <span>
@@ -32,18 +33,27 @@ class StructureShelf {
   StructureShelf(const TriangleMesh& mesh, const Registry& registry, unsigned threads)
       : mesh_(mesh), registry_(registry), threads_(threads) {}
   /// Throws UserError as build_structure() does. The reference holds until the next call: beyond kMostBytes all others
-  /// are dropped.
+  /// are dropped, and always those that were expected and have been got as often.
   [[nodiscard]] const Accel& get(const Cell& cell);
+  /// get() will be called for the cell so many times more. A structure that nothing was ever expected of is kept.
+  void expect(const Cell& cell, std::uint64_t times);
+  /// How many structures are held.
+  [[nodiscard]] std::size_t size() const noexcept { return built_.size(); }
 
   static constexpr std::size_t kMostBytes = std::size_t{6} << 30;
 
  private:
   using Key = std::tuple<std::string, std::string, std::string, Isa>;
 
+  [[nodiscard]] Isa built_for(const Cell& cell) const;
+  [[nodiscard]] Key key_of(const Cell& cell) const;
+  void drop_spent(const Key& but);
+
   const TriangleMesh& mesh_;
   const Registry& registry_;
   unsigned threads_;
   std::map<Key, std::unique_ptr<Accel>> built_;
+  std::map<Key, std::uint64_t> expected_;  ///< calls of get() to come
   std::size_t bytes_ = 0;
 };
 

@@ -264,6 +264,32 @@ std::vector<VerifyTally> tallies_of(const VerifiedCell& verified, const Registry
 
 }  // namespace
 
+TEST_CASE("structures are held as long as cells are expected to take them, and no longer") {
+  const Registry registry = this_registry();
+  const std::vector<VerifiedCell> cells = promising_cells(registry);
+  const auto cell_of = [&](std::string_view structure) -> const Cell& {
+    return std::ranges::find_if(cells, [&](const VerifiedCell& c) { return c.cell.structure == structure; })->cell;
+  };
+  const Cell &first = cell_of("bvh4"), &second = cell_of("bvh8"), &third = cell_of("kdtree");
+  const TriangleMesh mesh = generate_sphere(300, 1).mesh;
+  StructureShelf kept(mesh, registry, 1);
+  for (const Cell* cell : {&first, &second, &third}) (void)kept.get(*cell);
+  CHECK(kept.size() == 3);
+
+  StructureShelf shelf(mesh, registry, 1);
+  shelf.expect(first, 2), shelf.expect(second, 1), shelf.expect(first, 1), shelf.expect(third, 1);
+  const Accel* held = &shelf.get(first);
+  (void)shelf.get(second);
+  CHECK(shelf.size() == 2);  // the first is expected twice more
+  CHECK(&shelf.get(first) == held);
+  CHECK(shelf.size() == 1);
+  CHECK(&shelf.get(first) == held);
+  (void)shelf.get(third);
+  CHECK(shelf.size() == 1);
+  (void)shelf.get(first);  // unexpected: built again
+  CHECK(shelf.size() == 1);
+}
+
 TEST_CASE("a kernel that leaks is told to leak, and a promise that it breaks is shown as a small case") {
   const Registry registry = this_registry();
   std::vector<VerifiedCell> cells = only(promising_cells(registry), "bvh8", "watertight");

@@ -197,6 +197,34 @@ TEST_CASE("each placing of a scene has rays of its own, and each keeps its cases
 }
 
 namespace {
+std::vector<std::pair<char, std::size_t>> traced;  // last letter of the structure's name, rays
+}  // namespace
+
+TEST_CASE("rays that are spread: the batches of a cell follow each other, and cells have as many but for one") {
+  std::vector<KernelRow> rows;
+  const auto record = [](const Accel& accel, const KernelRow& row, RayBatch batch, std::span<Hit> hits,
+                         Counters* counters) {
+    honest(row).closest_hit(accel, batch, hits, counters);
+    if (traced.empty() || traced.back().first != row.structure.back()) traced.emplace_back(row.structure.back(), 0);
+    traced.back().second += batch.size();
+  };
+  const Registry registry = with_liars(rows, "exact", {{"bvh2", record}, {"bvh4", record}, {"bvh8", record}});
+  VerifyCommand command;
+  command.subject = "sphere:200", command.threads = 1, command.spread = true, command.kinds = {"interior"};
+  command.axes = {"structure=bvh2,bvh4,bvh8", "intersector=exact", "box=padded", "isa=" + any_isa()};
+  constexpr std::size_t kBatch = 1 << 14;  // the largest
+  command.rays = 7 * kBatch + 100;
+  traced.clear();
+  CHECK(verify(command, &registry).status == 0);
+  CHECK(traced == std::vector<std::pair<char, std::size_t>>{{'2', 3 * kBatch}, {'4', 3 * kBatch}, {'8', kBatch + 100}});
+  // Fewer batches than cells: the next scene's go to those that had none.
+  command.rays = 2 * 256, command.offsets = {0, 1}, command.kinds = {"interior"};
+  traced.clear();
+  CHECK(verify(command, &registry).status == 0);
+  CHECK(traced == std::vector<std::pair<char, std::size_t>>{{'2', 256}, {'4', 256}});
+}
+
+namespace {
 int calls = 0;
 }  // namespace
 
