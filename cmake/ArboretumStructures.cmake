@@ -1,7 +1,7 @@
 # Structures and the executables that have them. Comes with the source tree and with the installed package.
 #
 # A structure is a folder <folder>/ with <name>.h, which says `using Structures = TypeList<...>;` in namespace
-# arboretum::<folder>, its .cpp files, <name>_kernels.h, and, where it says what its builders read, <name>_parameters.h. For each of its types and each instruction set a kernel unit is
+# arboretum::<folder>, its .cpp files, <name>_kernels.h, and, where it says something of its builders, <name>_parameters.h. For each of its types and each instruction set a kernel unit is
 # generated; a generated registry.cpp says which structures and kernels an executable has. What the functions below hand to
 # each other is a record `<header as included>|<folder>|<types, comma-separated>|<yes where there is a <name>_parameters.h>`.
 #
@@ -154,7 +154,7 @@ ${declarations}
 // What makes an instruction set's rows is itself compiled for it: elsewhere it must not run.
 std::vector<StructureEntry> registered_structures() { return structure_entries(ConcatLists<${lists}>{}); }
 
-std::vector<BuilderParametersOf> registered_parameters() { return parameters_entries(ConcatLists<${lists}>{}); }
+std::vector<StructureBuilders> registered_builders() { return builders_entries(ConcatLists<${lists}>{}); }
 
 std::vector<KernelRow> registered_kernels() {
   std::vector<KernelRow> rows;

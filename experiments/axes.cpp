@@ -1,5 +1,7 @@
 #include "experiments/axes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <iterator>
@@ -18,22 +20,12 @@ struct Summary {
   std::string_view key, line;
 };
 
+/// Others stand beside the builders (structures/parameters_read.h); Embree's are here because configurations may name
+/// them where its library is missing.
 constexpr Summary kBuilders[] = {
-    {"in_order", "nothing is sorted: triangles in the mesh's order"},
-    {"binned_sah", "top-down, surface area heuristic over bins of centroids, then collapsed to the structure's width"},
-    {"sweep_sah", "top-down, surface area heuristic at every candidate plane"},
-    {"spatial_sah", "binned SAH with spatial splits (references may be duplicated)"},
-    {"morton", "sorted along a Morton curve (linear BVH)"},
-    {"ploc", "bottom-up, parallel locally-ordered clustering"},
-    {"uniform", "grid: one, of equal cells"},
-    {"two_level", "grid: crowded cells are divided by a grid of their own"},
-    {"octants", "octree: cells divided in eight while that is estimated to pay"},
     {"low", "Embree's low quality (Morton)"},
     {"medium", "Embree's medium quality (binned SAH)"},
     {"high", "Embree's high quality (spatial splits)"},
-    {"embree_low", "Embree's Morton builder, for our BVHs"},
-    {"embree_medium", "Embree's binned SAH builder, for our BVHs"},
-    {"embree_high", "Embree's builder with spatial splits, for our BVHs"},
     {"auto", "the first that the structure takes"},
     {"all", "each that the structure takes, a cell for each"},
 };
@@ -144,12 +136,16 @@ void append_new(std::vector<std::string>& list, std::string_view value) {
   if (std::ranges::find(list, value) == list.end()) list.emplace_back(value);
 }
 
-/// Builders of BVHs have a second key, with reinsertion behind them.
-std::string builder_summary(std::string_view builder) {
-  constexpr std::string_view suffix = "_reinsertion";
-  if (!builder.ends_with(suffix)) return std::string(look_up(kBuilders, builder));
-  builder.remove_suffix(suffix.size());
-  return std::string(look_up(kBuilders, builder)) + "; then subtrees reinserted where they cost least";
+/// Where structures say different things of builders of one name, all of them.
+std::string builder_summary_of(std::string_view builder, const Registry& registry) {
+  std::vector<std::string> lines;
+  if (const std::string_view line = look_up(kBuilders, builder); !line.empty()) lines.emplace_back(line);
+  for (const StructureEntry& e : registry.structures) {
+    const auto& takes = e.info.builders;
+    if (!registry.builder_summary || e.info.takes_below || std::ranges::find(takes, builder) == takes.end()) continue;
+    if (const std::string line = registry.builder_summary(e.info.name, builder); !line.empty()) append_new(lines, line);
+  }
+  return fmt::format("{}", fmt::join(lines, "; "));
 }
 
 std::string workload_summary(std::string_view workload) {
@@ -245,7 +241,7 @@ std::string summary_of(Axis axis, std::string_view value, const Registry& regist
     case Axis::structure:
       if (const StructureEntry* e = registry.structure(value)) return std::string(e->info.summary);
       return "not in this build: libembree was not found";
-    case Axis::builder: return builder_summary(value);
+    case Axis::builder: return builder_summary_of(value, registry);
     case Axis::leaf: return leaf_summary(value);
     case Axis::intersector: return std::string(intersector_summary(value));
     case Axis::box: return std::string(box_summary(value));

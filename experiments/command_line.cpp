@@ -204,8 +204,8 @@ void declare(CLI::App& app, Arguments& a) {
   declare_render(app, a.render);
   CLI::App* list = app.add_subcommand("list", "What can be swept");
   list->add_option("AXIS", a.axis,
-                   "structures, builders, leaves, intersectors, boxes, traversals, calls, isas, workloads, scenes, "
-                   "effects, promises");
+                   "structures, builders, leaves, intersectors, boxes, traversals, calls, isas, workloads, "
+                   "parameters, scenes, effects, promises");
   list->add_flag("--json", a.json, "As JSON");
   CLI::App* info = app.add_subcommand("info", "What a scene holds");
   info->add_option("SCENE", a.scene, "A catalogue name, a file, or generator:triangles[:seed]")->required();

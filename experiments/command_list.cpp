@@ -76,6 +76,20 @@ Json axis_entries(Axis axis, const Registry& registry) {
   return entries;
 }
 
+/// Of builders and of ways of traversal.
+Json parameter_entries(const Registry& registry) {
+  Json entries = Json::array();
+  for (const std::string& name : parameter_names()) {
+    Json entry = {{"name", name},
+                  {"summary", parameter_summary(name)},
+                  {"values", parameter_values(name)},
+                  {"default", default_parameter(name)}};
+    if (!is_of_traversal(name)) entry["readers"] = registry.readers_of(name);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
 Json scene_entries() {
   Json entries = Json::array();
   for (const CatalogueEntry& scene : catalogue()) {
@@ -162,6 +176,8 @@ std::string remark(const Json& entry) {
     const std::string words = again.empty() ? "" : fmt::format("{}, also as …{}", fmt::join(again, " "), kAgain);
     line += fmt::format(" [builders: {}{}{}]", words, again.empty() || once.empty() ? "" : "; ", fmt::join(once, " "));
   }
+  if (entry.contains("values"))
+    line += fmt::format(" [{}; default: {}]", entry["values"].get<std::string>(), entry["default"].get<std::string>());
   if (entry.contains("generator")) {
     line += !entry["generator"].get<bool>()   ? fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>())
             : entry["takes_seed"].get<bool>() ? " (generated, any triangle count and seed)"
@@ -182,11 +198,12 @@ ExitStatus command_list(const std::string& wanted, bool json) {
   std::vector<std::string> titles;
   for (std::size_t i = 0; i + 1 < kAxisCount; ++i)
     titles.push_back(plural(static_cast<Axis>(i)));  // threads are no list
+  titles.emplace_back("parameters");
   titles.emplace_back("scenes");
   titles.emplace_back("effects");
   titles.emplace_back("promises");
   const bool known = std::ranges::any_of(titles, [&](const std::string& t) { return t == wanted; }) ||
-                     wanted == "scene" || wanted == "effect" || wanted == "promise" ||
+                     wanted == "parameter" || wanted == "scene" || wanted == "effect" || wanted == "promise" ||
                      (parse_axis(wanted) && wanted != "threads");
   if (!wanted.empty() && !known) throw UserError(unknown_name_message("axis", wanted, titles));
 
@@ -196,6 +213,8 @@ ExitStatus command_list(const std::string& wanted, bool json) {
     if (wanted.empty() || wanted == plural(axis) || wanted == to_string(axis))
       document[plural(axis)] = axis_entries(axis, registry);
   }
+  if (wanted.empty() || wanted == "parameters" || wanted == "parameter")
+    document["parameters"] = parameter_entries(registry);
   if (wanted.empty() || wanted == "scenes" || wanted == "scene") document["scenes"] = scene_entries();
   if (wanted.empty() || wanted == "effects" || wanted == "effect") document["effects"] = effect_entries();
   if (wanted.empty() || wanted == "promises" || wanted == "promise") document["promises"] = promise_entries(registry);

@@ -14,19 +14,48 @@ namespace {
 
 constexpr std::string_view kOwn = "auto";  ///< the builder's or the way of traversal's own choice
 
-/// f(parameter, the set that it is of) for the one of that name.
+/// f(parameter, the set that it is of) for the one of that name; of a structure's own `own` is the set.
 template <class F>
 auto with(std::string_view name, Parameters& all, const F& f) {
   for (const auto& parameter : traversal_setting_table())
     if (parameter.name == name) return f(parameter, all.traversal);
   for (const auto& parameter : builder_parameter_table())
     if (parameter.name == name) return f(parameter, all.builder);
+  if (const OwnParameter* parameter = find_own_parameter(name)) return f(*parameter, all.own);
   throw std::logic_error(fmt::format("there is no parameter {}", name));
 }
 
-/// What a word may be: where the table leaves it open, a structure's name. What cannot stand below, the plan says.
+/// f(a value of the parameter's type).
+template <class Set, class F>
+auto of_type(const Parameter<Set>& parameter, const F& f) {
+  return std::visit([&]<class T>(T Set::*) { return f(T{}); }, parameter.member);
+}
+template <class F>
+auto of_type(const OwnParameter& parameter, const F& f) {
+  return std::visit(f, parameter.initial);
+}
+
+template <class Set, class T>
+void assign(const Parameter<Set>& parameter, Set& set, const T& value) {
+  set.*std::get<T Set::*>(parameter.member) = value;
+}
+void assign(const OwnParameter& parameter, OwnValues& values, const ParameterValue& value) {
+  if (value == parameter.initial)
+    values.erase(std::string(parameter.name));
+  else
+    values[std::string(parameter.name)] = value;
+}
+
+/// Whether the builder or the way of traversal may choose itself.
 template <class Set>
-std::vector<std::string_view> words_of(const Parameter<Set>& parameter) {
+bool has_own_choice(const Parameter<Set>& parameter) {
+  return parameter.has_own;
+}
+bool has_own_choice(const OwnParameter&) { return false; }
+
+/// What a word may be: where the table leaves it open, a structure's name. What cannot stand below, the plan says.
+template <class Row>
+std::vector<std::string_view> words_of(const Row& parameter) {
   std::vector<std::string_view> words(parameter.words.begin(), parameter.words.end());
   if (words.empty())
     for (const StructureEntry& e : all_structures()) words.push_back(e.info.name);
@@ -34,21 +63,49 @@ std::vector<std::string_view> words_of(const Parameter<Set>& parameter) {
 }
 
 /// What a value of type T may be, in words.
-template <class T, class Set>
-std::string expectation(const Parameter<Set>& p) {
+template <class T, class Row>
+std::string expectation(const Row& p) {
   if constexpr (std::is_same_v<T, std::string>) return fmt::format("one of {}", fmt::join(words_of(p), ", "));
   if (!p.choices.empty()) return fmt::format("one of {}", fmt::join(p.choices, ", "));
-  if (p.has_own) return fmt::format("{} or an integer from {} to {}", kOwn, p.limits.low, p.limits.high);
+  if (has_own_choice(p)) return fmt::format("{} or an integer from {} to {}", kOwn, p.limits.low, p.limits.high);
   return fmt::format("{} from {} to {}", std::is_integral_v<T> ? "an integer" : "a number", p.limits.low,
                      p.limits.high);
 }
 
-template <class T>
-bool parse_within(const std::string& text, const ParameterLimits& limits, T& out) {
-  const std::optional<T> value = parse_number<T>(text);
-  if (!value || !limits.hold(*value)) return false;
-  out = *value;
-  return true;
+/// The value that the text is, where it is one that the parameter may have.
+template <class T, class Row>
+std::optional<T> allowed_value(const Row& parameter, const std::string& text) {
+  if constexpr (std::is_same_v<T, std::string>) {
+    const std::vector<std::string_view> words = words_of(parameter);
+    return std::ranges::find(words, text) != words.end() ? std::optional(text) : std::nullopt;
+  } else {
+    if constexpr (std::is_same_v<T, unsigned>) {
+      if (has_own_choice(parameter) && text == kOwn) return BuilderParameters::kOwn;
+    }
+    const std::optional<T> value = parse_number<T>(text);
+    if (!value) return std::nullopt;
+    bool allowed = parameter.limits.hold(*value);
+    if constexpr (std::is_same_v<T, unsigned>) {
+      const auto& choices = parameter.choices;
+      if (!choices.empty()) allowed = std::ranges::find(choices, *value) != choices.end();
+    }
+    return allowed ? value : std::nullopt;
+  }
+}
+
+template <class Set>
+std::string value_text(const Parameter<Set>& parameter, const Set& set) {
+  const auto text = [&]<class T>(T Set::*member) {
+    if constexpr (std::is_same_v<T, unsigned>) {
+      if (parameter.has_own && set.*member == Set::kOwn) return std::string(kOwn);
+    }
+    return fmt::format("{}", set.*member);
+  };
+  return std::visit(text, parameter.member);
+}
+std::string value_text(const OwnParameter& parameter, const OwnValues& values) {
+  const auto value = values.find(parameter.name);
+  return text_of(value == values.end() ? parameter.initial : value->second);
 }
 
 }  // namespace
@@ -57,6 +114,7 @@ std::vector<std::string> parameter_names() {
   std::vector<std::string> names;
   for (const auto& p : builder_parameter_table()) names.emplace_back(p.name);
   for (const auto& p : traversal_setting_table()) names.emplace_back(p.name);
+  for (const OwnParameter& p : all_own_parameters()) names.emplace_back(p.name);
   return names;
 }
 
@@ -64,38 +122,28 @@ std::string default_parameter(std::string_view name) { return parameter_text({},
 
 std::string parameter_text(const Parameters& parameters, std::string_view name) {
   Parameters all = parameters;
-  return with(name, all, []<class Set>(const Parameter<Set>& parameter, const Set& set) {
-    const auto text = [&]<class T>(T Set::*member) {
-      if constexpr (std::is_same_v<T, unsigned>) {
-        if (parameter.has_own && set.*member == Set::kOwn) return std::string(kOwn);
-      }
-      return fmt::format("{}", set.*member);
-    };
-    return std::visit(text, parameter.member);
+  return with(name, all, [](const auto& parameter, const auto& set) { return value_text(parameter, set); });
+}
+
+std::string parameter_values(std::string_view name) {
+  Parameters all;
+  return with(name, all, [](const auto& parameter, const auto&) {
+    return of_type(parameter, [&]<class T>(const T&) { return expectation<T>(parameter); });
   });
 }
 
-std::string set_parameter(Parameters& all, std::string_view name, const std::string& value) {
-  return with(name, all, [&]<class Set>(const Parameter<Set>& parameter, Set& set) {
-    const auto assign = [&]<class T>(T Set::*member) {
-      T& to = set.*member;
-      bool done = false;
-      if constexpr (std::is_same_v<T, std::string>) {
-        const std::vector<std::string_view> words = words_of(parameter);
-        done = std::ranges::find(words, value) != words.end();
-        if (done) to = value;
-      } else if constexpr (std::is_same_v<T, unsigned>) {
-        const auto& choices = parameter.choices;
-        unsigned chosen = Set::kOwn;
-        done = (parameter.has_own && value == kOwn) || parse_within(value, parameter.limits, chosen);
-        done = done && (choices.empty() || std::ranges::find(choices, chosen) != choices.end());
-        if (done) to = chosen;
-      } else {
-        done = parse_within(value, parameter.limits, to);
-      }
-      return done ? std::string() : expectation<T>(parameter);
-    };
-    return std::visit(assign, parameter.member);
+std::string_view parameter_summary(std::string_view name) {
+  Parameters all;
+  return with(name, all, [](const auto& parameter, const auto&) { return parameter.summary; });
+}
+
+std::string set_parameter(Parameters& all, std::string_view name, const std::string& text) {
+  return with(name, all, [&](const auto& parameter, auto& set) {
+    return of_type(parameter, [&]<class T>(const T&) {
+      const std::optional<T> value = allowed_value<T>(parameter, text);
+      if (value) assign(parameter, set, *value);
+      return value ? std::string() : expectation<T>(parameter);
+    });
   });
 }
 
@@ -109,7 +157,8 @@ bool concerns(std::string_view name, std::string_view traversal) {
                                     : name == "rays_in_flight" && traversal == "queued";
 }
 
-void reset_parameter(BuilderParameters& parameters, std::string_view name) {
+void reset_parameter(BuilderParameters& parameters, OwnValues& own, std::string_view name) {
+  if (const auto value = own.find(name); value != own.end()) own.erase(value);
   const BuilderParameters defaults;
   for (const auto& p : builder_parameter_table())
     if (p.name == name) std::visit([&](auto member) { parameters.*member = defaults.*member; }, p.member);

@@ -1,5 +1,5 @@
-// Parameters by name, of builders and of ways of traversal: what the YAML's `parameters:` may hold, one table for
-// reading, defaults and cell names.
+// Parameters by name, of builders, a structure's own among them, and of ways of traversal: what the YAML's
+// `parameters:` may hold, one table for reading, defaults and cell names.
 #pragma once
 
 #include <map>
@@ -9,6 +9,7 @@
 
 #include "core/ray.h"
 #include "structures/accel.h"
+#include "structures/own_parameters.h"
 
 namespace arboretum {
 
@@ -18,6 +19,7 @@ using ParameterSweep = std::map<std::string, std::vector<std::string>>;
 struct Parameters {
   BuilderParameters builder;
   TraversalSettings traversal;
+  OwnValues own;  ///< of the builders, too
   friend bool operator==(const Parameters&, const Parameters&) = default;
 };
 
@@ -31,8 +33,11 @@ struct Parameters {
 /// Whether it is of the ways of traversal, and means something to that one; builders read theirs as they concern them.
 [[nodiscard]] bool is_of_traversal(std::string_view name);
 [[nodiscard]] bool concerns(std::string_view name, std::string_view traversal);
+/// What a value may be, in words: "an integer from 4 to 64"; and what a parameter means, in one line.
+[[nodiscard]] std::string parameter_values(std::string_view name);
+[[nodiscard]] std::string_view parameter_summary(std::string_view name);
 /// Sets a builder's parameter to its default.
-void reset_parameter(BuilderParameters& parameters, std::string_view name);
+void reset_parameter(BuilderParameters& parameters, OwnValues& own, std::string_view name);
 /// Takes ":name=value" out of a label.
 void drop_label(std::string& label, std::string_view name);
 

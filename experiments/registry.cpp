@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "structures/own_parameters.h"
 #include "structures/parameters_read.h"
 
 namespace arboretum {
@@ -33,6 +34,8 @@ bool Registry::reads(std::string_view parameter, std::string_view name, std::str
   if (!entry || !entry->info.uses_parameters) return false;
   const auto read = parameters_read ? parameters_read(name, builder, below) : std::nullopt;
   if (read) return std::ranges::find(*read, parameter) != read->end();
+  // One that does not say reads what there is for all, and what it has itself.
+  if (find_own_parameter(parameter)) return has_own_parameter(name, parameter);
   return parameter != "below" || entry->info.takes_below;
 }
 
@@ -93,6 +96,7 @@ Registry this_registry() {
   registry.why_no_kernel = remembered(why_no_kernel);
   registry.build = build_structure;
   registry.parameters_read = parameters_read;
+  registry.builder_summary = builder_summary;
   return registry;
 }
 

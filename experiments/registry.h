@@ -32,6 +32,8 @@ struct Registry {
   std::function<std::optional<std::vector<std::string_view>>(std::string_view structure, std::string_view builder,
                                                              std::string_view below)>
       parameters_read;
+  /// One line on a builder of the structure; empty where there is none. Left empty: there is none on any.
+  std::function<std::string(std::string_view structure, std::string_view builder)> builder_summary;
 
   /// nullptr where there is none.
   [[nodiscard]] const StructureEntry* structure(std::string_view name) const;

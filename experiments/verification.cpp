@@ -166,7 +166,7 @@ const Accel& StructureShelf::get(const Cell& cell) {
   drop_spent(key);
   if (const auto left = expected_.find(key); left != expected_.end() && left->second > 0) --left->second;
   if (const auto found = built_.find(key); found != built_.end()) return *found->second;
-  const BuildSettings settings{cell.builder, cell.leaf, built_for(cell), threads_, cell.parameters};
+  const BuildSettings settings{with_values(cell.builder, cell.own), cell.leaf, built_for(cell), threads_, cell.parameters};
   BuildReport report;
   std::unique_ptr<Accel> fresh = registry_.build(cell.structure, mesh_, settings, report);
   if (bytes_ + fresh->bytes() > kMostBytes) built_.clear(), bytes_ = 0;

@@ -18,28 +18,77 @@ constexpr ParameterLimits kCosts{1e-3, 1e3};
 
 using B = BuilderParameters;
 constexpr Parameter<B> kBuilderTable[] = {
-    {.name = "bins", .member = &B::bins, .limits = {4, 64}},
-    {.name = "traversal_cost", .member = &B::traversal_cost, .limits = kCosts},
-    {.name = "intersection_cost", .member = &B::intersection_cost, .limits = kCosts},
-    {.name = "max_leaf_blocks", .member = &B::max_leaf_blocks, .limits = {1, bvh::kMaxLeafBlocks}},
-    {.name = "morton_bits", .member = &B::morton_bits, .limits = {30, 63}, .choices = kMortonBits},
-    {.name = "ploc_radius", .member = &B::ploc_radius, .limits = {1, kMostPlocRadius}},
-    {.name = "duplication_budget", .member = &B::duplication_budget, .limits = {0, 4}},
-    {.name = "spatial_overlap", .member = &B::spatial_overlap, .limits = {0, 1}},
-    {.name = "spatial_gain", .member = &B::spatial_gain, .limits = {0.01, 1}},
-    {.name = "reinsertion_rounds", .member = &B::reinsertion_rounds, .limits = {1, 64}},
-    {.name = "reinsertion_top", .member = &B::reinsertion_top, .limits = {0, 65536}, .has_own = true},
-    {.name = "empty_bonus", .member = &B::empty_bonus, .limits = {0, 0.95}},
-    {.name = "max_depth", .member = &B::max_depth, .limits = {0, 63}},  // an octree's end at 21
-    {.name = "grid_density", .member = &B::grid_density, .limits = {0.01, 64}},
-    {.name = "below", .member = &B::below},
-    {.name = "collapse", .member = &B::collapse, .words = kCollapses},
+    {.name = "bins", .summary = "binned SAH: bins an axis", .member = &B::bins, .limits = {4, 64}},
+    {.name = "traversal_cost",
+     .summary = "cost of a node visit, in units of one block test",
+     .member = &B::traversal_cost,
+     .limits = kCosts},
+    {.name = "intersection_cost",
+     .summary = "cost of testing one leaf block",
+     .member = &B::intersection_cost,
+     .limits = kCosts},
+    {.name = "max_leaf_blocks",
+     .summary = "leaf blocks in a leaf at most",
+     .member = &B::max_leaf_blocks,
+     .limits = {1, bvh::kMaxLeafBlocks}},
+    {.name = "morton_bits",
+     .summary = "bits of a Morton code",
+     .member = &B::morton_bits,
+     .limits = {30, 63},
+     .choices = kMortonBits},
+    {.name = "ploc_radius",
+     .summary = "neighbours looked at on each side",
+     .member = &B::ploc_radius,
+     .limits = {1, kMostPlocRadius}},
+    {.name = "duplication_budget",
+     .summary = "references added at most, as a share of the triangles",
+     .member = &B::duplication_budget,
+     .limits = {0, 4}},
+    {.name = "spatial_overlap",
+     .summary = "least overlap of an object split for a spatial one to be tried, and least area that a reference more "
+                "must save: shares of the root's area",
+     .member = &B::spatial_overlap,
+     .limits = {0, 1}},
+    {.name = "spatial_gain",
+     .summary = "a share x of references more must lower the estimated cost by (1 - this) x",
+     .member = &B::spatial_gain,
+     .limits = {0.01, 1}},
+    {.name = "reinsertion_rounds",
+     .summary = "builders that end in _reinsertion: passes over the tree",
+     .member = &B::reinsertion_rounds,
+     .limits = {1, 64}},
+    {.name = "reinsertion_top",
+     .summary = "how many of the tree's largest nodes the builder ends by reinserting; auto: 512 after binned_sah, "
+                "sweep_sah and spatial_sah, else none",
+     .member = &B::reinsertion_top,
+     .limits = {0, 65536},
+     .has_own = true},
+    {.name = "empty_bonus",
+     .summary = "share of the cost taken off a split that cuts away empty space",
+     .member = &B::empty_bonus,
+     .limits = {0, 0.95}},
+    {.name = "max_depth",
+     .summary = "deepest leaf; 0: 8 + 1.3 log2 n for the kdtree, 21 for the octree, whose end that is",
+     .member = &B::max_depth,
+     .limits = {0, 63}},  // an octree's end at 21
+    {.name = "grid_density", .summary = "cells a triangle", .member = &B::grid_density, .limits = {0.01, 64}},
+    {.name = "below", .summary = "the structure of each prototype", .member = &B::below},
+    {.name = "collapse",
+     .summary = "binary to N-wide: by dynamic programming, or the largest area first",
+     .member = &B::collapse,
+     .words = kCollapses},
 };
 
 using S = TraversalSettings;
 constexpr Parameter<S> kTraversalTable[] = {
-    {.name = "hybrid_threshold", .member = &S::hybrid_threshold, .limits = {0, S::kWidestHybrid}},
-    {.name = "rays_in_flight", .member = &S::rays_in_flight, .limits = {1, S::kMostInFlight}},
+    {.name = "hybrid_threshold",
+     .summary = "so many rays of a packet in a node, or fewer, go on alone; 0: none ever",
+     .member = &S::hybrid_threshold,
+     .limits = {0, S::kWidestHybrid}},
+    {.name = "rays_in_flight",
+     .summary = "rays on their way at once",
+     .member = &S::rays_in_flight,
+     .limits = {1, S::kMostInFlight}},
 };
 
 constexpr std::size_t kBuilderMembers = 16, kTraversalMembers = 2;
@@ -76,20 +125,33 @@ void require_one(std::string_view parameter, const T& value, const std::string& 
   throw UserError(std::string(parameter) + ": " + shown + " is " + all);
 }
 
+template <class Row, class T>
+void check_value(const Row& parameter, const T& value) {
+  if constexpr (std::is_same_v<T, std::string>) {
+    if (!parameter.words.empty()) require_one(parameter.name, value, "'" + value + "'", parameter.words);
+  } else {
+    if constexpr (std::is_same_v<T, unsigned>) {
+      if (!parameter.choices.empty()) return require_one(parameter.name, value, text_of(value), parameter.choices);
+    }
+    require(parameter.name, value, parameter.limits);
+  }
+}
+
+template <class Set, class T>
+bool is_own_choice(const Parameter<Set>& parameter, const T& value) {
+  if constexpr (std::is_same_v<T, unsigned>) {
+    return parameter.has_own && value == Set::kOwn;
+  } else {
+    return false;
+  }
+}
+
 template <class Set>
 void check(std::span<const Parameter<Set>> table, const Set& set) {
   for (const Parameter<Set>& parameter : table) {
-    const auto one = [&]<class T>(T Set::*member) {
-      const T& value = set.*member;
-      if constexpr (std::is_same_v<T, std::string>) {
-        if (!parameter.words.empty()) require_one(parameter.name, value, "'" + value + "'", parameter.words);
-      } else {
-        if constexpr (std::is_same_v<T, unsigned>) {
-          if (parameter.has_own && value == Set::kOwn) return;
-          if (!parameter.choices.empty()) return require_one(parameter.name, value, text_of(value), parameter.choices);
-        }
-        require(parameter.name, value, parameter.limits);
-      }
+    const auto one = [&](auto member) {
+      if (is_own_choice(parameter, set.*member)) return;
+      check_value(parameter, set.*member);
     };
     std::visit(one, parameter.member);
   }
@@ -102,6 +164,15 @@ std::span<const Parameter<TraversalSettings>> traversal_setting_table() noexcept
 
 void check_parameters(const BuilderParameters& parameters) { check(builder_parameter_table(), parameters); }
 void check_settings(const TraversalSettings& settings) { check(traversal_setting_table(), settings); }
+
+bool operator==(const OwnParameter& a, const OwnParameter& b) noexcept {
+  return a.name == b.name && a.initial == b.initial && a.limits.low == b.limits.low && a.limits.high == b.limits.high &&
+         std::ranges::equal(a.choices, b.choices) && std::ranges::equal(a.words, b.words);
+}
+
+void check_parameter(const OwnParameter& parameter, const ParameterValue& value) {
+  std::visit([&](const auto& v) { check_value(parameter, v); }, value);
+}
 
 void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits) {
   require(parameter, value, limits);

@@ -24,10 +24,12 @@ struct ParameterLimits {
   }
 };
 
-/// A member of `Set`, BuilderParameters or TraversalSettings.
+/// A member of `Set`: of BuilderParameters, of TraversalSettings, or of what a structure has of its own
+/// (own_parameters.h).
 template <class Set>
 struct Parameter {
   std::string_view name;
+  std::string_view summary;  ///< one line for `list`
   std::variant<unsigned Set::*, float Set::*, std::string Set::*> member;
   ParameterLimits limits{};                               ///< of a number
   std::span<const unsigned> choices{};                    ///< of a number that may have no other values
@@ -45,6 +47,18 @@ struct Parameter {
 void check_parameters(const BuilderParameters& parameters);
 /// As above of a way of traversal, whether or not it reads the setting.
 void check_settings(const TraversalSettings& settings);
+
+using ParameterValue = std::variant<unsigned, float, std::string>;
+/// A structure's own parameter, whatever it is a member of. All its values are of the type of `initial`, the default.
+struct OwnParameter {
+  std::string_view name, summary;
+  ParameterValue initial;
+  ParameterLimits limits{};
+  std::span<const unsigned> choices{};
+  std::span<const std::string_view> words{};
+  friend bool operator==(const OwnParameter& a, const OwnParameter& b) noexcept;
+};
+void check_parameter(const OwnParameter& parameter, const ParameterValue& value);
 /// Throws UserError unless the limits hold `value`: for those that a structure has beside the table's.
 void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits);
 

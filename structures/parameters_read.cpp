@@ -2,20 +2,24 @@
 
 #include <algorithm>
 
+#include "structures/builders/builder_parameters.h"
 #include "structures/registry.h"
 
 namespace arboretum {
 
+const StructureBuilders* builders_of_structure(std::string_view structure) {
+  static const std::vector<StructureBuilders> declared = registered_builders();  // in the order of all_structures()
+  const StructureEntry* entry = find_structure(structure);
+  return entry ? &declared[std::size_t(entry - all_structures().data())] : nullptr;
+}
+
 std::optional<std::vector<std::string_view>> parameters_read(std::string_view structure, std::string_view builder,
                                                              std::string_view below) {
-  // Of registered_structures(), which all_structures() begins with.
-  static const std::vector<BuilderParametersOf> declared = registered_parameters();
-  const std::span<const StructureEntry> all = all_structures();
-  const auto entry = std::ranges::find(all, structure, [](const StructureEntry& e) { return e.info.name; });
-  if (entry == all.end() || !entry->info.uses_parameters) return std::vector<std::string_view>{};
-  const auto index = std::size_t(entry - all.begin());
-  if (index >= declared.size() || !declared[index]) return std::nullopt;
-  std::vector<std::string_view> names = declared[index](builder);
+  const StructureEntry* entry = find_structure(structure);
+  if (!entry || !entry->info.uses_parameters) return std::vector<std::string_view>{};
+  const StructureBuilders* builders = builders_of_structure(structure);
+  if (!builders->reads) return std::nullopt;
+  std::vector<std::string_view> names = builders->reads(builder);
   if (entry->info.takes_below && !below.empty() && below != structure) {
     const auto more = parameters_read(below, builder);
     if (!more) return std::nullopt;
@@ -24,6 +28,12 @@ std::optional<std::vector<std::string_view>> parameters_read(std::string_view st
   std::ranges::sort(names);
   names.erase(std::unique(names.begin(), names.end()), names.end());  // clang 14 has no std::ranges::unique
   return names;
+}
+
+std::string builder_summary(std::string_view structure, std::string_view builder) {
+  const StructureBuilders* builders = builders_of_structure(structure);
+  const std::string_view own = builders && builders->summary ? builders->summary(builder) : std::string_view();
+  return own.empty() ? binary_builder_summary(builder) : std::string(own);
 }
 
 }  // namespace arboretum

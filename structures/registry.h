@@ -1,4 +1,4 @@
-// What an executable has: its structures, what their builders read, and their kernels. The functions stand in a
+// What an executable has: its structures, what they say of their builders, and their kernels. The functions stand in a
 // generated registry.cpp (cmake/ArboretumStructures.cmake): that of the library arboretum_registry, or one of an
 // executable's own which names more structures. The linker takes the executable's, and then never looks for the
 // library's.
@@ -11,6 +11,7 @@
 
 #include "core/type_list.h"
 #include "structures/accel.h"
+#include "structures/parameter_limits.h"
 
 namespace arboretum {
 
@@ -18,11 +19,16 @@ struct KernelRow;
 
 [[nodiscard]] std::vector<StructureEntry> registered_structures();
 [[nodiscard]] std::vector<KernelRow> registered_kernels();
-/// The members of BuilderParameters that a structure's builder reads, by name.
-using BuilderParametersOf = std::vector<std::string_view> (*)(std::string_view builder);
-/// One for each of registered_structures(), in their order; nullptr where the structure does not say
-/// (parameters_read.h).
-[[nodiscard]] std::vector<BuilderParametersOf> registered_parameters();
+/// What a structure says of its builders (parameters_read.h); a function is nullptr where it does not.
+struct StructureBuilders {
+  std::vector<std::string_view> (*reads)(std::string_view builder) = nullptr;
+  std::string_view (*summary)(std::string_view builder) = nullptr;
+  std::vector<OwnParameter> own{};
+  /// Of a structure of that kind: sets the parameter that is so many in `own`.
+  void (*set)(Accel& accel, std::size_t parameter, const ParameterValue& value) = nullptr;
+};
+/// One for each of registered_structures(), in their order.
+[[nodiscard]] std::vector<StructureBuilders> registered_builders();
 
 /// An entry for each type of the list, in order.
 template <class... Types>
@@ -32,20 +38,42 @@ template <class... Types>
   return list;
 }
 
+/// Not inlined, like the next: where GCC sees that a set has no word, it warns of what would read one.
+template <class Set>
+[[nodiscard, gnu::noinline]] ParameterValue value_of(const Set& set, const Parameter<Set>& parameter) {
+  return std::visit([&](auto member) -> ParameterValue { return set.*member; }, parameter.member);
+}
+/// The value is of the parameter's type.
+template <class Set>
+[[gnu::noinline]] void set_value(Set& set, const Parameter<Set>& parameter, const ParameterValue& value) {
+  std::visit([&]<class T>(T Set::*member) { set.*member = std::get<T>(value); }, parameter.member);
+}
+
 template <class Structure>
-[[nodiscard]] BuilderParametersOf parameters_entry() {
-  if constexpr (requires(std::string_view builder) { builder_parameters(std::type_identity<Structure>{}, builder); }) {
-    return [](std::string_view builder) -> std::vector<std::string_view> {
-      return builder_parameters(std::type_identity<Structure>{}, builder);
+[[nodiscard]] StructureBuilders builders_entry() {
+  using Type = std::type_identity<Structure>;
+  StructureBuilders entry;
+  if constexpr (requires(std::string_view builder) { builder_parameters(Type{}, builder); }) {
+    entry.reads = [](std::string_view builder) -> std::vector<std::string_view> {
+      return builder_parameters(Type{}, builder);
     };
-  } else {
-    return nullptr;
   }
+  if constexpr (requires(std::string_view builder) { builder_summary(Type{}, builder); })
+    entry.summary = [](std::string_view builder) -> std::string_view { return builder_summary(Type{}, builder); };
+  if constexpr (requires { own_parameters(Type{}); }) {
+    using Set = decltype(Structure::parameters);
+    for (const Parameter<Set>& p : own_parameters(Type{}))
+      entry.own.push_back({p.name, p.summary, value_of(Set{}, p), p.limits, p.choices, p.words});
+    entry.set = [](Accel& accel, std::size_t parameter, const ParameterValue& value) {
+      set_value(static_cast<Structure&>(accel).parameters, own_parameters(Type{})[parameter], value);
+    };
+  }
+  return entry;
 }
 
 template <class... Types>
-[[nodiscard]] std::vector<BuilderParametersOf> parameters_entries(TypeList<Types...>) {
-  return {parameters_entry<Types>()...};
+[[nodiscard]] std::vector<StructureBuilders> builders_entries(TypeList<Types...>) {
+  return {builders_entry<Types>()...};
 }
 
 }  // namespace arboretum

@@ -51,6 +51,7 @@ BinaryBuilder on_any(Isa) {
 
 struct Entry {
   std::string_view name;
+  std::string_view summary;
   BinaryBuilder (*on)(Isa);
   std::array<std::string_view, 4> reads = {};  ///< of BuilderParameters; reinsertion's apart
   unsigned reinserted_top = 0;                 ///< where reinsertion_top leaves it to the builder
@@ -64,20 +65,36 @@ constexpr unsigned kTop = 512;
 
 constexpr Entry kBuilders[] = {
     {"binned_sah",
+     "top-down, surface area heuristic over bins of centroids, then collapsed to the structure's width",
      on_each<isa_scalar::kBinnedSah, isa_sse::kBinnedSah, isa_avx2::kBinnedSah, isa_avx512::kBinnedSah>,
      {"bins"},
      kTop},
-    {"sweep_sah", on_any<build_sweep_sah>, {}, kTop},
+    {"sweep_sah", "top-down, surface area heuristic at every candidate plane", on_any<build_sweep_sah>, {}, kTop},
     {"spatial_sah",
+     "binned SAH with spatial splits (references may be duplicated)",
      on_each<isa_scalar::kSpatialSah, isa_sse::kSpatialSah, isa_avx2::kSpatialSah, isa_avx512::kSpatialSah>,
      {"bins", "duplication_budget", "spatial_overlap", "spatial_gain"},
      kTop},
-    {"morton", on_any<build_morton>, {"morton_bits"}, 0, build_morton_in_blocks},
-    {"ploc", on_any<build_ploc>, {"morton_bits", "ploc_radius"}},
+    {"morton",
+     "sorted along a Morton curve (linear BVH)",
+     on_any<build_morton>,
+     {"morton_bits"},
+     0,
+     build_morton_in_blocks},
+    {"ploc", "bottom-up, parallel locally-ordered clustering", on_any<build_ploc>, {"morton_bits", "ploc_radius"}},
 #ifdef ARBORETUM_HAVE_EMBREE
-    {"embree_low", on_any<build_embree_low>, {"traversal_cost", "intersection_cost"}},
-    {"embree_medium", on_any<build_embree_medium>, {"traversal_cost", "intersection_cost"}},
-    {"embree_high", on_any<build_embree_high>, {"traversal_cost", "intersection_cost", "duplication_budget"}},
+    {"embree_low",
+     "Embree's Morton builder, for our BVHs",
+     on_any<build_embree_low>,
+     {"traversal_cost", "intersection_cost"}},
+    {"embree_medium",
+     "Embree's binned SAH builder, for our BVHs",
+     on_any<build_embree_medium>,
+     {"traversal_cost", "intersection_cost"}},
+    {"embree_high",
+     "Embree's builder with spatial splits, for our BVHs",
+     on_any<build_embree_high>,
+     {"traversal_cost", "intersection_cost", "duplication_budget"}},
 #endif
 };
 
@@ -120,6 +137,13 @@ std::vector<std::string_view> binary_builder_parameters(std::string_view builder
   for (std::string_view name : found.entry->reads)
     if (!name.empty()) names.push_back(name);
   return names;
+}
+
+std::string binary_builder_summary(std::string_view builder) {
+  const Found found = find_builder(builder);
+  if (!found.entry) return {};
+  return std::string(found.entry->summary) +
+         (found.reinserts ? "; then subtrees reinserted where they cost least" : "");
 }
 
 const std::vector<std::string_view>& binary_builder_names() {

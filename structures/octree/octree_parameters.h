@@ -1,4 +1,4 @@
-// What the octree's builder reads.
+// What the octree's builder is and reads.
 #pragma once
 
 #include <string_view>
@@ -11,6 +11,10 @@ namespace arboretum::octree {
 
 [[nodiscard]] inline std::vector<std::string_view> builder_parameters(std::type_identity<Octree>, std::string_view) {
   return {"traversal_cost", "intersection_cost", "max_depth"};
+}
+
+[[nodiscard]] inline std::string_view builder_summary(std::type_identity<Octree>, std::string_view) {
+  return "octree: cells divided in eight while that is estimated to pay";
 }
 
 }  // namespace arboretum::octree

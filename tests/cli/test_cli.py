@@ -387,7 +387,7 @@ class CommandLine(CommandLineCase):
 
     def test_lists(self):
         listed = json.loads(self.call("list", "--json").stdout)
-        for title in ("structures", "builders", "leaves", "intersectors", "boxes", "traversals", "calls", "isas", "workloads", "scenes"):
+        for title in ("structures", "builders", "leaves", "intersectors", "boxes", "traversals", "calls", "isas", "workloads", "parameters", "scenes"):
             self.assertTrue(listed[title], title)
             for entry in listed[title]:
                 self.assertTrue(entry["summary"], f"{title}: {entry['name']} has no summary")
@@ -401,6 +401,9 @@ class CommandLine(CommandLineCase):
         read = {s["name"]: s["parameters"] for s in listed["structures"] if s["available"]}
         self.assertIn("ploc_radius", read["bvh8"]["ploc"])
         self.assertNotIn("ploc_radius", read["bvh8"]["binned_sah"])
+        bins = next(p for p in listed["parameters"] if p["name"] == "bins")
+        self.assertEqual((bins["values"], bins["default"]), ("an integer from 4 to 64", "32"))
+        self.assertIn("binned_sah", bins["readers"])
         self.assertEqual(next(b for b in listed["builders"] if b["name"] == "uniform")["parameters"], {"grid": ["grid_density"], "two_level": read["two_level"]["uniform"]})
 
     def test_info(self):

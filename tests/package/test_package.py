@@ -42,7 +42,8 @@ def configure(source, build, *words, expect=0):
 
 
 def build(folder):
-    call(SETTINGS["cmake"], "--build", folder, "--parallel", os.cpu_count() or 2)
+    result = call(SETTINGS["cmake"], "--build", folder, "--parallel", os.cpu_count() or 2)
+    check("warning:" not in result.stdout + result.stderr, f"{folder} is built with warnings: {result.stdout}{result.stderr}")
 
 
 def step_install():
@@ -117,6 +118,13 @@ def step_structure():
     entry = [e for e in json.loads(call(program, "list", "--json").stdout)["structures"] if e["name"] == "sorted_boxes"]
     check(len(entry) == 1 and entry[0]["available"] and "binned_sah" in entry[0]["builders"], f"list --json: {entry}")
 
+    builders = {b["name"]: b for b in json.loads(call(program, "list", "builders", "--json").stdout)}
+    check(builders["mesh_order"]["summary"] == "blocks of triangles that follow each other in the mesh", f"list builders: {builders['mesh_order']}")
+    check(builders["mesh_order"]["parameters"]["sorted_boxes"] == ["run_length"], f"list builders: {builders['mesh_order']}")
+    parameters = {p["name"]: p for p in json.loads(call(program, "list", "parameters", "--json").stdout)}
+    told = [parameters["run_length"][key] for key in ("values", "default", "readers")]
+    check(told == ["an integer from 1 to 16", "16", "mesh_order (sorted_boxes)"], f"list parameters: {told}")
+
     results = WORK / "results"
     shutil.rmtree(results, ignore_errors=True)
     call(program, "run", PREFIX / "share/arboretum/examples/structure/sweep.yaml", "--no-plots", "--out", results)
@@ -128,8 +136,17 @@ def step_structure():
         check(row["wrong_answers"] == 0, f"{row['name']}: {row['wrong_answers']} wrong answers")
         hits.setdefault((row["workload"], row["intersector"], row["box"]), set()).add(row["hits"])
     check(len({(r["workload"], r["intersector"], r["box"]) for r in own}) == 12, f"{len(own)} rows of sorted_boxes")
+    runs = {r["parameters"]["run_length"]: r for r in traces if r["builder"].startswith("mesh_order")}
+    check({n: r["builder"] for n, r in runs.items()} == {n: f"mesh_order:run_length={n}" for n in (4, 8)}, f"rows of mesh_order: {list(runs)}")
+    block = {n: min(n, int(re.search(r"\d+", r["leaf"])[0])) for n, r in runs.items()}
+    check(all(r["leaves"] == -(-r["triangles"] // block[n]) for n, r in runs.items()), "run_length does not arrive in the build")
+    check(all("run_length" not in r.get("parameters", {}) for r in traces if not r["builder"].startswith("mesh_order")), "all read run_length")
     check(all(len(numbers) == 1 for numbers in hits.values()), f"structures differ in their hits: {hits}")
     check(all(0 < r["triangles_per_ray"] and 0 < r["nodes_per_ray"] for r in own), "no counters")
+    sweep = WORK / "sweep.yaml"
+    sweep.write_text((PREFIX / "share/arboretum/examples/structure/sweep.yaml").read_text().replace("[4, 8]", "[4, 17]"))
+    error = call(program, "run", sweep, expect=2).stderr
+    check("sweep.yaml:" in error and "run_length must be an integer from 1 to 16, not '17'" in error, f"a value beyond the limits: {error}")
     quality = [r for r in rows if r["structure"] == "sorted_boxes" and r.get("sah_cost")]
     check(quality, "no SAH cost")
     print(f"{len(traces)} timed repetitions, {len(own)} of sorted_boxes, no wrong answer")

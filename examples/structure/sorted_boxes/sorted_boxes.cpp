@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,15 @@ namespace {
 /// The references of one block: up to Block::kWidth triangles that the builder put into one leaf.
 using References = std::span<const std::uint32_t>;
 
+/// Cuts `rest` into what one block takes each, and puts that behind `blocks`.
+void add_blocks(References rest, std::size_t most, std::vector<References>& blocks) {
+  while (!rest.empty()) {
+    const std::size_t count = std::min(most, rest.size());
+    blocks.push_back(rest.first(count));
+    rest = rest.subspan(count);
+  }
+}
+
 /// Cuts the leaves of the tree, left to right, into what one block takes each.
 std::vector<References> references_by_block(const BinaryTree& tree, std::size_t block_width) {
   std::vector<References> blocks;
@@ -33,12 +43,7 @@ std::vector<References> references_by_block(const BinaryTree& tree, std::size_t 
       stack.insert(stack.end(), {node.left + 1, node.left});
       continue;
     }
-    References rest(tree.primitives.data() + tree.first[index], node.count);
-    while (!rest.empty()) {
-      const std::size_t count = std::min(block_width, rest.size());
-      blocks.push_back(rest.first(count));
-      rest = rest.subspan(count);
-    }
+    add_blocks({tree.primitives.data() + tree.first[index], node.count}, block_width, blocks);
   }
   return blocks;
 }
@@ -67,6 +72,7 @@ const StructureInfo& SortedBoxes::static_info() {
     i.name = kName;
     i.summary = "a flat list of leaf blocks, each with a box: all boxes tested, hit ones visited from near to far";
     i.builders = binary_builder_names();
+    i.builders.push_back(kMeshOrder);
     i.leaves = all_leaf_names();
     i.only_single_rays = "every ray tests every box: there is no node to share";
     i.flat = true;
@@ -80,11 +86,18 @@ void SortedBoxes::build(const TriangleMesh& mesh, const BuildSettings& settings,
   require_triangles(kName, mesh.size());
   const bool known = with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
     BinaryTree tree;
-    if (mesh.size() > 0) build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
+    std::vector<std::uint32_t> in_order;
+    std::vector<References> list;
+    if (settings.builder == kMeshOrder) {
+      in_order.resize(mesh.size());
+      std::iota(in_order.begin(), in_order.end(), 0u);
+      add_blocks(in_order, std::min<std::size_t>(parameters.run_length, Block::kWidth), list);
+    } else if (mesh.size() > 0) {
+      build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report);
+      list = references_by_block(tree, Block::kWidth);
+    }
 
     const double start = wall_seconds();
-    const std::vector<References> list =
-        mesh.size() > 0 ? references_by_block(tree, Block::kWidth) : std::vector<References>{};
     blocks_ = list.size();
     arena_ = Arena(groups() * sizeof(BoxGroup) + blocks_ * sizeof(Block));
     auto* group = reinterpret_cast<BoxGroup*>(arena_.data());

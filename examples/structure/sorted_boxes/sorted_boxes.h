@@ -26,9 +26,19 @@ struct alignas(64) BoxGroup {
   float planes[6][kWidth];
 };
 
+/// The builder that is its own: blocks of triangles that follow each other in the mesh.
+inline constexpr std::string_view kMeshOrder = "mesh_order";
+
+/// Builder parameters that it has beside BuilderParameters; sorted_boxes_parameters.h says what they may be.
+struct Parameters {
+  unsigned run_length = 16;  ///< mesh_order: triangles in a block at most, where the leaf's blocks have room
+};
+
 class SortedBoxes final : public Accel {
  public:
   static constexpr std::string_view kName = "sorted_boxes";
+
+  Parameters parameters;  ///< of the next build
 
   [[nodiscard]] static const StructureInfo& static_info();
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }

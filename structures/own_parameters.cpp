@@ -1,0 +1,138 @@
+#include "structures/own_parameters.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "core/error.h"
+#include "core/names.h"
+#include "core/parse_number.h"
+#include "structures/parameters_read.h"
+#include "structures/registry.h"
+
+namespace arboretum {
+namespace {
+
+void require_usable(std::string_view structure, const OwnParameter& parameter) {
+  const auto refuse = [&](const std::string& why) {
+    throw UserError(std::string(structure) + ": its parameter " + std::string(parameter.name) + why);
+  };
+  const auto has_its_name = [&](const auto& row) { return row.name == parameter.name; };
+  if (std::ranges::any_of(builder_parameter_table(), has_its_name) ||
+      std::ranges::any_of(traversal_setting_table(), has_its_name))
+    refuse(" has the name of one that is there for all; call it otherwise, or read that one");
+  if (parameter.name.empty() || parameter.name.find_first_of(":=/ ") != std::string_view::npos)
+    refuse(" is part of cell names: give it a name without ':', '=', '/' and blanks");
+  if (std::holds_alternative<std::string>(parameter.initial) && parameter.words.empty())
+    refuse(" is a word: say which there are in `words`");
+  try {
+    check_parameter(parameter, parameter.initial);
+  } catch (const UserError& e) {
+    refuse(std::string(": its default is out of its limits: ") + e.what());
+  }
+}
+
+/// Takes "name=value" off the front of ":name=value:name=value".
+std::pair<std::string_view, std::string_view> next_value(std::string_view& rest) {
+  rest.remove_prefix(1);
+  const std::string_view one = rest.substr(0, rest.find(':'));
+  rest.remove_prefix(one.size());
+  const std::size_t equals = std::min(one.find('='), one.size());
+  return {one.substr(0, equals), one.substr(std::min(equals + 1, one.size()))};
+}
+
+}  // namespace
+
+void add_own_parameters(std::string_view structure, std::span<const OwnParameter> own, std::vector<OwnParameter>& all) {
+  for (const OwnParameter& parameter : own) {
+    require_usable(structure, parameter);
+    const auto known = std::ranges::find(all, parameter.name, &OwnParameter::name);
+    if (known == all.end())
+      all.push_back(parameter);
+    else if (*known != parameter)
+      throw UserError(std::string(structure) + ": its parameter " + std::string(parameter.name) +
+                      " is another structure's too, with another default or other limits; call it otherwise");
+  }
+}
+
+std::span<const OwnParameter> all_own_parameters() {
+  static const std::vector<OwnParameter> all = [] {
+    std::vector<OwnParameter> list;
+    for (const StructureEntry& e : all_structures())
+      add_own_parameters(e.info.name, builders_of_structure(e.info.name)->own, list);
+    return list;
+  }();
+  return all;
+}
+
+const OwnParameter* find_own_parameter(std::string_view name) {
+  const auto found = std::ranges::find(all_own_parameters(), name, &OwnParameter::name);
+  return found == all_own_parameters().end() ? nullptr : &*found;
+}
+
+bool has_own_parameter(std::string_view structure, std::string_view name) {
+  const StructureBuilders* builders = builders_of_structure(structure);
+  return builders && std::ranges::find(builders->own, name, &OwnParameter::name) != builders->own.end();
+}
+
+std::string text_of(const ParameterValue& value) {
+  const auto text = []<class T>(const T& v) -> std::string {
+    if constexpr (std::is_same_v<T, std::string>) {
+      return v;
+    } else {
+      char digits[32];
+      return {digits, std::to_chars(digits, digits + sizeof digits, v).ptr};
+    }
+  };
+  return std::visit(text, value);
+}
+
+std::optional<ParameterValue> read_value(const OwnParameter& parameter, std::string_view text) {
+  const auto read = [&]<class T>(const T&) -> std::optional<ParameterValue> {
+    if constexpr (std::is_same_v<T, std::string>) {
+      return std::string(text);
+    } else {
+      return parse_number<T>(text);
+    }
+  };
+  return std::visit(read, parameter.initial);
+}
+
+std::string with_values(std::string_view builder, const OwnValues& values) {
+  std::string all(builder);
+  for (const auto& [name, value] : values) all.append(":").append(name).append("=").append(text_of(value));
+  return all;
+}
+
+std::string_view builder_of(std::string_view with_values) noexcept {
+  return {with_values.begin(), std::ranges::find(with_values, ':')};
+}
+
+std::unique_ptr<Accel> create_structure(const StructureEntry& entry, BuildSettings& settings) {
+  std::unique_ptr<Accel> accel = entry.create();
+  const std::string all = std::move(settings.builder);
+  settings.builder = builder_of(all);
+  const StructureBuilders* builders = builders_of_structure(entry.info.name);
+  for (std::string_view rest = std::string_view(all).substr(settings.builder.size()); !rest.empty();) {
+    const auto [name, text] = next_value(rest);
+    const auto known = std::ranges::find(builders->own, name, &OwnParameter::name);
+    if (known != builders->own.end()) {
+      const std::optional<ParameterValue> value = read_value(*known, text);
+      if (!value)
+        throw UserError(std::string(name) + ": '" + std::string(text) + "' is not a " +
+                        (std::holds_alternative<unsigned>(known->initial) ? "whole number" : "number"));
+      check_parameter(*known, *value);
+      builders->set(*accel, std::size_t(known - builders->own.begin()), *value);
+    } else if (entry.info.takes_below) {
+      settings.builder.append(":").append(name).append("=").append(text);
+    } else {
+      std::vector<std::string> names;
+      for (const OwnParameter& parameter : builders->own) names.emplace_back(parameter.name);
+      throw UserError(std::string(entry.info.name) + ": " +
+                      (names.empty() ? "it has no parameters of its own, but is given '" + std::string(name) + "'"
+                                     : unknown_name_message("parameter of its own", name, names)));
+    }
+  }
+  return accel;
+}
+
+}  // namespace arboretum
