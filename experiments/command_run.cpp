@@ -14,6 +14,7 @@
 #include "experiments/earlier_run.h"
 #include "experiments/conclusion.h"
 #include "experiments/config_plots.h"
+#include "experiments/crash_note.h"
 #include "experiments/effective.h"
 #include "experiments/estimate.h"
 #include "experiments/folder_lock.h"
@@ -272,6 +273,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   RunOutcome outcome;
   {
     const InterruptNote note;
+    const CrashNote crash("; cells that ended are kept, and the same command with --resume goes on after them");
     outcome = run_plan(experiment, plan, registry, journal,
                        {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)},
                        std::move(loaded));

@@ -16,6 +16,7 @@
 #include "experiments/case_file.h"
 #include "experiments/commands.h"
 #include "experiments/config_scenes.h"
+#include "experiments/crash_note.h"
 #include "experiments/progress.h"
 #include "experiments/summary.h"
 #include "experiments/verify_breaches.h"
@@ -61,6 +62,7 @@ class Verify {
 
   ExitStatus run() {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_);
+    const CrashNote crash("");
     if (!command_.out.empty()) make_output_folder(command_.out);
     if (subject_ == Subject::scene) scene();
     if (subject_ == Subject::cases) cases();

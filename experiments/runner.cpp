@@ -14,6 +14,7 @@
 #include "core/parse_number.h"
 #include "experiments/append_file.h"
 #include "experiments/build_job.h"
+#include "experiments/crash_note.h"
 #include "experiments/interleave.h"
 #include "experiments/json_text.h"
 #include "experiments/parameters.h"
@@ -125,7 +126,10 @@ class Runner {
       std::vector<const Cell*> batch;
       do {
         const auto& cells = by_structure[order[next++]];
-        if (try_for(cells, [&] { (void)pool.get(*cells.front()); }))
+        if (try_for(cells, [&] {
+              const UnderWay building("the build for " + cells.front()->name());
+              (void)pool.get(*cells.front());
+            }))
           batch.insert(batch.end(), cells.begin(), cells.end());
       } while (next < order.size() && pool.held_bytes() + pool.expected_bytes(*by_structure[order[next]].front()) <=
                                           experiment_.measure.memory);
@@ -173,6 +177,7 @@ class Runner {
     for (const Cell* cell : cells) {
       Json facts = Json::object();
       const auto prepare = [&] {
+        const UnderWay preparing(cell->name());
         const Accel& accel = pool.get(*cell);
         facts.update(pool.facts(*cell, accel));
         facts.update(data.facts());
@@ -209,7 +214,11 @@ class Runner {
     for (const Cell* cell : cells) {
       BuildJob& job = jobs.emplace_back(*cell, data.mesh(), registry_);
       Json facts = Json::object();
-      if (!try_for({cell}, [&] { job.prepare(facts, pool, experiment_.measure); })) continue;
+      const auto prepare = [&] {
+        const UnderWay preparing(cell->name());
+        job.prepare(facts, pool, experiment_.measure);
+      };
+      if (!try_for({cell}, prepare)) continue;
       Running& running = begin(*cell);
       running.result.facts.update(facts);
       interleaved.push_back(
@@ -246,14 +255,15 @@ class Runner {
 
   InterleavedJob interleaved_job(Running& running, std::uint64_t iterations,
                                  std::function<Repetition(TimedLoop&)> measure) {
-    InterleavedJob job{.name = running.result.cell.name(),
-                       .indices = {},
-                       .iterations = iterations,
-                       .measure = std::move(measure),
-                       .ended = {}};
+    InterleavedJob job{
+        .name = running.result.cell.name(), .indices = {}, .iterations = iterations, .measure = {}, .ended = {}};
     for (unsigned i = 0; i < running.wanted; ++i)
       if (std::ranges::find(running.result.repetitions, i, &Repetition::index) == running.result.repetitions.end())
         job.indices.push_back(i);
+    job.measure = [name = job.name, measure = std::move(measure)](TimedLoop& loop) {
+      const UnderWay measuring(name);
+      return measure(loop);
+    };
     job.ended = [this, &running, name = job.name](Repetition repetition) {
       repetition.origin = options_.origin;
       journal_.add(name, repetition);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/coordinates.h"
+#include "experiments/crash_note.h"
 #include "oracle/answer_check.h"
 #include "oracle/sheared.h"
 
@@ -117,6 +118,7 @@ class Judge {
 /// Adds to the tallies of a ray traced alone what goes wrong with it in company alone.
 void add_company(const Cell& cell, const Accel& accel, const VerifyBatch& batch, const Company& company,
                  std::vector<VerifyTally>& tallies) {
+  const UnderWay tracing(cell.name());
   std::vector<Hit> hits(company.rays.size(), kUnwritten);
   std::vector<std::uint8_t> occluded(company.rays.size(), std::uint8_t(AnyAnswer::unwritten));
   cell.kernel->closest_hit(accel, RayBatch(company.rays), hits);
@@ -166,7 +168,9 @@ const Accel& StructureShelf::get(const Cell& cell) {
   drop_spent(key);
   if (const auto left = expected_.find(key); left != expected_.end() && left->second > 0) --left->second;
   if (const auto found = built_.find(key); found != built_.end()) return *found->second;
-  const BuildSettings settings{with_values(cell.builder, cell.own), cell.leaf, built_for(cell), threads_, cell.parameters};
+  const BuildSettings settings{with_values(cell.builder, cell.own), cell.leaf, built_for(cell), threads_,
+                               cell.parameters};
+  const UnderWay building("the build for " + cell.name());
   BuildReport report;
   std::unique_ptr<Accel> fresh = registry_.build(cell.structure, mesh_, settings, report);
   if (bytes_ + fresh->bytes() > kMostBytes) built_.clear(), bytes_ = 0;
@@ -176,6 +180,7 @@ const Accel& StructureShelf::get(const Cell& cell) {
 
 std::vector<VerifyTally> verify_cell(const Cell& cell, const Accel& accel, const VerifyBatch& batch,
                                      std::vector<Hit>& hits, std::span<const Hit> reference) {
+  const UnderWay tracing(cell.name());
   const std::size_t count = batch.rays.rays.size();
   hits.assign(count, kUnwritten);
   const Judge judge(cell, batch);

@@ -4,6 +4,7 @@
 import csv
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -347,6 +348,34 @@ class CommandLine(CommandLineCase):
                 self.assertEqual(error.splitlines()[-1], "arboretum: interrupted; what was measured is kept, and the same command with --resume goes on from there")
         result = self.run_small(*words, "--resume")
         self.assertIn(result.returncode, (0, 1), result.stderr)
+
+    def test_a_crash_names_its_cell(self):
+        crashes = {signal.SIGSEGV: "SIGSEGV", signal.SIGBUS: "SIGBUS", signal.SIGFPE: "SIGFPE", signal.SIGILL: "SIGILL", signal.SIGABRT: "SIGABRT"}
+        # Nearly all of their time is within cells.
+        run = ("run", self.config, "--no-plots", "--out", "out", "--benchmark_min_time=1")
+        verify = ("verify", "sphere_flake:20000", "structure=brute_force", "intersector=exact", "isa=scalar", "--rays", "100000000")
+        names = self.run_small("--list").stdout.splitlines()
+        for sent, word in crashes.items():
+            for command in (run, verify):
+                with self.subTest(signal=word, command=command[0]):
+                    shutil.rmtree(self.folder / "out", ignore_errors=True)
+                    process = subprocess.Popen([ARBORETUM, *command], cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CORE, (0, 0)))
+                    journal = self.folder / "out" / "repetitions.jsonl"
+                    for _ in range(100 if command == verify else 3000):
+                        if journal.exists() and journal.read_bytes():
+                            break
+                        time.sleep(0.01)
+                    process.send_signal(sent)
+                    error = process.communicate(timeout=60)[1]
+                    self.assertEqual(process.returncode, -sent, error)
+                    said = re.fullmatch(r"arboretum: crashed \((\w+)\) in (?:the build for )?([^ ;]+)(; .+)?", error.splitlines()[-1])
+                    self.assertTrue(said, error)
+                    self.assertEqual(said[1], word)
+                    self.assertIn("/brute_force/" if command == verify else "/", said[2])
+                    if command == run:
+                        self.assertIn(said[2], names)
+                        self.assertIn("--resume", said[3])
 
     def test_resume_on_a_full_disk_leaves_the_results_there(self):
         self.assertIn(self.run_small("--out", "out", "--filter", "bvh4").returncode, (0, 1))
