@@ -26,7 +26,15 @@
 //    from the triangle's plane, in double, and kept between the nearest and the farthest corner: a triangle that is met
 //    only because its corners are rounded, edge on, has its plane anywhere along the ray, and must close the surface
 //    all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not computed again.
+// 6. The mean itself, of the rounded corners, is where the ray is within delta of a point of the triangle: within its
+//    box, as pads have it, in whatever structure. What the edge functions' own roundings move it by is 6 u s A / |det|,
+//    A the sum of the squares across: for a triangle seen edge on, or a sliver, any share of s, and boxes might cull
+//    what lies so far before them. Where |det| is below 2^-12 A the mean is made of doubles, whose roundings are nothing
+//    beside it, and a distance of 5 is kept where the ray is in the triangle's box.
 #pragma once
+
+#include <algorithm>
+#include <limits>
 
 #include "intersectors/sheared_packet.h"
 #include "intersectors/triangle_hits.h"
@@ -56,7 +64,7 @@ struct Watertight {
       // What the rare functions are handed is copied, or read from memory again: a reference to the vectors here would
       // keep all of them in memory.
       if (__builtin_expect(open != 0, 0)) {
-        if (__builtin_expect(any(inside & e.ties()), 0)) {
+        if (__builtin_expect(any(inside & e.in_doubt()), 0)) {
           TriangleHits<W> decided = hits;
           inside = decide_in_double(inside, ray, block, decided);
           hits = decided;
@@ -88,7 +96,7 @@ struct Watertight {
     if (inside == 0) return 0;
     const unsigned open = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits).bits();
     if (__builtin_expect(open != 0, 0)) {
-      again = open & e.ties().bits();
+      again = open & e.in_doubt().bits();
       if (const unsigned close = open & ~again) hits.t = plane_distances_of_rays(close, rays, kz, k, block, i, hits.t);
     }
     return inside & ~again;
@@ -111,29 +119,43 @@ struct Watertight {
     ARBORETUM_INLINE vm<W> inside() const { return sides >= F(0.0f); }
     /// Of lanes inside, those in which an edge is met, or may be.
     ARBORETUM_INLINE vm<W> ties() const { return sides == F(0.0f); }
+    /// And those whose mean floats round too far away.
+    ARBORETUM_INLINE vm<W> in_doubt() const { return ties() | (edge_on(across(), abs(u + v + w)) >= F(0.0f)); }
 
     /// Sets the hits; returns the lanes that, if inside, are decided: no edge is met, and t is as right as it must be.
     ARBORETUM_INLINE vm<W> hits(F tnear, F sz, TriangleHits<W>& out) const {
       const F det = u + v + w, za = sz * p.a.z, zb = sz * p.b.z, zc = sz * p.c.z;
       out.t = (u * za + v * zb + w * zc) / det;
       out.u_numerator = v, out.v_numerator = w, out.denominator = det;
-      return (sides != F(0.0f)) & clear(tnear, za, zb, zc, det, out.t);
+      return (sides != F(0.0f)) & clear<true>(tnear, za, zb, zc, det, out.t);
     }
     /// What the products that t is a sum of may lose, less than 2^-147, is no more than 2^-23 of this.
     static constexpr float kUnderflow = 0x1p-124f;
-    /// Lanes whose t need not be computed again in double; none where it has overflowed.
+    /// Lanes whose t need not be computed again in double for tnear's sake, nor, where asked, for the triangle being
+    /// seen edge on; none where it has overflowed.
+    template <bool AndEdgeOn>
     ARBORETUM_INLINE vm<W> clear(F tnear, F za, F zb, F zc, F det, F t) const {
       const F spread = max_x86(max_x86(za, zb), zc) - min_x86(min_x86(za, zb), zc), area = abs(det);
-      const auto squares = [](const vf3<W>& q) { return madd(q.x, q.x, madd(q.y, q.y, q.z * q.z)); };
-      const F size = squares(p.a) + squares(p.b) + squares(p.c);
+      const F sideways = across();
+      const F size = madd(p.a.z, p.a.z, madd(p.b.z, p.b.z, madd(p.c.z, p.c.z, sideways)));
       const F beyond = (t - madd(t, F(0.0f), tnear)) * area, error = F(0x1p-19f) * size;  // NaN of an infinite t
-      return min_x86(madd(spread, error, beyond + F(kUnderflow)),
-                     msub(spread, max_x86(error, F(0x1p-10f) * area), beyond - F(kUnderflow))) < F(0.0f);
+      F behind = msub(spread, max_x86(error, F(0x1p-10f) * area), beyond - F(kUnderflow));
+      if constexpr (AndEdgeOn) behind = max_x86(edge_on(sideways, area), behind);
+      return min_x86(madd(spread, error, beyond + F(kUnderflow)), behind) < F(0.0f);
     }
+
+   private:
+    /// The squares of what the corners are across the ray.
+    ARBORETUM_INLINE F across() const {
+      const auto squares = [](const vf3<W>& q, F more) { return madd(q.x, q.x, madd(q.y, q.y, more)); };
+      return squares(p.a, squares(p.b, madd(p.c.x, p.c.x, p.c.y * p.c.y)));
+    }
+    /// Negative but where a triangle is seen edge on, or a sliver.
+    static ARBORETUM_INLINE F edge_on(F sideways, F area) { return msub(F(0x1p-12f), sideways, area); }
   };
 
-  /// The lanes of `inside` that are hit when ties are decided in double; sets their hits, and distances close to tnear,
-  /// again.
+  /// The lanes of `inside` that are hit when ties are decided in double; sets their hits and those of triangles seen
+  /// edge on, and distances close to tnear, again.
   template <class Block>
   static __attribute__((noinline)) vm<Block::kWidth> decide_in_double(vm<Block::kWidth> inside, const ShearedRay& ray,
                                                                       const Block& block,
@@ -141,14 +163,14 @@ struct Watertight {
     constexpr int W = Block::kWidth;
     using F = vf<W>;
     const Edges<W> e(ShearedVertices<W>(ray, block));
-    const unsigned ties = (inside & e.ties()).bits();
     unsigned hit = inside.bits();
     float p[9][W], out[4][W];
     const F in[9] = {e.p.a.x, e.p.a.y, e.p.a.z, e.p.b.x, e.p.b.y, e.p.b.z, e.p.c.x, e.p.c.y, e.p.c.z};
     for (int i = 0; i < 9; ++i) in[i].store(p[i]);
     hits.t.store(out[0]), hits.u_numerator.store(out[1]), hits.v_numerator.store(out[2]),
         hits.denominator.store(out[3]);
-    for (unsigned rest = ties; rest; rest &= rest - 1) {
+    const unsigned doubt = (inside & e.in_doubt()).bits();
+    for (unsigned rest = doubt; rest; rest &= rest - 1) {
       const int i = __builtin_ctz(rest);
       const double u = double(p[6][i]) * p[4][i] - double(p[7][i]) * p[3][i];
       const double v = double(p[0][i]) * p[7][i] - double(p[1][i]) * p[6][i];
@@ -163,10 +185,39 @@ struct Watertight {
       out[1][i] = float(v / det), out[2][i] = float(w / det), out[3][i] = 1.0f;
     }
     const F sz(ray.shear[2]), t = F::load(out[0]);
-    const unsigned near =
-        hit & ~e.clear(F(ray.tnear()), sz * e.p.a.z, sz * e.p.b.z, sz * e.p.c.z, e.u + e.v + e.w, t).bits();
-    hits = {plane_distances_in_double(near, ray, block, t), F::load(out[1]), F::load(out[2]), F::load(out[3])};
+    const vm<W> clear =
+        e.template clear<false>(F(ray.tnear()), sz * e.p.a.z, sz * e.p.b.z, sz * e.p.c.z, e.u + e.v + e.w, t);
+    const unsigned near = hit & ~clear.bits();
+    if (near != 0) {
+      float of_planes[W];
+      plane_distances_in_double(near, ray, block, t).store(of_planes);
+      for (unsigned rest = near; rest; rest &= rest - 1) {
+        const int i = __builtin_ctz(rest);
+        out[0][i] = doubt >> i & 1u ? within_box(of_planes[i], out[0][i], ray, block, i) : of_planes[i];
+      }
+    }
+    hits = {F::load(out[0]), F::load(out[1]), F::load(out[2]), F::load(out[3])};
     return vm<W>::from_bits(hit);
+  }
+  /// `t`, no earlier and no later than the ray is in the box of triangle i of the block, padded along each axis by
+  /// 2^-22 of the distance from the origin; `mean` where it never is.
+  template <class Block>
+  static float within_box(float t, float mean, const ShearedRay& ray, const Block& block, int i) {
+    const AxisOrder& axes = *ray.order;
+    const std::uint32_t rows[3] = {axes.x, axes.y, axes.z};
+    double first = -std::numeric_limits<double>::infinity(), last = -first;
+    for (int a = 0; a < 3; ++a) {
+      const double d = ray.direction[a];
+      if (d == 0) continue;
+      const auto seen = [&](const float(&p)[3][Block::kWidth]) {
+        return double(ShearedRay::row(p, rows[a])[i]) - double(ray.from[a]);
+      };
+      const auto [low, high] = std::minmax({seen(block.v0), seen(block.v1), seen(block.v2)});
+      const double pad = 0x1p-22 * std::max(-low, high);
+      const auto [enter, leave] = std::minmax({(low - pad) / d, (high + pad) / d});
+      first = std::max(first, enter), last = std::min(last, leave);
+    }
+    return first <= last ? float(std::clamp(double(t), first, last)) : mean;
   }
 
   /// Where a ray along d meets a triangle's plane, N.a / N.d, but between the nearest and the farthest corner; a: the

@@ -288,6 +288,44 @@ TEST_CASE("a ray that has met an inner grid's last face stays in its last cells 
   }
 }
 
+TEST_CASE("rays so short that reciprocals of their components overflow lose no hit in a grid") {
+  const TriangleMesh mesh = moved_and_scaled(random_triangles(300, 0.4f, 33), 0, -17);
+  const Vec3f e = mesh.bounds().extent();
+  const float size = std::max({e.x, e.y, e.z});
+  std::vector<Ray> rays;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const auto c = mesh.corners(random_bits(71, i, 0) % mesh.size());
+    Ray ray{c[0] * 0.5f + c[1] * 0.3f + c[2] * 0.2f, 0, {}, kInfinity};
+    for (std::size_t a = 0; a < 3; ++a)
+      ray.direction[a] =
+          std::ldexp(uniform(72, i, unsigned(a), -1, 1), -126 - int(random_bits(73, i, unsigned(a)) % 6));
+    ray.direction[i % 3] = i % 2 ? 0x1p-70f : -0x1p-70f;
+    ray.origin[i % 3] -= std::copysign(2 * size, ray.direction[i % 3]);
+    rays.push_back(ray);
+  }
+  const std::vector<ExactHit> truth = Oracle(mesh).closest_hit(rays);
+  CHECK(std::ranges::count_if(truth, [](const ExactHit& h) { return h.hit.is_hit(); }) > 1900);
+  for (const Isa isa : available_isas()) {
+    const std::string leaf(default_leaf("grid", "exact", isa));
+    for (const char* builder : {"two_level", "uniform"}) {
+      const auto accel = build({"grid", builder}, mesh, leaf);
+      for (const char* traversal : {"single", "packet8", "packet64", "hybrid16", "auto"}) {
+        const KernelRow* row = find_kernel("grid", leaf, "exact", "padded", traversal, isa);
+        if (isa == Isa::scalar && !row) continue;
+        REQUIRE(row);
+        INFO(builder << ", " << name_of(*row));
+        const std::vector<Hit> hits = closest_hit(*row, *accel, rays);
+        const std::vector<std::uint8_t> occluded = any_hit(*row, *accel, rays);
+        std::size_t wrong = 0, lost = 0;
+        for (std::size_t i = 0; i < rays.size(); ++i)
+          wrong += hits[i].primitive != truth[i].hit.primitive, lost += occluded[i] == 0 && truth[i].hit.is_hit();
+        CHECK(wrong == 0);
+        CHECK(lost == 0);
+      }
+    }
+  }
+}
+
 TEST_CASE("an octree wider than floats go is divided as a narrower one is, and loses no hit") {
   const TriangleMesh small = random_triangles(3000, 0.02f, 23);
   float reach = 0;

@@ -65,14 +65,15 @@ class FarWalk {
   Leaf& leaf_;
 };
 
-/// Whether the walk's proof holds for rays (grid.h), and their numbers are far from overflowing. `away`: the largest
-/// |component| of the origin as the grid's lower corner sees it; `largest`: that of the direction. `F` is float or
-/// lanes.
+/// Whether the walk's proof holds for rays (grid.h), and their numbers are far from overflowing: the reciprocals of
+/// components down to 2^-60 of the largest among them. `away`: the largest |component| of the origin as the grid's
+/// lower corner sees it; `largest`: that of the direction. `F` is float or lanes.
 template <class F>
 ARBORETUM_INLINE auto within_walk_bounds(const grid::Grid& grid, F away, F largest) {
   const float all = grid.max_coordinate() + 32.0f * grid.reach();
   const float most_away = all < 0x1p120f ? 16.0f * grid.reach() : -1.0f;
-  return (away <= F(most_away)) & (F(all) <= F(0x1p60f) * largest) & (F(grid.pad()) >= F(0x1p-80f) * largest);
+  return (away <= F(most_away)) & (F(0x1p-60f) <= largest) & (F(all) <= F(0x1p60f) * largest) &
+         (F(grid.pad()) >= F(0x1p-80f) * largest);
 }
 ARBORETUM_INLINE bool within_walk_bounds(const grid::Grid& grid, const Ray& ray) {
   const grid::Level& outer = grid.levels()[0];

@@ -11,8 +11,8 @@
 // - An intersector that promises something answers t such that o + t d is within 20 u D of a point Q = sum l_k w_k of
 //   the flat triangle, l_k >= 0, sum l_k = 1, D the largest |w_k - o|: it works on corners as seen from the origin, and
 //   rounds shears, weights and t by less (exact_filter.h has 4.5 to 5.5 u D across the ray, 10 u D along it). Not so
-//   `watertight` where it sees a triangle edge on, to within its rounding: t is then anywhere between the corners'. Such
-//   hits boxes may lose in any structure, and no promise is about them. A takes this to 20 u |R| D, and
+//   `watertight` close to tnear where it sees a triangle edge on, to within its rounding: t is then within the box that
+//   its corners have in world space, and no promise is about it. A takes this to 20 u |R| D, and
 //   D <= |L| |A(w_k) - o*| (1 + 2^-9) where |L R - 1| <= 2^-10, so to less than 20.1 u k (M + |o*|) for k = |R||L|, and
 //   what the mismatch below adds times k u.
 // - A(w_k) is not the prototype's corner v_k. The flat mesh rounds, by 2^-23 of |L| M + |T| (2^-20 where it is not what
