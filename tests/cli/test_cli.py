@@ -366,6 +366,8 @@ class CommandLine(CommandLineCase):
                         if journal.exists() and journal.read_bytes():
                             break
                         time.sleep(0.01)
+                    # A repetition that has just been written ends a cell; the next takes a second at least.
+                    time.sleep(0.4)
                     process.send_signal(sent)
                     error = process.communicate(timeout=60)[1]
                     self.assertEqual(process.returncode, -sent, error)
