@@ -7,7 +7,6 @@
 #include "core/isa.h"
 #include "rendering/self_intersection.h"
 #include "structures/accel.h"
-#include "structures/own_parameters.h"
 #include "traversal/kernel_table.h"
 
 namespace arboretum {
@@ -19,8 +18,7 @@ struct Cell {
   Isa isa = Isa::scalar;
   unsigned threads = 1;
   BuilderParameters parameters;
-  OwnValues own;                ///< parameters of the structure's own
-  std::string parameter_label;  ///< what of `parameters` and `own` is swept: ":bins=16"; part of the name
+  std::string parameter_label;  ///< what of `parameters` is swept: ":bins=16"; part of the name
   TraversalSettings settings;
   std::string call = "batch";  ///< how many rays the kernel gets a call (experiments/call_axis.h)
   /// what of `settings` is swept, and a call other than `batch`: ":hybrid_threshold=2:call=ray"; part of the name

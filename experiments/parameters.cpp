@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/parse_number.h"
+#include "structures/own_parameters.h"
 #include "structures/parameter_limits.h"
 
 namespace arboretum {
@@ -14,14 +15,14 @@ namespace {
 
 constexpr std::string_view kOwn = "auto";  ///< the builder's or the way of traversal's own choice
 
-/// f(parameter, the set that it is of) for the one of that name; of a structure's own `own` is the set.
+/// f(parameter, the set that it is of) for the one of that name; of a structure's own BuilderParameters, too.
 template <class F>
 auto with(std::string_view name, Parameters& all, const F& f) {
   for (const auto& parameter : traversal_setting_table())
     if (parameter.name == name) return f(parameter, all.traversal);
   for (const auto& parameter : builder_parameter_table())
     if (parameter.name == name) return f(parameter, all.builder);
-  if (const OwnParameter* parameter = find_own_parameter(name)) return f(*parameter, all.own);
+  if (const OwnParameter* parameter = find_own_parameter(name)) return f(*parameter, all.builder);
   throw std::logic_error(fmt::format("there is no parameter {}", name));
 }
 
@@ -39,11 +40,12 @@ template <class Set, class T>
 void assign(const Parameter<Set>& parameter, Set& set, const T& value) {
   set.*std::get<T Set::*>(parameter.member) = value;
 }
-void assign(const OwnParameter& parameter, OwnValues& values, const ParameterValue& value) {
+/// Kept where it is not the default.
+void assign(const OwnParameter& parameter, BuilderParameters& set, const ParameterValue& value) {
   if (value == parameter.initial)
-    values.erase(std::string(parameter.name));
+    set.own.erase(std::string(parameter.name));
   else
-    values[std::string(parameter.name)] = value;
+    set.own[std::string(parameter.name)] = value;
 }
 
 /// Whether the builder or the way of traversal may choose itself.
@@ -103,9 +105,9 @@ std::string value_text(const Parameter<Set>& parameter, const Set& set) {
   };
   return std::visit(text, parameter.member);
 }
-std::string value_text(const OwnParameter& parameter, const OwnValues& values) {
-  const auto value = values.find(parameter.name);
-  return text_of(value == values.end() ? parameter.initial : value->second);
+std::string value_text(const OwnParameter& parameter, const BuilderParameters& set) {
+  const auto value = set.own.find(parameter.name);
+  return text_of(value == set.own.end() ? parameter.initial : value->second);
 }
 
 }  // namespace
@@ -157,8 +159,8 @@ bool concerns(std::string_view name, std::string_view traversal) {
                                     : name == "rays_in_flight" && traversal == "queued";
 }
 
-void reset_parameter(BuilderParameters& parameters, OwnValues& own, std::string_view name) {
-  if (const auto value = own.find(name); value != own.end()) own.erase(value);
+void reset_parameter(BuilderParameters& parameters, std::string_view name) {
+  parameters.own.erase(std::string(name));
   const BuilderParameters defaults;
   for (const auto& p : builder_parameter_table())
     if (p.name == name) std::visit([&](auto member) { parameters.*member = defaults.*member; }, p.member);

@@ -9,7 +9,6 @@
 
 #include "core/ray.h"
 #include "structures/accel.h"
-#include "structures/own_parameters.h"
 
 namespace arboretum {
 
@@ -19,7 +18,6 @@ using ParameterSweep = std::map<std::string, std::vector<std::string>>;
 struct Parameters {
   BuilderParameters builder;
   TraversalSettings traversal;
-  OwnValues own;  ///< of the builders, too
   friend bool operator==(const Parameters&, const Parameters&) = default;
 };
 
@@ -37,7 +35,7 @@ struct Parameters {
 [[nodiscard]] std::string parameter_values(std::string_view name);
 [[nodiscard]] std::string_view parameter_summary(std::string_view name);
 /// Sets a builder's parameter to its default.
-void reset_parameter(BuilderParameters& parameters, OwnValues& own, std::string_view name);
+void reset_parameter(BuilderParameters& parameters, std::string_view name);
 /// Takes ":name=value" out of a label.
 void drop_label(std::string& label, std::string_view name);
 

@@ -60,8 +60,7 @@ class Planner {
             Cell cell;
             cell.scene_index = scene, cell.scene = experiment_.scenes[scene].name;
             cell.structure = structure, cell.builder = builder, cell.leaf = leaf;
-            cell.parameters = point.parameters.builder, cell.own = point.parameters.own,
-            cell.parameter_label = point.label;
+            cell.parameters = point.parameters.builder, cell.parameter_label = point.label;
             cell.settings = point.parameters.traversal, cell.setting_label = point.traversal_label;
             add_kernels(cell, lists, out);
           }
@@ -139,7 +138,7 @@ class Planner {
     const std::string below = cell.parameters.below;
     for (const auto& [name, values] : experiment_.parameters) {
       if (is_of_traversal(name) || reads(name, cell.structure, cell.builder, below)) continue;
-      reset_parameter(cell.parameters, cell.own, name);
+      reset_parameter(cell.parameters, name);
       drop_label(cell.parameter_label, name);
     }
   }

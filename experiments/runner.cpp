@@ -235,7 +235,7 @@ class Runner {
                             ? cell.metric == Cell::Metric::trace && concerns(name, cell.traversal)
                             : registry_.reads(name, cell.structure, cell.builder, cell.parameters.below);
       if (!read) continue;
-      const std::string text = parameter_text({cell.parameters, cell.settings, cell.own}, name);
+      const std::string text = parameter_text({cell.parameters, cell.settings}, name);
       const auto whole = parse_number<std::uint64_t>(text);
       const auto number = parse_number<double>(text);
       facts["parameters"][name] = whole ? Json(*whole) : number ? Json(*number) : Json(text);

@@ -10,7 +10,7 @@
 namespace arboretum {
 
 BuildSettings settings_of(const Cell& cell) {
-  return {.builder = with_values(cell.builder, cell.own),
+  return {.builder = cell.builder,
           .leaf = cell.leaf,
           .isa = cell.isa,
           .threads = cell.threads,

@@ -8,6 +8,7 @@
 
 #include "core/coordinates.h"
 #include "experiments/crash_note.h"
+#include "experiments/structure_pool.h"
 #include "oracle/answer_check.h"
 #include "oracle/sheared.h"
 
@@ -168,8 +169,8 @@ const Accel& StructureShelf::get(const Cell& cell) {
   drop_spent(key);
   if (const auto left = expected_.find(key); left != expected_.end() && left->second > 0) --left->second;
   if (const auto found = built_.find(key); found != built_.end()) return *found->second;
-  const BuildSettings settings{with_values(cell.builder, cell.own), cell.leaf, built_for(cell), threads_,
-                               cell.parameters};
+  BuildSettings settings = settings_of(cell);
+  settings.isa = built_for(cell), settings.threads = threads_;
   const UnderWay building("the build for " + cell.name());
   BuildReport report;
   std::unique_ptr<Accel> fresh = registry_.build(cell.structure, mesh_, settings, report);

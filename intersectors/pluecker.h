@@ -27,6 +27,14 @@ struct PlueckerTerms {
     v = dot(cross(edge_v, p0 + p1), d);
     w = dot(cross(p1 - p2, p1 + p2), d);
   }
+  /// Where none of them is on another side of 0 than the others.
+  [[nodiscard]] ARBORETUM_INLINE auto one_side() const {
+    const F least = min_x86(min_x86(u, v), w), largest = max_x86(max_x86(u, v), w);
+    return (least >= F(0.0f)) | (F(0.0f) >= largest);
+  }
+  [[nodiscard]] ARBORETUM_INLINE F sum() const { return u + v + w; }
+  /// (v1 - v0) x (v2 - v0)
+  [[nodiscard]] ARBORETUM_INLINE vec3<F> normal() const { return cross(edge_u, edge_v); }
 };
 
 struct Pluecker {
@@ -44,15 +52,13 @@ struct Pluecker {
     const vf3<W> p0 = vf3<W>{F::load(block.v0[0]), F::load(block.v0[1]), F::load(block.v0[2])} - o;
     const vf3<W> p1 = vf3<W>{F::load(block.v1[0]), F::load(block.v1[1]), F::load(block.v1[2])} - o;
     const vf3<W> p2 = vf3<W>{F::load(block.v2[0]), F::load(block.v2[1]), F::load(block.v2[2])} - o;
-    const PlueckerTerms<F> terms(p0, p1, p2, d);
-    const F u = terms.u, v = terms.v, w = terms.w;
-    const F smallest = min_x86(min_x86(u, v), w), largest = max_x86(max_x86(u, v), w);
-    vm<W> inside = (smallest >= F(0.0f)) | (largest <= F(0.0f));
+    const PlueckerTerms<F> e(p0, p1, p2, d);
+    vm<W> inside = e.one_side();
     if (any(inside)) {
-      const vf3<W> n = cross(terms.edge_u, terms.edge_v);  // (v1 - v0) x (v2 - v0)
-      const F sum = u + v + w, det = dot(n, d), numerator = dot(n, p0);
+      const vf3<W> n = e.normal();
+      const F sum = e.sum(), det = dot(n, d), numerator = dot(n, p0);
       hits.t = numerator / det;
-      hits.u_numerator = u, hits.v_numerator = v, hits.denominator = sum;
+      hits.u_numerator = e.u, hits.v_numerator = e.v, hits.denominator = sum;
       const vm<W> tiny =
           (min_x86(abs(det), abs(numerator)) < F(0x1p-60f)) & (abs(n.x) + abs(n.y) + abs(n.z) < F(0x1p-20f));
       const unsigned in_double = (inside & tiny).bits();
@@ -85,11 +91,9 @@ struct Pluecker {
       const auto corner = [&](const float(&p)[3][W]) { return load3<D>(p[0] + k, p[1] + k, p[2] + k) - o; };
       const vd3<D> p0 = corner(block.v0);
       const PlueckerTerms<F> e(p0, corner(block.v1), corner(block.v2), d);
-      const F least = min_x86(min_x86(e.u, e.v), e.w), largest = max_x86(max_x86(e.u, e.v), e.w), sum = e.u + e.v + e.w;
-      const vd3<D> n = cross(e.edge_u, e.edge_v);
-      const F det = dot(n, d);
-      const unsigned one_side = ((least >= F(0.0)) | (F(0.0) >= largest)) & (sum != F(0.0));
-      hit |= (det != F(0.0)) << k & (one_side << k | ~zero);
+      const vd3<D> n = e.normal();
+      const F det = dot(n, d), sum = e.sum();
+      hit |= (det != F(0.0)) << k & ((e.one_side() & (sum != F(0.0))) << k | ~zero);
       (dot(n, p0) / det).store(t + k), (e.u / sum).store(u + k), (e.v / sum).store(v + k);
     }
     hit &= lanes;

@@ -26,12 +26,10 @@ struct PlueckerDouble {
   static ARBORETUM_INLINE unsigned test(vec3<F> v0, vec3<F> v1, vec3<F> v2, vec3<F> o, vec3<F> d, F& t, F& u, F& v) {
     const vec3<F> p0 = v0 - o;
     const PlueckerTerms<F> terms(p0, v1 - o, v2 - o, d);
-    const F smallest = min_x86(min_x86(terms.u, terms.v), terms.w),
-            largest = max_x86(max_x86(terms.u, terms.v), terms.w);
-    const F sum = terms.u + terms.v + terms.w;
-    unsigned inside = ((smallest >= F(0.0)) | (F(0.0) >= largest)) & (sum != F(0.0));
+    const F sum = terms.sum();
+    unsigned inside = terms.one_side() & (sum != F(0.0));
     if (inside) {
-      const vec3<F> n = cross(terms.edge_u, terms.edge_v);
+      const vec3<F> n = terms.normal();
       const F det = dot(n, d);
       inside &= det != F(0.0);
       t = dot(n, p0) / det, u = terms.u / sum, v = terms.v / sum;

@@ -30,7 +30,8 @@
 //    box, as pads have it, in whatever structure. What the edge functions' own roundings move it by is 6 u s A / |det|,
 //    A the sum of the squares across: for a triangle seen edge on, or a sliver, any share of s, and boxes might cull
 //    what lies so far before them. Where |det| is below 2^-12 A the mean is made of doubles, whose roundings are nothing
-//    beside it, and a distance of 5 is kept where the ray is in the triangle's box.
+//    beside it, and a distance of 5 is kept where the ray is in the triangle's box, or left to the mean where the ray
+//    is in the plane.
 #pragma once
 
 #include <algorithm>
@@ -188,36 +189,40 @@ struct Watertight {
     const vm<W> clear =
         e.template clear<false>(F(ray.tnear()), sz * e.p.a.z, sz * e.p.b.z, sz * e.p.c.z, e.u + e.v + e.w, t);
     const unsigned near = hit & ~clear.bits();
-    if (near != 0) {
-      float of_planes[W];
-      plane_distances_in_double(near, ray, block, t).store(of_planes);
-      for (unsigned rest = near; rest; rest &= rest - 1) {
-        const int i = __builtin_ctz(rest);
-        out[0][i] = doubt >> i & 1u ? within_box(of_planes[i], out[0][i], ray, block, i) : of_planes[i];
-      }
+    float distances[W];
+    plane_distances_in_double(near, ray, block, t).store(distances);
+    for (unsigned rest = near & doubt; rest; rest &= rest - 1) {
+      const int i = __builtin_ctz(rest);
+      distances[i] = within_box(distances[i], out[0][i], ray, block, i);
     }
-    hits = {F::load(out[0]), F::load(out[1]), F::load(out[2]), F::load(out[3])};
+    hits = {F::load(distances), F::load(out[1]), F::load(out[2]), F::load(out[3])};
     return vm<W>::from_bits(hit);
   }
-  /// `t`, no earlier and no later than the ray is in the box of triangle i of the block, padded along each axis by
-  /// 2^-22 of the distance from the origin; `mean` where it never is.
+  /// `t`, where the ray meets the plane of triangle i of the block, but no earlier and no later than the ray is in its
+  /// box, padded along each axis by 2^-22 of the distance from the origin; `mean` where it never is, or is in the plane
+  /// to 2^-20, which then says nothing.
   template <class Block>
   static float within_box(float t, float mean, const ShearedRay& ray, const Block& block, int i) {
-    const AxisOrder& axes = *ray.order;
-    const std::uint32_t rows[3] = {axes.x, axes.y, axes.z};
+    const std::uint32_t rows[3] = {ray.order->x, ray.order->y, ray.order->z};
     double first = -std::numeric_limits<double>::infinity(), last = -first;
+    double d[3], e1[3], e2[3];
     for (int a = 0; a < 3; ++a) {
-      const double d = ray.direction[a];
-      if (d == 0) continue;
       const auto seen = [&](const float(&p)[3][Block::kWidth]) {
         return double(ShearedRay::row(p, rows[a])[i]) - double(ray.from[a]);
       };
-      const auto [low, high] = std::minmax({seen(block.v0), seen(block.v1), seen(block.v2)});
+      const double p0 = seen(block.v0), p1 = seen(block.v1), p2 = seen(block.v2);
+      d[a] = ray.direction[a], e1[a] = p1 - p0, e2[a] = p2 - p0;
+      if (d[a] == 0) continue;
+      const auto [low, high] = std::minmax({p0, p1, p2});
       const double pad = 0x1p-22 * std::max(-low, high);
-      const auto [enter, leave] = std::minmax({(low - pad) / d, (high + pad) / d});
+      const auto [enter, leave] = std::minmax({(low - pad) / d[a], (high + pad) / d[a]});
       first = std::max(first, enter), last = std::min(last, leave);
     }
-    return first <= last ? float(std::clamp(double(t), first, last)) : mean;
+    const double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
+    const auto dot = [](const double* p, const double* q) { return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]; };
+    const double along = dot(n, d);
+    if (!(first <= last) || along * along < 0x1p-40 * dot(n, n) * dot(d, d)) return mean;
+    return float(std::clamp(double(t), first, last));
   }
 
   /// Where a ray along d meets a triangle's plane, N.a / N.d, but between the nearest and the farthest corner; a: the

@@ -1,4 +1,4 @@
-// Numbers out of text: correctly rounded floats, `nan` and `inf` included, whatever the locale.
+// Lines, words and numbers out of text: correctly rounded floats, `nan` and `inf` included, whatever the locale.
 #pragma once
 
 #include <locale.h>
@@ -27,6 +27,19 @@ namespace arboretum {
   static const locale_t kC = newlocale(LC_ALL_MASK, "C", nullptr);
   value = strtof_l(std::string(p, next).c_str(), nullptr, kC);
   return next;
+}
+
+/// The float that all of `word` is, as above; false where it is none.
+[[nodiscard]] inline bool parse_float(std::string_view word, float& value) {
+  return !word.empty() && parse_float(word.data(), word.data() + word.size(), value) == word.data() + word.size();
+}
+
+/// The next line, taken off the front of the text with its end: "\n", "\r\n" or "\r".
+[[nodiscard]] inline std::string_view next_line(std::string_view& text) {
+  const std::size_t end = std::min(text.size(), text.find_first_of("\r\n"));
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(std::min(text.size(), end + (text.substr(end).starts_with("\r\n") ? 2 : 1)));
+  return line;
 }
 
 /// The next word of a line, taken off its front; empty at its end or before a comment.

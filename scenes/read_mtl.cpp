@@ -42,9 +42,7 @@ std::string checked_line(std::string_view line, const std::string& where) {
     if (i == 1 && word.empty()) return fmt::format("{} {} {} {}", keyword, first, first, first);
     if (i == 0) first = word;
     float value;
-    const char* const end = parse_float(word.data(), word.data() + word.size(), value);
-    const bool is_number =
-        !word.empty() && end == word.data() + word.size() && (keyword != "illum" || value == std::trunc(value));
+    const bool is_number = parse_float(word, value) && (keyword != "illum" || value == std::trunc(value));
     if (!is_number) {
       throw UserError(word.empty() ? fmt::format("{}: {} needs {}", where, keyword,
                                                  known->count == 3 ? "three numbers, or one for all" : "a number")
@@ -71,15 +69,13 @@ std::pair<std::string, std::vector<MapPlaces>> checked_lines(std::string_view te
   std::pair<std::string, std::vector<MapPlaces>> result;
   auto& [checked, places] = result;
   for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-    std::string_view line = text.substr(0, end);
+    std::string_view line = next_line(text);
     const std::string where = fmt::format("{}:{}", path.string(), number);
     checked += checked_line(line, where) + "\n";
     const std::string_view keyword = next_word(line);
     if (keyword == "newmtl" && line.find_first_not_of(" \t\r") != std::string_view::npos) places.emplace_back();
     if (keyword == "map_Kd" && !places.empty()) places.back().diffuse = where + ": map_Kd";
     if (keyword == "map_d" && !places.empty()) places.back().opacity = where + ": map_d";
-    text.remove_prefix(std::min(end + (text.substr(end).starts_with("\r\n") ? 2 : 1), text.size()));
   }
   return result;
 }

@@ -35,7 +35,7 @@ class OffReader {
     scene_.mesh.vertices.reserve(vertices), scene_.mesh.triangles.reserve(faces);
     for (std::uint64_t i = 0; i < vertices; ++i) add_vertex(i, vertices);
     for (std::uint64_t i = 0; i < faces; ++i) add_face(i, faces);
-    if (next_line())
+    if (find_line())
       warn(fmt::format("{}:{}: the header promises {} vertices and {} faces; what is from here on is left out",
                        path_.string(), number_, vertices, faces));
     if (short_faces_ > 0) warn(short_faces_warning(path_, short_faces_));
@@ -52,12 +52,10 @@ class OffReader {
   }
   void warn(std::string line) { scene_.report.warnings.push_back(std::move(line)); }
 
-  /// The next line that holds more than blanks and comments; lines end with "\n", "\r\n" or "\r".
-  bool next_line() {
+  /// Goes to the next line that holds more than blanks and comments.
+  bool find_line() {
     while (!rest_.empty()) {
-      const std::size_t end = std::min(rest_.size(), rest_.find_first_of("\r\n"));
-      line_ = rest_.substr(0, end);
-      rest_.remove_prefix(std::min(rest_.size(), end + (rest_.substr(end).starts_with("\r\n") ? 2 : 1)));
+      line_ = next_line(rest_);
       ++number_;
       std::string_view ahead = line_;
       if (!next_word(ahead).empty()) return true;
@@ -68,13 +66,13 @@ class OffReader {
   /// The next word of the header, on whatever line.
   std::string_view header_word() {
     std::string_view word = next_word(line_);
-    if (word.empty() && next_line()) word = next_word(line_);
+    if (word.empty() && find_line()) word = next_word(line_);
     return word;
   }
 
   /// [ST][C][N][4][n]OFF, or nothing.
   void read_keyword() {
-    if (!next_line()) fail_truncated("nothing in it but blanks and comments");
+    if (!find_line()) fail_truncated("nothing in it but blanks and comments");
     line_.remove_prefix(line_.find_first_not_of(" \t"));
     std::string_view word = line_;
     for (const std::string_view prefix : {"ST", "C", "N", "4"}) {
@@ -108,7 +106,7 @@ class OffReader {
     if (word.empty()) {
       const std::string_view rest = rest_;
       const std::size_t number = number_;
-      if (!next_line()) return;
+      if (!find_line()) return;
       word = next_word(line_);
       if (!next_word(line_).empty() || dimension_ == 1) {
         rest_ = rest, number_ = number;
@@ -120,7 +118,7 @@ class OffReader {
   }
 
   void add_vertex(std::uint64_t index, std::uint64_t of) {
-    if (!next_line()) fail_truncated(fmt::format("{} vertices of the {} that the header promises", index, of));
+    if (!find_line()) fail_truncated(fmt::format("{} vertices of the {} that the header promises", index, of));
     std::array<float, 4> values{0.0f, 0.0f, 0.0f, 1.0f};
     for (std::size_t k = 0; k < dimension_; ++k) values[k] = coordinate(index, "xyz"[k]);
     Vec3f v{values[0], values[1], values[2]};
@@ -134,14 +132,14 @@ class OffReader {
   float coordinate(std::uint64_t vertex, char axis) {
     const std::string_view word = next_word(line_);
     float value = 0.0f;
-    if (word.empty() || parse_float(word.data(), word.data() + word.size(), value) != word.data() + word.size())
+    if (!parse_float(word, value))
       fail(fmt::format("vertex {} has no number for {}{}; write a vertex a line", vertex, axis,
                        word.empty() ? "" : fmt::format(" but '{}'", one_line(word))));
     return value;
   }
 
   void add_face(std::uint64_t face, std::uint64_t of) {
-    if (!next_line()) fail_truncated(fmt::format("{} faces of the {} that the header promises", face, of));
+    if (!find_line()) fail_truncated(fmt::format("{} faces of the {} that the header promises", face, of));
     const auto promised = parse_number<std::uint64_t>(next_word(line_));
     if (!promised) fail(fmt::format("face {} does not begin with its number of corners", face));
     corners_.clear();

@@ -89,8 +89,7 @@ class TextReader {
     Vec3f values;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::string_view word = next();
-      if (word.empty() ||
-          parse_float(word.data(), word.data() + word.size(), values[axis]) != word.data() + word.size())
+      if (!parse_float(word, values[axis]))
         fail(line, fmt::format("'{0}' has no number for {1}{2}; write '{0} x y z'", keyword, "xyz"[axis],
                                word.empty() || line_ != line ? "" : fmt::format(" but '{}'", one_line(word))));
     }

@@ -76,19 +76,19 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
     const std::vector<std::string> names(valid.begin(), valid.end());
     throw UserError(std::string(name) + ": " + unknown_name_message(kind, value, names));
   };
-  const std::string builder(builder_of(settings.builder));
-  check("builder", builder, entry->info.builders);
+  check("builder", settings.builder, entry->info.builders);
   check("leaf", settings.leaf, entry->info.leaves);
-  if (const std::string why = entry->info.why_not_built(builder, settings.leaf); !why.empty()) throw UserError(why);
+  if (const std::string why = entry->info.why_not_built(settings.builder, settings.leaf); !why.empty())
+    throw UserError(why);
 
   check_parameters(settings.parameters);
   check_triangles(mesh, Largest::finite);
   if (!entry->info.holds_motion) check_one_moment(mesh, name);
   if (entry->info.takes_below) check_instances(mesh, Largest::finite);
 
+  std::unique_ptr<Accel> accel = create_structure(*entry, settings.parameters);
   report = {};
   BuildSettings allowed = settings;
-  std::unique_ptr<Accel> accel = create_structure(*entry, allowed);
   allowed.threads = allowed_threads(settings.threads);
   tbb::task_arena arena(int(allowed.threads), 1);
   MemoryMeter::reset_peak();

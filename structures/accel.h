@@ -6,11 +6,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/bounds.h"
@@ -20,6 +23,8 @@
 namespace arboretum {
 
 class Archive;
+
+using ParameterValue = std::variant<unsigned, float, std::string>;
 
 /// Parameters of a builder; a builder reads those that concern it. Part of the cell when they are swept.
 struct BuilderParameters {
@@ -44,6 +49,9 @@ struct BuilderParameters {
   std::string below = "bvh8";  ///< two_level: the structure of each prototype
   /// binary to N-wide: `greedy` (largest area first) or `optimal` (dynamic programming)
   std::string collapse = "optimal";
+  /// Of what a structure has of its own (own_parameters.h), by name; what is not here keeps its default. The structure
+  /// finds them in its member `parameters`.
+  std::map<std::string, ParameterValue, std::less<>> own = {};
   friend bool operator==(const BuilderParameters&, const BuilderParameters&) = default;
 };
 

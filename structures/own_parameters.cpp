@@ -1,11 +1,9 @@
 #include "structures/own_parameters.h"
 
 #include <algorithm>
-#include <charconv>
 
 #include "core/error.h"
 #include "core/names.h"
-#include "core/parse_number.h"
 #include "structures/parameters_read.h"
 #include "structures/registry.h"
 
@@ -29,15 +27,6 @@ void require_usable(std::string_view structure, const OwnParameter& parameter) {
   } catch (const UserError& e) {
     refuse(std::string(": its default is out of its limits: ") + e.what());
   }
-}
-
-/// Takes "name=value" off the front of ":name=value:name=value".
-std::pair<std::string_view, std::string_view> next_value(std::string_view& rest) {
-  rest.remove_prefix(1);
-  const std::string_view one = rest.substr(0, rest.find(':'));
-  rest.remove_prefix(one.size());
-  const std::size_t equals = std::min(one.find('='), one.size());
-  return {one.substr(0, equals), one.substr(std::min(equals + 1, one.size()))};
 }
 
 }  // namespace
@@ -74,61 +63,19 @@ bool has_own_parameter(std::string_view structure, std::string_view name) {
   return builders && std::ranges::find(builders->own, name, &OwnParameter::name) != builders->own.end();
 }
 
-std::string text_of(const ParameterValue& value) {
-  const auto text = []<class T>(const T& v) -> std::string {
-    if constexpr (std::is_same_v<T, std::string>) {
-      return v;
-    } else {
-      char digits[32];
-      return {digits, std::to_chars(digits, digits + sizeof digits, v).ptr};
-    }
-  };
-  return std::visit(text, value);
-}
-
-std::optional<ParameterValue> read_value(const OwnParameter& parameter, std::string_view text) {
-  const auto read = [&]<class T>(const T&) -> std::optional<ParameterValue> {
-    if constexpr (std::is_same_v<T, std::string>) {
-      return std::string(text);
-    } else {
-      return parse_number<T>(text);
-    }
-  };
-  return std::visit(read, parameter.initial);
-}
-
-std::string with_values(std::string_view builder, const OwnValues& values) {
-  std::string all(builder);
-  for (const auto& [name, value] : values) all.append(":").append(name).append("=").append(text_of(value));
-  return all;
-}
-
-std::string_view builder_of(std::string_view with_values) noexcept {
-  return {with_values.begin(), std::ranges::find(with_values, ':')};
-}
-
-std::unique_ptr<Accel> create_structure(const StructureEntry& entry, BuildSettings& settings) {
+std::unique_ptr<Accel> create_structure(const StructureEntry& entry, const BuilderParameters& parameters) {
   std::unique_ptr<Accel> accel = entry.create();
-  const std::string all = std::move(settings.builder);
-  settings.builder = builder_of(all);
   const StructureBuilders* builders = builders_of_structure(entry.info.name);
-  for (std::string_view rest = std::string_view(all).substr(settings.builder.size()); !rest.empty();) {
-    const auto [name, text] = next_value(rest);
+  for (const auto& [name, value] : parameters.own) {
     const auto known = std::ranges::find(builders->own, name, &OwnParameter::name);
     if (known != builders->own.end()) {
-      const std::optional<ParameterValue> value = read_value(*known, text);
-      if (!value)
-        throw UserError(std::string(name) + ": '" + std::string(text) + "' is not a " +
-                        (std::holds_alternative<unsigned>(known->initial) ? "whole number" : "number"));
-      check_parameter(*known, *value);
-      builders->set(*accel, std::size_t(known - builders->own.begin()), *value);
-    } else if (entry.info.takes_below) {
-      settings.builder.append(":").append(name).append("=").append(text);
-    } else {
+      check_parameter(*known, value);
+      builders->set(*accel, std::size_t(known - builders->own.begin()), value);
+    } else if (!entry.info.takes_below) {
       std::vector<std::string> names;
       for (const OwnParameter& parameter : builders->own) names.emplace_back(parameter.name);
       throw UserError(std::string(entry.info.name) + ": " +
-                      (names.empty() ? "it has no parameters of its own, but is given '" + std::string(name) + "'"
+                      (names.empty() ? "it has no parameters of its own, but is given '" + name + "'"
                                      : unknown_name_message("parameter of its own", name, names)));
     }
   }

@@ -91,38 +91,37 @@ constexpr Parameter<S> kTraversalTable[] = {
      .limits = {1, S::kMostInFlight}},
 };
 
-constexpr std::size_t kBuilderMembers = 16, kTraversalMembers = 2;
+constexpr std::size_t kBuilderMembers = 17, kTraversalMembers = 2;
 /// The compiler refuses these where a struct has another number of members.
 [[maybe_unused]] void bind_all(const B& parameters) {
-  [[maybe_unused]] const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = parameters;
+  [[maybe_unused]] const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, own] = parameters;
 }
 [[maybe_unused]] void bind_all(const S& settings) { [[maybe_unused]] const auto& [a, b] = settings; }
-static_assert(std::size(kBuilderTable) == kBuilderMembers && std::size(kTraversalTable) == kTraversalMembers,
-              "each member has a row");
+static_assert(std::size(kBuilderTable) == kBuilderMembers - 1 && std::size(kTraversalTable) == kTraversalMembers,
+              "each member has a row, but for `own`");
 static_assert(B::kOwn == S::kOwn);
 
 template <class T>
-std::string text_of(T value) {
+requires std::is_arithmetic_v<T> std::string shown(T value) {
   char digits[32];
   return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
 }
-std::string text_of(std::string_view word) { return std::string(word); }
+std::string shown(std::string_view word) { return std::string(word); }
 
 template <class T>
 void require(std::string_view parameter, T value, const ParameterLimits& limits) {
   if (limits.hold(value)) return;
-  throw UserError(std::string(parameter) + ": " + text_of(value) + " is not within " + text_of(limits.low) + " .. " +
-                  text_of(limits.high));
+  throw UserError(std::string(parameter) + ": " + shown(value) + " is not within " + shown(limits.low) + " .. " +
+                  shown(limits.high));
 }
 
-/// `value`, as it is to be shown, must be one of `choices`.
+/// `value`, of which `text` is said, must be one of `choices`.
 template <class T, class Choice>
-void require_one(std::string_view parameter, const T& value, const std::string& shown,
-                 std::span<const Choice> choices) {
+void require_one(std::string_view parameter, const T& value, const std::string& text, std::span<const Choice> choices) {
   if (std::ranges::find(choices, value) != choices.end()) return;
   std::string all;
-  for (const Choice& choice : choices) all += (all.empty() ? "neither " : " nor ") + text_of(choice);
-  throw UserError(std::string(parameter) + ": " + shown + " is " + all);
+  for (const Choice& choice : choices) all += (all.empty() ? "neither " : " nor ") + shown(choice);
+  throw UserError(std::string(parameter) + ": " + text + " is " + all);
 }
 
 template <class Row, class T>
@@ -131,7 +130,7 @@ void check_value(const Row& parameter, const T& value) {
     if (!parameter.words.empty()) require_one(parameter.name, value, "'" + value + "'", parameter.words);
   } else {
     if constexpr (std::is_same_v<T, unsigned>) {
-      if (!parameter.choices.empty()) return require_one(parameter.name, value, text_of(value), parameter.choices);
+      if (!parameter.choices.empty()) return require_one(parameter.name, value, shown(value), parameter.choices);
     }
     require(parameter.name, value, parameter.limits);
   }
@@ -171,7 +170,15 @@ bool operator==(const OwnParameter& a, const OwnParameter& b) noexcept {
 }
 
 void check_parameter(const OwnParameter& parameter, const ParameterValue& value) {
+  constexpr std::string_view kTypes[] = {"a whole number", "a number", "a word"};
+  if (value.index() != parameter.initial.index())
+    throw UserError(std::string(parameter.name) + ": '" + text_of(value) + "' is not " +
+                    std::string(kTypes[parameter.initial.index()]));
   std::visit([&](const auto& v) { check_value(parameter, v); }, value);
+}
+
+std::string text_of(const ParameterValue& value) {
+  return std::visit([](const auto& v) { return shown(v); }, value);
 }
 
 void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits) {

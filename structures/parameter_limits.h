@@ -48,7 +48,6 @@ void check_parameters(const BuilderParameters& parameters);
 /// As above of a way of traversal, whether or not it reads the setting.
 void check_settings(const TraversalSettings& settings);
 
-using ParameterValue = std::variant<unsigned, float, std::string>;
 /// A structure's own parameter, whatever it is a member of. All its values are of the type of `initial`, the default.
 struct OwnParameter {
   std::string_view name, summary;
@@ -58,7 +57,10 @@ struct OwnParameter {
   std::span<const std::string_view> words{};
   friend bool operator==(const OwnParameter& a, const OwnParameter& b) noexcept;
 };
+/// Throws UserError for a value of another type or out of the parameter's limits.
 void check_parameter(const OwnParameter& parameter, const ParameterValue& value);
+/// As short as it is read back the same.
+[[nodiscard]] std::string text_of(const ParameterValue& value);
 /// Throws UserError unless the limits hold `value`: for those that a structure has beside the table's.
 void require_within(std::string_view parameter, unsigned value, const ParameterLimits& limits);
 

@@ -10,7 +10,6 @@
 #include <boost/crc.hpp>
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
-#include <charconv>
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
@@ -156,18 +155,14 @@ std::filesystem::path unfinished_name(const std::filesystem::path& file) {
 
 std::string text_of(const BuilderParameters& parameters) {
   std::string text;
+  const auto add = [&](std::string_view name, const ParameterValue& value) {
+    text.append(text.empty() ? "" : " ").append(name).append("=").append(text_of(value));
+  };
   for (const Parameter<BuilderParameters>& parameter : builder_parameter_table()) {
-    text.append(text.empty() ? "" : " ").append(parameter.name).append("=");
-    const auto append = [&]<class T>(T BuilderParameters::*member) {
-      if constexpr (std::is_same_v<T, std::string>) {
-        text += parameters.*member;
-      } else {
-        char digits[32];
-        text.append(digits, std::to_chars(digits, digits + sizeof digits, parameters.*member).ptr);
-      }
-    };
-    std::visit(append, parameter.member);
+    const auto value = [&](auto member) -> ParameterValue { return parameters.*member; };
+    add(parameter.name, std::visit(value, parameter.member));
   }
+  for (const auto& [name, value] : parameters.own) add(name, value);
   return text;
 }
 

@@ -251,6 +251,29 @@ TEST_CASE("scenes as wide as floats go take no more cells than others, and lose 
   }
 }
 
+/// Grids of `mesh`, single rays and packets, answer with `exact` what is true, closest hits and any.
+void check_exact(const TriangleMesh& mesh, std::span<const Ray> rays, std::span<const ExactHit> truth) {
+  for (const Isa isa : available_isas()) {
+    const std::string leaf(default_leaf("grid", "exact", isa));
+    for (const char* builder : {"two_level", "uniform"}) {
+      const auto accel = build({"grid", builder}, mesh, leaf);
+      for (const char* traversal : {"single", "packet8", "packet16", "packet64", "hybrid16", "auto"}) {
+        const KernelRow* row = find_kernel("grid", leaf, "exact", "padded", traversal, isa);
+        if (isa == Isa::scalar && !row) continue;
+        REQUIRE(row);
+        INFO(builder << ", " << name_of(*row));
+        const std::vector<Hit> hits = closest_hit(*row, *accel, rays);
+        const std::vector<std::uint8_t> occluded = any_hit(*row, *accel, rays);
+        std::size_t wrong = 0, lost = 0;
+        for (std::size_t i = 0; i < rays.size(); ++i)
+          wrong += hits[i].primitive != truth[i].hit.primitive, lost += occluded[i] == 0 && truth[i].hit.is_hit();
+        CHECK(wrong == 0);
+        CHECK(lost == 0);
+      }
+    }
+  }
+}
+
 TEST_CASE("a ray that has met an inner grid's last face stays in its last cells until it leaves the outer cell") {
   // Far from the origin the two faces are rounded apart, and rays that hardly move across them are between them for
   // long.
@@ -269,23 +292,7 @@ TEST_CASE("a ray that has met an inner grid's last face stays in its last cells 
   }
   const std::vector<ExactHit> truth = Oracle(mesh).closest_hit(rays);
   CHECK(std::ranges::count_if(truth, [](const ExactHit& h) { return h.hit.is_hit(); }) > 15000);
-  for (const Isa isa : available_isas()) {
-    const std::string leaf(default_leaf("grid", "exact", isa));
-    const auto accel = build({"grid", "two_level"}, mesh, leaf);
-    for (const char* traversal : {"single", "packet16", "packet64", "hybrid16", "auto"}) {
-      const KernelRow* row = find_kernel("grid", leaf, "exact", "padded", traversal, isa);
-      if (isa == Isa::scalar && !row) continue;
-      REQUIRE(row);
-      INFO(name_of(*row));
-      const std::vector<Hit> hits = closest_hit(*row, *accel, rays);
-      const std::vector<std::uint8_t> occluded = any_hit(*row, *accel, rays);
-      std::size_t wrong = 0, lost = 0;
-      for (std::size_t i = 0; i < rays.size(); ++i)
-        wrong += hits[i].primitive != truth[i].hit.primitive, lost += occluded[i] == 0 && truth[i].hit.is_hit();
-      CHECK(wrong == 0);
-      CHECK(lost == 0);
-    }
-  }
+  check_exact(mesh, rays, truth);
 }
 
 TEST_CASE("rays so short that reciprocals of their components overflow lose no hit in a grid") {
@@ -305,25 +312,7 @@ TEST_CASE("rays so short that reciprocals of their components overflow lose no h
   }
   const std::vector<ExactHit> truth = Oracle(mesh).closest_hit(rays);
   CHECK(std::ranges::count_if(truth, [](const ExactHit& h) { return h.hit.is_hit(); }) > 1900);
-  for (const Isa isa : available_isas()) {
-    const std::string leaf(default_leaf("grid", "exact", isa));
-    for (const char* builder : {"two_level", "uniform"}) {
-      const auto accel = build({"grid", builder}, mesh, leaf);
-      for (const char* traversal : {"single", "packet8", "packet64", "hybrid16", "auto"}) {
-        const KernelRow* row = find_kernel("grid", leaf, "exact", "padded", traversal, isa);
-        if (isa == Isa::scalar && !row) continue;
-        REQUIRE(row);
-        INFO(builder << ", " << name_of(*row));
-        const std::vector<Hit> hits = closest_hit(*row, *accel, rays);
-        const std::vector<std::uint8_t> occluded = any_hit(*row, *accel, rays);
-        std::size_t wrong = 0, lost = 0;
-        for (std::size_t i = 0; i < rays.size(); ++i)
-          wrong += hits[i].primitive != truth[i].hit.primitive, lost += occluded[i] == 0 && truth[i].hit.is_hit();
-        CHECK(wrong == 0);
-        CHECK(lost == 0);
-      }
-    }
-  }
+  check_exact(mesh, rays, truth);
 }
 
 TEST_CASE("an octree wider than floats go is divided as a narrower one is, and loses no hit") {

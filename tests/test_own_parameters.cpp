@@ -83,6 +83,8 @@ using namespace arboretum::test;
 
 namespace {
 
+using Values = std::map<std::string, ParameterValue, std::less<>>;
+
 toy::Seen built(std::string_view structure, const std::string& builder, const BuilderParameters& parameters = {}) {
   BuildReport report;
   const TriangleMesh mesh = random_triangles(8, 0.1f, 1);
@@ -91,8 +93,9 @@ toy::Seen built(std::string_view structure, const std::string& builder, const Bu
   return toy::seen;
 }
 
-std::string refusal(const std::string& builder, std::string_view structure = "toy") {
-  return error_of([&] { (void)built(structure, builder); });
+/// With `fancy`.
+std::string refusal(const Values& own, std::string_view structure = "toy") {
+  return error_of([&] { (void)built(structure, "fancy", {.own = own}); });
 }
 
 }  // namespace
@@ -126,44 +129,45 @@ TEST_CASE("own parameters are set, refused and shown as those that there are for
   CHECK(set_parameter(parameters, "toy_order", "y").empty());
   CHECK(parameter_text(parameters, "toy_steps") == "2");
   CHECK(parameter_text(parameters, "toy_order") == "y");
-  CHECK(with_values("fancy", parameters.own) == "fancy:toy_order=y:toy_steps=2");
-  reset_parameter(parameters.builder, parameters.own, "toy_order");
-  CHECK(with_values("fancy", parameters.own) == "fancy:toy_steps=2");
+  CHECK(parameters.builder.own == Values{{"toy_order", "y"}, {"toy_steps", 2u}});
+  reset_parameter(parameters.builder, "toy_order");
+  CHECK(parameters.builder.own == Values{{"toy_steps", 2u}});
 
   const auto points = parameter_points({{"toy_steps", {"1", "4"}}, {"toy_share", {"0.25"}}});
   REQUIRE(points.size() == 2);
   CHECK(points[0].label == ":toy_steps=1");
-  CHECK(with_values("fancy", points[0].parameters.own) == "fancy:toy_share=0.25:toy_steps=1");
-  CHECK(with_values("fancy", points[1].parameters.own) == "fancy:toy_share=0.25");
+  CHECK(points[0].parameters.builder.own == Values{{"toy_share", 0.25f}, {"toy_steps", 1u}});
+  CHECK(points[1].parameters.builder.own == Values{{"toy_share", 0.25f}});
 }
 
-TEST_CASE("values behind the builder's name arrive in the build") {
+TEST_CASE("values arrive in the build") {
   CHECK(built("toy", "plain").parameters == toy::Parameters{});
-  const toy::Seen all = built("toy", "fancy:toy_order=y:toy_share=0.25:toy_steps=2:toy_bits=63");
+  const toy::Seen all =
+      built("toy", "fancy", {.own = {{"toy_order", "y"}, {"toy_share", 0.25f}, {"toy_steps", 2u}, {"toy_bits", 63u}}});
   CHECK(all.builder == "fancy");
   CHECK(all.parameters == toy::Parameters{2, 63, 0.25f, "y"});
 
-  CHECK(refusal("fancy:toy_steps=9") == "toy_steps: 9 is not within 1 .. 8");
-  CHECK(refusal("fancy:toy_bits=31") == "toy_bits: 31 is neither 30 nor 63");
-  CHECK(refusal("fancy:toy_order=z") == "toy_order: 'z' is neither x nor y");
-  CHECK(refusal("fancy:toy_share=nan") == "toy_share: nan is not within 0 .. 1");
-  CHECK(refusal("fancy:toy_steps=many") == "toy_steps: 'many' is not a whole number");
-  CHECK(refusal("fancy:toy_share=") == "toy_share: '' is not a number");
-  CHECK_THAT(refusal("fancy:toy_step=2"), Catch::Contains("toy: ") && Catch::Contains("did you mean 'toy_steps'"));
-  CHECK_THAT(refusal("fancy:"), Catch::Contains("parameter of its own"));
-  CHECK_THAT(refusal("fanzy:toy_steps=2"), Catch::Contains("did you mean 'fancy'"));
-  CHECK_THAT(refusal("plain:toy_steps=2", "mute"), Catch::Contains("mute: it has no parameters of its own"));
+  CHECK(refusal({{"toy_steps", 9u}}) == "toy_steps: 9 is not within 1 .. 8");
+  CHECK(refusal({{"toy_bits", 31u}}) == "toy_bits: 31 is neither 30 nor 63");
+  CHECK(refusal({{"toy_order", "z"}}) == "toy_order: 'z' is neither x nor y");
+  CHECK(refusal({{"toy_share", std::numeric_limits<float>::quiet_NaN()}}) == "toy_share: nan is not within 0 .. 1");
+  CHECK(refusal({{"toy_steps", "many"}}) == "toy_steps: 'many' is not a whole number");
+  CHECK(refusal({{"toy_share", 1u}}) == "toy_share: '1' is not a number");
+  CHECK(refusal({{"toy_order", 2u}}) == "toy_order: '2' is not a word");
+  CHECK_THAT(refusal({{"toy_step", 2u}}), Catch::Contains("toy: ") && Catch::Contains("did you mean 'toy_steps'"));
+  CHECK_THAT(refusal({{"toy_steps", 2u}}, "mute"), Catch::Contains("mute: it has no parameters of its own"));
 }
 
 TEST_CASE("a structure that stands above others hands them on") {
   BuilderParameters below;
   below.below = "toy";
-  const toy::Seen under = built("two_level", "fancy:toy_steps=3", below);
+  CHECK(built("two_level", "plain", below).parameters == toy::Parameters{});
+  below.own = {{"toy_steps", 3u}};
+  const toy::Seen under = built("two_level", "fancy", below);
   CHECK(under.builder == "fancy");
   CHECK(under.parameters == toy::Parameters{.steps = 3});
-  CHECK(built("two_level", "plain", below).parameters == toy::Parameters{});
   below.below = "mute";
-  CHECK_THAT(error_of([&] { (void)built("two_level", "fancy:toy_steps=3", below); }),
+  CHECK_THAT(error_of([&] { (void)built("two_level", "fancy", below); }),
              Catch::Contains("mute: it has no parameters of its own"));
 }
 
@@ -186,7 +190,7 @@ TEST_CASE("a saved structure is found by its values") {
   const TriangleMesh mesh = random_triangles(8, 0.1f, 1);
   const BuildSettings plain{.builder = "fancy", .leaf = "triangle1", .parameters = {}};
   BuildSettings other = plain;
-  other.builder = "fancy:toy_steps=2";
+  other.parameters.own = {{"toy_steps", 2u}};
   CHECK(structure_file_name("toy", mesh, plain) != structure_file_name("toy", mesh, other));
 }
 

@@ -14,9 +14,9 @@
 #include "core/zero_area.h"
 #include "structures/archive.h"
 #include "structures/builders/builders.h"
-#include "structures/own_parameters.h"
 #include "structures/builders/phase_clock.h"
 #include "structures/leaves/leaf_names.h"
+#include "structures/own_parameters.h"
 
 namespace arboretum::two_level {
 namespace {
@@ -255,22 +255,21 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
     throw UserError(pair + "kernels do not know how a ray that was mapped goes through " + std::string(below.name) +
                     "; take " + std::string(bvh::Bvh8::kName));
   }
-  const std::string builder(builder_of(settings.builder));  // values behind it are of what is below
-  if (!has(below.builders, builder))
-    throw UserError(pair + std::string(below.name) + " has no builder " + builder + "; its first is " +
+  if (!has(below.builders, settings.builder))
+    throw UserError(pair + std::string(below.name) + " has no builder " + settings.builder + "; its first is " +
                     std::string(below.builders.front()));
   if (!has(below.leaves, settings.leaf))
     throw UserError(pair + std::string(below.name) + " has no leaf " + settings.leaf);
-  if (const std::string why = below.why_not_built(builder, settings.leaf); !why.empty()) throw UserError(pair + why);
+  if (const std::string why = below.why_not_built(settings.builder, settings.leaf); !why.empty())
+    throw UserError(pair + why);
 
   mesh_ = &mesh, below_ = settings.parameters.below, leaf_ = settings.leaf;
   prototypes_.clear(), placed_.clear();
 
   const auto add_prototype = [&](const TriangleMesh& prototype) {
     BuildReport one;
-    BuildSettings as_below = settings;
-    prototypes_.push_back(create_structure(*entry, as_below));
-    prototypes_.back()->build(prototype, as_below, one);
+    prototypes_.push_back(create_structure(*entry, settings.parameters));
+    prototypes_.back()->build(prototype, settings, one);
     for (const auto& [name, seconds] : one.phases) {
       const auto known = std::ranges::find(report.phases, name, &std::pair<std::string, double>::first);
       if (known == report.phases.end())
@@ -290,7 +289,7 @@ void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, Bu
   place([&](std::size_t i, const Bounds3f& box) { boxes.set(i, box); });
   clock.ends("instances");
   BuildSettings top = settings;
-  top.builder = has(binary_builder_names(), builder) ? builder : binary_builder_names().front();
+  if (!has(binary_builder_names(), top.builder)) top.builder = binary_builder_names().front();
   top.leaf = kTopLeaf, top.parameters.max_leaf_blocks = 1;
   top.parameters.duplication_budget = 0.0f;  // builders that split triangles must not (BoxMesh)
   BuildReport top_report;
