@@ -191,16 +191,19 @@ struct BoxLanes {
   /// The same as lanes, of which those from N on hold nothing.
   template <class Planes>
   ARBORETUM_INLINE vm<W> meets(const Planes& planes, F tnear, F tfar, F& entry) const {
+    return meets({planes(near_x), planes(near_y), planes(near_z)},
+                 {planes(near_x ^ kSide), planes(far(near_y, 2)), planes(far(near_z, 4))}, tnear, tfar, entry);
+  }
+  /// The same for the near and the far planes themselves.
+  ARBORETUM_INLINE vm<W> meets(const vf3<W>& near, const vf3<W>& far, F tnear, F tfar, F& entry) const {
     F nx, ny, nz, lx, ly, lz;
     if constexpr (kHasFma) {
-      nx = msub(planes(near_x), rx, fx), ny = msub(planes(near_y), ry, fy), nz = msub(planes(near_z), rz, fz);
+      nx = msub(near.x, rx, fx), ny = msub(near.y, ry, fy), nz = msub(near.z, rz, fz);
       const F hx = Padded ? gx : fx, hy = Padded ? gy : fy, hz = Padded ? gz : fz;
-      lx = msub(planes(near_x ^ kSide), rx, hx), ly = msub(planes(far(near_y, 2)), ry, hy),
-      lz = msub(planes(far(near_z, 4)), rz, hz);
+      lx = msub(far.x, rx, hx), ly = msub(far.y, ry, hy), lz = msub(far.z, rz, hz);
     } else {
-      nx = (planes(near_x) - fx) * rx, ny = (planes(near_y) - fy) * ry, nz = (planes(near_z) - fz) * rz;
-      lx = (planes(near_x ^ kSide) - gx) * rx, ly = (planes(far(near_y, 2)) - gy) * ry,
-      lz = (planes(far(near_z, 4)) - gz) * rz;
+      nx = (near.x - fx) * rx, ny = (near.y - fy) * ry, nz = (near.z - fz) * rz;
+      lx = (far.x - gx) * rx, ly = (far.y - gy) * ry, lz = (far.z - gz) * rz;
     }
     // Two levels instead of three. A NaN may take a neighbour's bound with it: the interval only grows.
     entry = max_x86(max_x86(nx, ny), max_x86(nz, tnear));

@@ -23,15 +23,10 @@ void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_ize_rows<N>(rows);
   add_queued_rows<bvh::Bvh<N>, BvhQueue<N>::template Of, typename BvhQueue<N>::Single>(rows, BatchLeaves{});
   add_packet_rows<bvh::Bvh<N>, BvhPacketFamily<SoaPacketNodes<N>>>(rows, BatchLeaves{});
-  // Scalar kernels are the reference, not a race: independent rays go alone. On SSE rays in flight pay beside streams
-  // where a node is one or two registers a plane.
-  constexpr bool kInFlightToo = kRegisterWidth == 4 && (N == 4 || N == 8);
-  using Incoherent = std::conditional_t<kRegisterWidth == 1, Single,
-                                        std::conditional_t<kInFlightToo, BvhStreamsOrQueue<N>, BvhStream<N>>>;
+  using Incoherent = IncoherentInStreams<SoaPacketNodes<N>, BvhQueue<N>::template Of, typename BvhQueue<N>::Single>;
   add_rows<bvh::Bvh<N>, AutoFunctions<BvhPacketFamily<SoaPacketNodes<N>>, BatchLeaves, Incoherent, Single>>(
       rows, "auto", BatchLeaves{});
-  add_stream_rows<N>(rows);
-  add_stream_list_rows<N>(rows);
+  add_stream_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -66,6 +66,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
   static constexpr bool kMoves = kBoxesMove<Format>;
   using Children = vf<kLanes>;
+  using Planes = typename PacketNode<Format>::Planes;
 
   struct Entry {
     bvh::NodeReference reference;
@@ -183,9 +184,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   /// Planes k of all children; where they move, as far out as they are for any ray of the packet.
   ARBORETUM_INLINE Children planes(const std::byte* node, unsigned k) const {
     if constexpr (kMoves) {
-      return Format::planes(node, k, times_.first, times_.last);
+      return Planes::planes(node, k, times_.first, times_.last);
     } else {
-      return Format::planes(node, k);
+      return Planes::planes(node, k);
     }
   }
 
@@ -207,9 +208,9 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   /// Where the W rays from k on meet plane `plane` of child i; `c`: their offsets for it.
   ARBORETUM_INLINE F distance(const std::byte* node, unsigned plane, int i, F r, const float* c, int k) const {
     if constexpr (kMoves) {
-      return Format::template distance<F>(node, plane, i, r, F::load(c + k), F::load(times_.of_ray + k));
+      return Planes::template distance<F>(node, plane, i, r, F::load(c + k), F::load(times_.of_ray + k));
     } else {
-      return Format::template distance<F>(node, plane, i, r, F::load(c + k));
+      return Planes::template distance<F>(node, plane, i, r, F::load(c + k));
     }
   }
 
@@ -281,6 +282,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
           goto pop;
         }
         const std::byte* node = base_ + bvh::offset_of(e.reference);
+        const PacketNode<Format> read(node);
         alignas(64) float t[kLanes];
         unsigned hit;
         if constexpr (Mixed) {
@@ -288,7 +290,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
         } else {
           Children entry;
           if (__builtin_expect(interval.usable, 1)) {
-            hit = children_met(interval, node, tfar, entry);
+            hit = children_met(interval, read.planes, tfar, entry);
           } else {
             entry = Children(interval.tnear);
             hit = (1u << Format::boxes(node)) - 1u;
@@ -300,10 +302,11 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
         [[maybe_unused]] const unsigned tested = hit;
         for (; hit; hit &= hit - 1) {
           const int i = __builtin_ctz(hit);
-          const Mask mask = Mixed ? mixed_rays_met(node, i, e.mask, t[i]) : rays_met(interval.near, node, i, e.mask);
+          const Mask mask =
+              Mixed ? mixed_rays_met(read.planes, i, e.mask, t[i]) : rays_met(interval.near, read.planes, i, e.mask);
           if (mask == 0) continue;
           met.add(mask);
-          const bvh::NodeReference child = Format::child(node, i);
+          const bvh::NodeReference child = Format::children(node)[i * Format::kStride];
           prefetch_lines<kPrefetchLines>(base_ + bvh::offset_of(child));
           Entry* p = top++;
           if constexpr (!AnyHit) {

@@ -1,4 +1,4 @@
-// How packets read nodes, and how one of their rays goes on alone.
+// How packets and streams read nodes, and how one of a packet's rays goes on alone.
 #pragma once
 
 #include "structures/bvh/bvh_single.h"
@@ -7,11 +7,13 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// How packets read the nodes of bvh::SoaNodes<N>: planes k = 2 * axis + side, side 0 lower and 1 upper, of all
-/// children; where rays meet that of child i, as their own box test computes it.
+/// How packets and streams read the nodes of bvh::SoaNodes<N>: planes k = 2 * axis + side, side 0 lower and 1 upper, of
+/// all children; where rays meet that of child i, as their own box test computes it; references, child i's at
+/// children()[i * kStride].
 template <int N>
 struct SoaPacketNodes {
-  static constexpr int kBranching = N, kLanes = lanes_for(N);
+  static constexpr int kBranching = N, kLanes = lanes_for(N), kStride = 1;
+  static constexpr std::size_t kBytes = sizeof(bvh::Node<N>);
   template <bool Padded>
   using Single = SoaNodeTest<N, Padded>;
 
@@ -24,10 +26,48 @@ struct SoaPacketNodes {
     std::memcpy(&p, node + (k * N + unsigned(i)) * sizeof(float), sizeof p);
     return plane_distance(F(p), r, c);
   }
-  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) {
-    return Single<true>::children(node)[i];
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return Single<true>::children(node);
   }
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
+};
+
+/// Six planes of all children of a node in registers, in the order of `side`, which says of each its k; for streams.
+template <class Format>
+struct NodePlanes {
+  using F = vf<Format::kLanes>;
+  static constexpr bool kMoves = kBoxesMove<Format>;
+  F plane[6], motion[kMoves ? 6 : 1];
+
+  ARBORETUM_INLINE NodePlanes(const std::byte* node, const unsigned (&side)[6]) {
+    for (int i = 0; i < 6; ++i) {
+      plane[i] = Format::planes(node, side[i]);
+      if constexpr (kMoves) motion[i] = Format::motion(node, side[i]);
+    }
+  }
+  /// The i-th for a ray of that time, where boxes move.
+  ARBORETUM_INLINE F of(unsigned i, [[maybe_unused]] float time) const {
+    if constexpr (kMoves) return madd(motion[i], F(time), plane[i]);
+    return plane[i];
+  }
+};
+
+/// What a packet reads of a node's planes: the node itself, or, for formats whose planes are decoded once for all rays
+/// (`Format::Decoded` says how those are read), these.
+template <class Format>
+struct PacketNode {
+  using Planes = Format;
+  const std::byte* planes;
+  ARBORETUM_INLINE explicit PacketNode(const std::byte* node) : planes(node) {}
+};
+template <class Format>
+requires requires { typename Format::Decoded; }
+struct PacketNode<Format> {
+  using Planes = typename Format::Decoded;
+  alignas(64) std::byte planes[6 * Format::kBranching * sizeof(float)];
+  ARBORETUM_INLINE explicit PacketNode(const std::byte* node) {
+    for (unsigned k = 0; k < 6; ++k) Format::planes(node, k).store(planes + k * Format::kBranching * sizeof(float));
+  }
 };
 
 /// One ray through what hangs below `root`, with what it has met already; `box`, `first` and, where boxes move, `time`

@@ -36,19 +36,6 @@ ARBORETUM_INLINE void push_in_scalars(const bvh::NodeReference* child, const std
   }
 }
 
-#if ARBORETUM_TARGET != ARBORETUM_TARGET_SCALAR
-/// W references in a register, or two.
-template <int Stride, int W>
-ARBORETUM_INLINE vi<W> references(const bvh::NodeReference* child) {
-  if constexpr (Stride == 1) {
-    return vi<W>::load(child);
-  } else {
-    static_assert(W == 4);
-    return vi<4>(_mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride])));
-  }
-}
-#endif
-
 #if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
 /// Four entries, the largest first. Positive doubles order as their bits do, and no distance of a float is a double's
 /// NaN.
@@ -232,29 +219,27 @@ struct BvhNodeQueue {
   using Of = QueuedRays<BvhNodeWalk<Nodes<Padded>, Leaves, AnyHit>>;
 };
 
-/// Nodes of bvh::SoaNodes<N>: of a ray its constants alone are kept, from which a step makes their test anew, in
+/// Of a ray its constants alone are kept, from which a step makes its `Test` of nodes (bvh_single.h) anew, in
 /// registers.
-template <int N, bool Padded>
-struct SoaNodeConstants {
-  static constexpr int W = lanes_for(N), kStride = 1;
-  static constexpr std::size_t kBytes = sizeof(bvh::Node<N>);
+template <class Test, int N, bool Padded>
+struct NodeConstants {
+  static constexpr int W = Test::W, kStride = Test::kStride;
+  static constexpr std::size_t kBytes = Test::kBytes;
   BoxRay<N, Padded> box;
   float first, last;
 
-  ARBORETUM_INLINE SoaNodeConstants(const Ray& ray, float max_coordinate)
+  ARBORETUM_INLINE NodeConstants(const Ray& ray, float max_coordinate)
       : box(ray, max_coordinate), first(first_distance(ray)), last(ray.tfar) {}
   ARBORETUM_INLINE unsigned test(const std::byte* node, vf<W>& entry) const {
-    return BoxLanes<N, Padded>(box).test(node, vf<W>(first), vf<W>(last), entry);
+    return Test(box, first, last).test(node, entry);
   }
   ARBORETUM_INLINE void shorten(float t) { last = t; }
-  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
-    return SoaNodeTest<N, Padded>::children(node);
-  }
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) { return Test::children(node); }
 };
 template <int N>
 struct SoaConstants {
   template <bool Padded>
-  using Nodes = SoaNodeConstants<N, Padded>;
+  using Nodes = NodeConstants<SoaNodeTest<N, Padded>, N, Padded>;
 };
 
 /// Of the wide BVHs.
@@ -262,11 +247,6 @@ template <int N>
 struct BvhQueue : BvhNodeQueue<SoaConstants<N>::template Nodes> {
   using Single = typename BvhSingle<SoaTests<N>::template Nodes>::Functions;
 };
-
-/// How `auto` traces rays that share little: as rays in flight where N boxes are no more than a register
-/// (docs/performance.md), else alone.
-template <template <class, bool, bool> class Queue, class Single, int N>
-using IncoherentInFlight = std::conditional_t<(kRegisterWidth >= N), QueuedFunctions<Queue, Single, 32, 64>, Single>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -49,6 +49,7 @@ template <class Leaves>
 template <int N, bool Padded>
 struct SoaNodeTest {
   static constexpr int W = lanes_for(N), kSlots = W, kStride = 1;
+  static constexpr std::size_t kBytes = sizeof(bvh::Node<N>);
   using F = vf<W>;
   BoxLanes<N, Padded> box;
   F tnear, tfar;

@@ -12,7 +12,7 @@
 // not have alone; it finds the same hit, since a box is dropped only where it begins beyond the nearest hit.
 #pragma once
 
-#include "structures/bvh/bvh_single.h"
+#include "structures/bvh/bvh_packet_nodes.h"
 #include "structures/bvh/stream_stack.h"
 #include "traversal/box_rays.h"
 #include "traversal/kernel_rows.h"
@@ -25,16 +25,20 @@ inline constexpr std::string_view kStreamSorted = "stream_sorted";
 /// Groups that take turns (docs/performance.md).
 inline constexpr unsigned kGroupsInTurn = 12;
 
-template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
+/// `Format`: how nodes are read (bvh_packet_nodes.h).
+template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
 class Stream {
+  static constexpr int N = Format::kBranching;
+
  public:
   /// Where somebody asks how its rays share (bvh_streams_or_queue.h).
   static constexpr bool kCountsTurns = kRegisterWidth == 4;
 
   /// 1 to 2^31 rays.
   Stream(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
-      : base_(tree.base()), root_(tree.root()), pad_{tree.max_coordinate(), Padded && row.tests->depth_between_corners},
-        leaves_(row, tree.vertices()), form_(*row.tests->form), counting_(counting), rays_(rays),
+      : base_(tree.base()),
+        root_(tree.root()), pad_{tree.max_coordinate(), Padded && !kMoves && row.tests->depth_between_corners},
+        leaves_(leaves_of<Leaves>(tree, row)), form_(*row.tests->form), counting_(counting), rays_(rays),
         order_(row.traversal == kStreamSorted ? ray_order(rays) : std::vector<std::uint32_t>()),
         count_(unsigned(std::min(std::size_t{kGroupsInTurn}, rays.size()))), stack_entries_(tree.stack_entries()),
         stacks_(std::make_unique_for_overwrite<std::uint32_t[]>(count_ * StreamStack::words(stack_entries_))),
@@ -71,16 +75,19 @@ class Stream {
  private:
   static constexpr unsigned kRays = BoxRays::kMost;
   /// of a node, or of a leaf's first block, wherever they begin
-  static constexpr int kLines = lines_of(std::max(sizeof(bvh::Node<N>), Leaves::kBytesAhead));
-  using Test = SoaNodeTest<N, Padded>;
+  static constexpr int kLines = lines_of(std::max(Format::kBytes, Leaves::kBytesAhead));
   using Box = BoxRay<N, Padded>;
-  static constexpr int W = Test::W;
+  static constexpr int W = Format::kLanes;
   using F = vf<W>;
 
   /// The far planes' offsets are not the near ones'.
   static constexpr bool kTwoOffsets = Padded || !kHasFma;
+  /// Planes that move are rounded by more than pads that are tight along the ray stand.
+  static constexpr bool kMoves = kBoxesMove<Format>;
   /// What nodes need of a ray, in one cache line: BoxRay's r, the distance from which boxes count, the near planes'
-  /// offsets and the far ones'; where these are the same there is room for the ray.
+  /// offsets and the far ones', and, where boxes move, the ray's time; where the offsets are the same there is room for
+  /// the ray.
+  static constexpr int kTime = kTwoOffsets ? 11 : 7;
   struct alignas(64) Constants {
     float number[12];
   };
@@ -147,12 +154,14 @@ class Stream {
     lanes_.template prepare<kNativeWidth, N>(count, ray_at, Padded, pad_, [](int) {});
     for (int k = 0; k < count; k += 4) gather(g, k);
     for (int i = 0; i < count; ++i) {
+      [[maybe_unused]] const float time = rays_.time(list[i]);
+      if constexpr (kMoves) g.line[i].number[kTime] = within_frames(time);
       g.index[i] = list[i], ray(g, unsigned(i)) = ray_at(i);
       g.best[i] = NearestHit{lanes_.t[i]};
       if constexpr (kKeepsData) {
         if (lanes_.valid >> i & 1u)
           new (static_cast<void*>(g.data + std::size_t(i) * sizeof(RayData)))
-              std::remove_const_t<RayData>(leaves_.prepare(ray_at(i)));
+              std::remove_const_t<RayData>(prepare_at(leaves_, ray_at(i), time));
       }
     }
     for (int k = 0; k < count; k += kNativeWidth)
@@ -222,12 +231,11 @@ class Stream {
 
   ARBORETUM_INLINE void node(Group& g, bvh::NodeReference target, std::uint64_t rays) {
     constexpr unsigned kSide = Box::kSide;
-    [[maybe_unused]] constexpr unsigned kChildren = (1u << N) - 1u;
+    [[maybe_unused]] constexpr unsigned kChildren = (1u << N) - 1u, kSlots = Format::template Single<Padded>::kSlots;
     const std::byte* const node = base_ + bvh::offset_of(target);
-    const unsigned x = (g.octant & 1u) * kSide, y = (2 + (g.octant >> 1 & 1u)) * kSide,
-                   z = (4 + (g.octant >> 2)) * kSide;
-    const F planes[6] = {F::load(node + x),           F::load(node + (x ^ kSide)), F::load(node + y),
-                         F::load(node + (y ^ kSide)), F::load(node + z),           F::load(node + (z ^ kSide))};
+    const unsigned x = g.octant & 1u, y = 2 + (g.octant >> 1 & 1u), z = 4 + (g.octant >> 2);
+    const unsigned side[6] = {x, x ^ 1u, y, y ^ 1u, z, z ^ 1u};
+    const NodePlanes<Format> planes(node, side);
     MetChildren<N, AnyHit> met;
     for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
       const unsigned i = unsigned(__builtin_ctzll(rest));
@@ -235,18 +243,19 @@ class Stream {
       BoxLanes<N, Padded> box(Box({c[0], c[1], c[2]}, {f[0], f[1], f[2]}, {far[0], far[1], far[2]}));
       box.near_x = 0, box.near_y = 2 * kSide, box.near_z = 4 * kSide;
       F entry;
-      const vm<W> meets = box.meets([&](unsigned offset) { return planes[offset / kSide]; }, F(c[3]), F(g.t[i]), entry);
+      const vm<W> meets =
+          box.meets([&](unsigned offset) { return planes.of(offset / kSide, c[kTime]); }, F(c[3]), F(g.t[i]), entry);
       met.add(i, meets, entry);
       if constexpr (Counting::kCounting)
-        counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(meets.bits() & kChildren)));
+        counting_.node(Format::boxes(node), kSlots, unsigned(__builtin_popcount(meets.bits() & kChildren)));
     }
     if constexpr (Counting::kCounting) {
       const auto count = unsigned(__builtin_popcountll(rays));
       counting_.share_node(count);
-      counting_.at_depth(g.depths.current(), count * Test::kSlots, count * Test::boxes(node));
+      counting_.at_depth(g.depths.current(), count * kSlots, count * Format::boxes(node));
     }
     const unsigned first = g.top;
-    g.top = met.push(g.stack, first, Test::children(node), rays);
+    g.top = met.template push<Format::kStride>(g.stack, first, Format::children(node), rays);
     g.depths.push(first, g.top);
   }
 
@@ -288,8 +297,8 @@ class Stream {
   BoxRays lanes_;
 };
 
-/// Of a kind of stream, `Streams<N, Leaves, Padded, AnyHit, Counting>`, the functions of the kernel table.
-template <template <int, class, bool, bool, class> class Streams, int N>
+/// Of a kind of stream, `Streams<Format, Leaves, Padded, AnyHit, Counting>`, the functions of the kernel table.
+template <template <class, class, bool, bool, class> class Streams, class Format>
 struct StreamFunctions {
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
@@ -319,24 +328,14 @@ struct StreamFunctions {
                                      const Report& report) {
     constexpr std::size_t kAtOnce = std::size_t{1} << 31;  // a group numbers its rays in 32 bits
     for (std::size_t begin = 0; begin < rays.size(); begin += kAtOnce) {
-      Streams<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row,
-                                                          rays.part(begin, std::min(kAtOnce, rays.size() - begin)),
-                                                          Counting(counters));
+      Streams<Format, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::BvhBase&>(a), row,
+                                                               rays.part(begin, std::min(kAtOnce, rays.size() - begin)),
+                                                               Counting(counters));
       stream.run([&](std::size_t i, const NearestHit& best) { report(begin + i, best); });
     }
     if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_streams += rays.size();
   }
 };
-
-template <int N>
-using BvhStream = StreamFunctions<Stream, N>;
-
-/// `stream` takes the rays as they come, `stream_sorted` by octant and origin.
-template <int N>
-void add_stream_rows(KernelRows& rows) {
-  add_rows<bvh::Bvh<N>, BvhStream<N>>(rows, "stream", BatchLeaves{});
-  add_rows<bvh::Bvh<N>, BvhStream<N>>(rows, kStreamSorted, BatchLeaves{});
-}
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

@@ -24,16 +24,19 @@ namespace ARBORETUM_ISA_NAMESPACE {
 inline constexpr std::size_t kStreamRays = 1024;
 inline constexpr unsigned kFewRays = 4;
 
-template <int N, class Leaves, bool Padded, bool AnyHit, class Counting>
+/// `Format`: how nodes are read (bvh_packet_nodes.h).
+template <class Format, class Leaves, bool Padded, bool AnyHit, class Counting>
 class StreamLists {
+  static constexpr int N = Format::kBranching;
+
  public:
   /// There is at least one ray.
   StreamLists(const bvh::BvhBase& tree, const KernelRow& row, RayBatch rays, Counting counting)
-      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()), leaves_(row, tree.vertices()),
-        form_(*row.tests->form), counting_(counting), rays_(rays), group_(unsigned(std::min(kStreamRays, rays.size()))),
-        lists_(tree.stack_entries()), entries_(4 * group_), children_(std::size_t(N + 1) * group_),
-        stack_(tree.stack_entries()), room_(group_ * (sizeof(State) + sizeof(LeafState))),
-        states_(reinterpret_cast<State*>(room_.data())),
+      : base_(tree.base()), root_(tree.root()), max_coordinate_(tree.max_coordinate()),
+        leaves_(leaves_of<Leaves>(tree, row)), form_(*row.tests->form), counting_(counting), rays_(rays),
+        group_(unsigned(std::min(kStreamRays, rays.size()))), lists_(tree.stack_entries()), entries_(4 * group_),
+        children_(std::size_t(N + 1) * group_), stack_(tree.stack_entries()),
+        room_(group_ * (sizeof(State) + sizeof(LeafState))), states_(reinterpret_cast<State*>(room_.data())),
         leaf_states_(reinterpret_cast<LeafState*>(room_.data() + group_ * sizeof(State))) {}
 
   /// report(index of the ray, its nearest hit): any hit has a primitive where something was hit.
@@ -44,9 +47,10 @@ class StreamLists {
   }
 
  private:
-  using Test = SoaNodeTest<N, Padded>;
+  using Test = typename Format::template Single<Padded>;
+  static constexpr bool kMoves = kBoxesMove<Format>;
   using Box = BoxRay<N, Padded>;
-  static constexpr int W = Test::W;
+  static constexpr int W = Format::kLanes;
   using F = vf<W>;
 
   /// What nodes need of a ray: a cache line.
@@ -55,6 +59,7 @@ class StreamLists {
     float first;          ///< distance from which boxes count
     float nearest;        ///< beyond which they do not; -inf when the search is over
     std::uint32_t place;  ///< in the group
+    float time;           ///< where boxes move
   };
   static_assert(sizeof(State) == 64);
   /// What leaves need.
@@ -62,8 +67,8 @@ class StreamLists {
     NearestHit best;
     float tnear;
     typename Leaves::RayData data;
-    ARBORETUM_INLINE LeafState(const Ray& ray, const Leaves& leaves)
-        : best{ray.tfar}, tnear(ray.tnear), data(leaves.prepare(ray)) {}
+    ARBORETUM_INLINE LeafState(const Ray& ray, float time, const Leaves& leaves)
+        : best{ray.tfar}, tnear(ray.tnear), data(prepare_at(leaves, ray, time)) {}
   };
   /// Rays that are to visit a node or leaf: entries_[begin ...], the key of each the distance at which it enters.
   struct List {
@@ -81,9 +86,10 @@ class StreamLists {
         report(i, NearestHit{ray.tfar});
         continue;
       }
-      State& s = *new (&states_[rays])
-                     State{Box(ray, max_coordinate_), first_distance(ray), ray.tfar, std::uint32_t(i - begin)};
-      new (&leaf_states_[rays++]) LeafState(ray, leaves_);
+      const float time = rays_.time(i);
+      State& s = *new (&states_[rays]) State{Box(ray, max_coordinate_), first_distance(ray), ray.tfar,
+                                             std::uint32_t(i - begin), kMoves ? within_frames(time) : 0.0f};
+      new (&leaf_states_[rays++]) LeafState(ray, time, leaves_);
       ++of_octant[s.box.octant];
       direction[s.box.octant] = direction[s.box.octant] + ray.direction;
     }
@@ -104,8 +110,8 @@ class StreamLists {
   /// Everything that the rays of `root` meet. They have the same octant. Entries from `free` on are unused.
   void octant(const List& root, Vec3f direction, unsigned free) {
     const Box& box = states_[ray_of(entries_[root.begin])].box;
-    const unsigned x = box.near_x(), y = box.near_y(), z = box.near_z();
-    const unsigned near[6] = {x, x ^ Box::kSide, y, 5 * Box::kSide - y, z, 9 * Box::kSide - z};
+    const unsigned x = box.octant & 1u, y = 2 + (box.octant >> 1 & 1u), z = 4 + (box.octant >> 2);
+    const unsigned sides[6] = {x, x ^ 1u, y, y ^ 1u, z, z ^ 1u};
     List* const bottom = lists_.data();
     List* top = bottom;
     *top++ = root;
@@ -121,7 +127,7 @@ class StreamLists {
         leaf(list);
       } else {
         List* const first = top;
-        node(list, near, direction, list.begin < free ? free : list.begin, top, depths.current());
+        node(list, sides, direction, list.begin < free ? free : list.begin, top, depths.current());
         depths.push(first - bottom, top - bottom);
       }
     }
@@ -145,8 +151,7 @@ class StreamLists {
   void node(const List& list, const unsigned (&side)[6], Vec3f direction, unsigned free, List*& top,
             typename Counting::Depth depth) {
     const std::byte* const node = base_ + bvh::offset_of(list.target);
-    const F planes[6] = {F::load(node + side[0]), F::load(node + side[1]), F::load(node + side[2]),
-                         F::load(node + side[3]), F::load(node + side[4]), F::load(node + side[5])};
+    const NodePlanes<Format> planes(node, side);
     StackEntry* tail[N + 1];
     for (int i = 0; i <= N; ++i) tail[i] = children_.data() + std::size_t(i) * group_;
     alignas(64) std::uint32_t key[W + 1];
@@ -157,10 +162,10 @@ class StreamLists {
       BoxLanes<N, Padded> box(s.box);
       box.near_x = 0, box.near_y = 2 * Box::kSide, box.near_z = 4 * Box::kSide;
       F entry;
-      unsigned hit = box.test_planes([&](unsigned offset) { return planes[offset / Box::kSide]; }, F(s.first),
-                                     F(s.nearest), entry);
+      unsigned hit = box.test_planes([&](unsigned offset) { return planes.of(offset / Box::kSide, s.time); },
+                                     F(s.first), F(s.nearest), entry);
       if constexpr (Counting::kCounting)
-        counting_.node(Test::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
+        counting_.node(Format::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
       entry.store(key);
       // Two without a branch, which most rays need no more than; what is not there goes to the list behind the last.
       const auto append = [&] {
@@ -174,9 +179,9 @@ class StreamLists {
     }
     if constexpr (Counting::kCounting) {
       counting_.share_node(list.count);
-      counting_.at_depth(depth, list.count * Test::kSlots, list.count * Test::boxes(node));
+      counting_.at_depth(depth, list.count * Test::kSlots, list.count * Format::boxes(node));
     }
-    push(node, planes, tail, direction, free, top);
+    push(node, planes.plane, tail, direction, free, top);
   }
 
   /// The children's lists onto the stack, the nearest on top.
@@ -186,7 +191,7 @@ class StreamLists {
     ((planes[0] + planes[1]) * F(direction.x) + (planes[2] + planes[3]) * F(direction.y) +
      (planes[4] + planes[5]) * F(direction.z))
         .store(along);
-    const bvh::NodeReference* const child = Test::children(node);
+    const bvh::NodeReference* const child = Format::children(node);
     unsigned order[N], children = 0;
     std::size_t total = 0;
     for (unsigned i = 0; i < unsigned(N); ++i) {
@@ -200,11 +205,12 @@ class StreamLists {
     if (entries_.size() < free + total) entries_.resize(2 * (free + total));
     for (unsigned k = 0; k < children; ++k) {
       const unsigned i = order[k];
-      prefetch_lines<kPrefetchLines>(base_ + bvh::offset_of(child[i]));
+      const bvh::NodeReference reference = child[i * unsigned(Format::kStride)];
+      prefetch_lines<kPrefetchLines>(base_ + bvh::offset_of(reference));
       const StackEntry* const from = children_.data() + std::size_t(i) * group_;
       const auto count = unsigned(tail[i] - from);
       std::copy(from, from + count, entries_.data() + free);
-      *top++ = {child[i], free, count};
+      *top++ = {reference, free, count};
       free += count;
     }
   }
@@ -236,7 +242,13 @@ class StreamLists {
   /// One ray from `target` on.
   void alone(unsigned ray, bvh::NodeReference target, typename Counting::Depth depth) {
     State& s = states_[ray];
-    Test nodes(s.box, s.first, s.nearest);
+    auto nodes = [&] {
+      if constexpr (kMoves) {
+        return Test(s.box, s.first, s.nearest, s.time);
+      } else {
+        return Test(s.box, s.first, s.nearest);
+      }
+    }();
     walk_bvh<AnyHit>(
         base_, target, nodes, stack_.data(), leaf_states_[ray].best.t, counting_,
         [&](bvh::NodeReference reference) {
@@ -270,9 +282,15 @@ using StreamListLeaves =
                        std::conditional_t<kRegisterWidth == 4, TypeList<CompiledLeaves<EdgeBlock<4>, MollerTrumbore>>,
                                           TypeList<CompiledLeaves<EdgeBlock<8>, MollerTrumbore>>>>;
 
-template <int N>
-void add_stream_list_rows(KernelRows& rows) {
-  add_rows<bvh::Bvh<N>, StreamFunctions<StreamLists, N>>(rows, "stream_lists", StreamListLeaves{});
+/// `stream` takes the rays as they come, `stream_sorted` by octant and origin. `One` and `Lists`: Stream and
+/// StreamLists, or these with leaves of their own.
+template <class Structure, class Format, class Compiled = BatchLeaves, class CompiledLists = StreamListLeaves,
+          template <class, class, bool, bool, class> class One = Stream,
+          template <class, class, bool, bool, class> class Lists = StreamLists>
+void add_stream_rows(KernelRows& rows) {
+  add_rows<Structure, StreamFunctions<One, Format>>(rows, "stream", Compiled{});
+  add_rows<Structure, StreamFunctions<One, Format>>(rows, kStreamSorted, Compiled{});
+  add_rows<Structure, StreamFunctions<Lists, Format>>(rows, "stream_lists", CompiledLists{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -12,22 +12,25 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-template <int N>
+/// `Streams` and `Format`: as StreamFunctions takes them; `Queue` and `Single`: rays in flight
+/// (traversal/queued_functions.h).
+template <template <class, class, bool, bool, class> class Streams, class Format,
+          template <class, bool, bool> class Queue, class Single>
 class BvhStreamsOrQueue {
   /// So many rays as a stream show how they share; then so many go the one way or the other until it is asked again,
   /// each time that the answer is the same twice as many, and so many at most.
   static constexpr std::size_t kProbe = 4096, kThen = 8 * kProbe, kMost = 8 * kThen;
   static constexpr float kShared = 4.5f;
-  using Queue = QueuedFunctions<BvhQueue<N>::template Of, typename BvhQueue<N>::Single, 32, 64>;
+  using Queued = QueuedFunctions<Queue, Single, 32, 64>;
 
  public:
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
-    return functions<Leaves, Padded, NoCounters, &Queue::template timed<Leaves, Padded>>();
+    return functions<Leaves, Padded, NoCounters, &Queued::template timed<Leaves, Padded>>();
   }
   template <bool Padded>
   static RowFunctions counting() {
-    return functions<CalledLeaves, Padded, WithCounters, &Queue::template counting<Padded>>();
+    return functions<CalledLeaves, Padded, WithCounters, &Queued::template counting<Padded>>();
   }
 
  private:
@@ -63,8 +66,8 @@ class BvhStreamsOrQueue {
 
   /// Calls streams(begin, count), which returns how many rays took a turn together, and queue(begin, count), until all
   /// rays are done.
-  template <class Streams, class InFlight>
-  static void run(const RayBatch& rays, const Streams& streams, const InFlight& queue) {
+  template <class InStreams, class InFlight>
+  static void run(const RayBatch& rays, const InStreams& streams, const InFlight& queue) {
     bool shared = false;
     for (std::size_t begin = 0, then = kThen / 2; begin < rays.size();) {
       const std::size_t in_stream = std::min(shared ? then : kProbe, rays.size() - begin);
@@ -81,13 +84,23 @@ class BvhStreamsOrQueue {
   template <class Leaves, bool Padded, bool AnyHit, class Counting, class Report>
   static ARBORETUM_INLINE float stream(const Accel& a, const KernelRow& row, RayBatch rays, Counters* counters,
                                        const Report& report) {
-    Stream<N, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::Bvh<N>&>(a), row, rays,
-                                                       Counting(counters));
+    Streams<Format, Leaves, Padded, AnyHit, Counting> stream(static_cast<const bvh::BvhBase&>(a), row, rays,
+                                                             Counting(counters));
     stream.run(report);
     if constexpr (Counting::kCounting) counters->rays += rays.size(), counters->rays_in_streams += rays.size();
     return stream.rays_a_turn();
   }
 };
+
+/// How `auto` traces rays that share little; arguments as those of BvhStreamsOrQueue. Scalar kernels are the reference,
+/// not a race: independent rays go alone. On SSE rays in flight pay beside streams where a node is one or two registers
+/// a plane.
+template <class Format, template <class, bool, bool> class Queue, class Single,
+          template <class, class, bool, bool, class> class Streams = Stream>
+using IncoherentInStreams = std::conditional_t<
+    kRegisterWidth == 1, Single,
+    std::conditional_t<kRegisterWidth == 4 && (Format::kBranching == 4 || Format::kBranching == 8),
+                       BvhStreamsOrQueue<Streams, Format, Queue, Single>, StreamFunctions<Streams, Format>>>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

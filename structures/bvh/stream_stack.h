@@ -4,7 +4,7 @@
 
 #include "simd/lane_order.h"
 #include "simd/swizzle.h"
-#include "structures/bvh/bvh.h"
+#include "structures/bvh/traversal_stack.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -50,12 +50,13 @@ class MetChildrenInLanes {
   }
 
   /// The children that some ray met go onto the stack, whose first `begin` entries stay: the nearest on top, for any
-  /// hit as they stand in the node. Returns the new number of entries.
+  /// hit as they stand in the node. Returns the new number of entries. Child i's reference is child[i * Stride].
+  template <int Stride>
   ARBORETUM_INLINE unsigned push(const StreamStack& stack, unsigned begin, const bvh::NodeReference* child,
                                  std::uint64_t /*rays*/) const {
     const unsigned met = ~((low_ | high_) == vi<W>(0)).bits() & ((1u << N) - 1u),
                    count = unsigned(__builtin_popcount(met));
-    const vi<W> children = vi<W>::load(child);
+    const vi<W> children = references<Stride, W>(child);
     if constexpr (AnyHit) {
       compress(met, low_).store(stack.low + begin), compress(met, high_).store(stack.high + begin),
           compress(met, children).store(stack.target + begin);
@@ -99,14 +100,15 @@ class MetChildrenInBytes {
     if constexpr (!AnyHit) least_ = select(meets, min_x86(entry, least_), least_);
   }
 
+  template <int Stride>
   ARBORETUM_INLINE unsigned push(const StreamStack& stack, unsigned begin, const bvh::NodeReference* child,
                                  std::uint64_t rays) const {
     const SixtyFourBytes bytes[2] = {SixtyFourBytes(of_ray_[0]), SixtyFourBytes(of_ray_[kBytes - 1])};
     unsigned top = begin;
     const auto put = [&](unsigned i, float t) {
       const std::uint64_t met = bytes[i >> 3].with_bit(int(i & 7u)) & rays;
-      stack.low[top] = std::uint32_t(met), stack.high[top] = std::uint32_t(met >> 32), stack.target[top] = child[i],
-      stack.t[top] = t;
+      stack.low[top] = std::uint32_t(met), stack.high[top] = std::uint32_t(met >> 32),
+      stack.target[top] = child[i * unsigned(Stride)], stack.t[top] = t;
       ++top;
     };
     if constexpr (AnyHit) {

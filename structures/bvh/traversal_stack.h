@@ -76,6 +76,19 @@ ARBORETUM_INLINE bvh::NodeReference push_unordered(const std::byte* base, const 
   return child[__builtin_ctz(hit) * Stride];
 }
 
+#if ARBORETUM_TARGET != ARBORETUM_TARGET_SCALAR
+/// The references of W children, which lie `Stride` places apart, in a register, or two.
+template <int Stride, int W>
+ARBORETUM_INLINE vi<W> references(const bvh::NodeReference* child) {
+  if constexpr (Stride == 1) {
+    return vi<W>::load(child);
+  } else {
+    static_assert(W == 4);
+    return vi<4>(_mm_setr_epi32(int(child[0]), int(child[Stride]), int(child[2 * Stride]), int(child[3 * Stride])));
+  }
+}
+#endif
+
 using TraversalStack = BatchStack<StackEntry, 1024>;
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

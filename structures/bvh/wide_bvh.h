@@ -127,7 +127,6 @@ const StructureInfo& WideBvh<Format>::static_info() {
     i.builders = binary_builder_names();
     i.leaves = all_leaf_names();
     i.can_refit = true;
-    if constexpr (requires { Format::kNoStreams; }) i.no_streams = Format::kNoStreams;
     return i;
   }();
   return info;

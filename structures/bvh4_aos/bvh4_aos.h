@@ -25,9 +25,6 @@ struct AosNodes {
   static constexpr std::string_view kName = "bvh4_aos";
   static constexpr std::string_view kSummary =
       "4-wide bounding volume hierarchy, child boxes as array of structures (Xeon Phi's node: 16 lanes as 4 boxes)";
-  static constexpr std::string_view kNoStreams =
-      "not built: a stream keeps a node's planes in registers, each plane of all children in one, for all its rays; "
-      "here a register holds whole boxes beside the ray's own interval";
   static constexpr std::size_t kGranule = 64;
   using Node = bvh4_aos::Node;
 

@@ -12,6 +12,9 @@
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_single.h"
+#include "structures/bvh/bvh_stream.h"
+#include "structures/bvh/bvh_stream_lists.h"
+#include "structures/bvh/bvh_streams_or_queue.h"
 #include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
 #include "traversal/packet_rows.h"
@@ -72,9 +75,10 @@ struct AosNodeTest {
   }
 };
 
-/// How packets read a node (structures/bvh/bvh_packet_nodes.h).
+/// How packets and streams read a node (structures/bvh/bvh_packet_nodes.h).
 struct AosPacketNodes {
-  static constexpr int kBranching = 4, kLanes = 4;
+  static constexpr int kBranching = 4, kLanes = 4, kStride = 4;
+  static constexpr std::size_t kBytes = sizeof(bvh4_aos::Node);
   template <bool Padded>
   using Single = AosNodeTest<Padded>;
 
@@ -90,8 +94,8 @@ struct AosPacketNodes {
   static ARBORETUM_INLINE vf<4> planes(const std::byte* node, unsigned k) {
     return four(plane(node, k, 0), plane(node, k, 1), plane(node, k, 2), plane(node, k, 3));
   }
-  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) {
-    return Single<true>::children(node)[4 * i];
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return Single<true>::children(node);
   }
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
@@ -105,8 +109,9 @@ inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows)
   add_rows<Structure, Single>(rows, "single", ConcatLists<UsualLeaves, AosLeaves>{});
   add_queued_rows<Structure, BvhNodeQueue<AosNodeTest>::Of, Single>(rows, BatchLeaves{});
   add_packet_rows<Structure, Packets>(rows, TypeList<>{});
-  using Incoherent = IncoherentInFlight<BvhNodeQueue<AosNodeTest>::Of, Single, 4>;
-  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single, false>>(rows, "auto", BatchLeaves{});
+  using Incoherent = IncoherentInStreams<AosPacketNodes, BvhNodeQueue<AosNodeTest>::Of, Single>;
+  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single>>(rows, "auto", BatchLeaves{});
+  add_stream_rows<Structure, AosPacketNodes>(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -157,9 +157,6 @@ const StructureInfo& Bvh4Motion::static_info() {
     StructureInfo i;
     i.name = kName;
     i.summary = "4-wide BVH of a moving scene: boxes and triangles interpolated at the ray's time (BVH4MB)";
-    i.no_streams =
-        "not built: a stream keeps a node's planes in registers, each plane of all children in one, for all its rays; "
-        "here each ray has a time of its own, and the planes stand elsewhere for it";
     i.builders = binary_builder_names();
     i.leaves = {Block::kName};
     i.holds_motion = i.needs_motion = true;

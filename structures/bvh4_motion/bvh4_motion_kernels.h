@@ -12,6 +12,9 @@
 #include "structures/bvh/bvh_packet.h"
 #include "structures/bvh/bvh_queued.h"
 #include "structures/bvh/bvh_single.h"
+#include "structures/bvh/bvh_stream.h"
+#include "structures/bvh/bvh_stream_lists.h"
+#include "structures/bvh/bvh_streams_or_queue.h"
 #include "traversal/auto_rows.h"
 #include "traversal/kernel_rows.h"
 #include "traversal/packet_rows.h"
@@ -42,13 +45,21 @@ struct MovingNodeTest : SoaNodeTest<4, Padded> {
   }
 };
 
-/// How packets read a node (structures/bvh/bvh_packet_nodes.h).
+/// How packets and streams read a node (structures/bvh/bvh_packet_nodes.h).
 struct MovingPacketNodes {
-  static constexpr int kBranching = 4, kLanes = 4;
+  static constexpr int kBranching = 4, kLanes = 4, kStride = 1;
+  static constexpr std::size_t kBytes = sizeof(bvh4_motion::Node);
   static constexpr bool kMoves = true;
   template <bool Padded>
   using Single = MovingNodeTest<Padded>;
 
+  /// At time 0, and from there to time 1.
+  static ARBORETUM_INLINE vf<4> planes(const std::byte* node, unsigned k) {
+    return vf<4>::load(reinterpret_cast<const bvh4_motion::Node*>(node)->planes[k]);
+  }
+  static ARBORETUM_INLINE vf<4> motion(const std::byte* node, unsigned k) {
+    return vf<4>::load(reinterpret_cast<const bvh4_motion::Node*>(node)->motion[k]);
+  }
   /// The farthest out between two times.
   static ARBORETUM_INLINE vf<4> planes(const std::byte* node, unsigned k, float first, float last) {
     const auto* n = reinterpret_cast<const bvh4_motion::Node*>(node);
@@ -61,8 +72,8 @@ struct MovingPacketNodes {
     const auto* n = reinterpret_cast<const bvh4_motion::Node*>(node);
     return plane_distance(madd(F(n->motion[k][i]), time, F(n->planes[k][i])), r, c);
   }
-  static ARBORETUM_INLINE bvh::NodeReference child(const std::byte* node, int i) {
-    return Single<true>::children(node)[i];
+  static ARBORETUM_INLINE const bvh::NodeReference* children(const std::byte* node) {
+    return Single<true>::children(node);
   }
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
@@ -147,6 +158,11 @@ struct MovingRays {
   template <class, bool Padded, bool AnyHit>
   using Queue = QueuedRays<BvhNodeWalk<MovingNodeTest<Padded>, MovingLeaves, AnyHit>>;
 
+  template <class Format, class, bool Padded, bool AnyHit, class Counting>
+  using OneStream = Stream<Format, MovingLeaves, Padded, AnyHit, Counting>;
+  template <class Format, class, bool Padded, bool AnyHit, class Counting>
+  using Lists = StreamLists<Format, MovingLeaves, Padded, AnyHit, Counting>;
+
   struct PacketFamily : BvhPacketFamily<MovingPacketNodes> {
     template <int W, class, bool AnyHit, class Counting>
     using Packets = BvhPackets<MovingPacketNodes, W, MovingLeaves, AnyHit, Counting>;
@@ -155,12 +171,14 @@ struct MovingRays {
 
 inline void add_kernels(std::type_identity<bvh4_motion::Bvh4Motion>, KernelRows& rows) {
   using Structure = bvh4_motion::Bvh4Motion;
-  using Incoherent = IncoherentInFlight<MovingRays::Queue, MovingRays::Single, 4>;
+  using Incoherent =
+      IncoherentInStreams<MovingPacketNodes, MovingRays::Queue, MovingRays::Single, MovingRays::OneStream>;
   add_rows<Structure, MovingRays::Single>(rows, "single", TypeList<>{});
   add_queued_rows<Structure, MovingRays::Queue, MovingRays::Single>(rows, TypeList<>{});
   add_packet_rows<Structure, MovingRays::PacketFamily>(rows, TypeList<>{});
-  add_rows<Structure, AutoFunctions<MovingRays::PacketFamily, TypeList<>, Incoherent, MovingRays::Single, false>>(
+  add_rows<Structure, AutoFunctions<MovingRays::PacketFamily, TypeList<>, Incoherent, MovingRays::Single>>(
       rows, "auto", TypeList<>{});
+  add_stream_rows<Structure, MovingPacketNodes, TypeList<>, TypeList<>, MovingRays::OneStream, MovingRays::Lists>(rows);
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

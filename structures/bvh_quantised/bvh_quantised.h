@@ -77,9 +77,6 @@ struct QuantisedNodes {
   static constexpr std::string_view kSummary =
       N == 4 ? "4-wide bounding volume hierarchy, child boxes in 10 bits a plane: 64-byte nodes"
              : "8-wide bounding volume hierarchy, child boxes in 10 bits a plane: 128-byte nodes";
-  static constexpr std::string_view kNoStreams =
-      "not built: a stream keeps a node's planes in registers as floats for all its rays; these are decoded anew for "
-      "each ray, as part of its distances";
   static constexpr std::size_t kGranule = 64;
   using Node = bvh_quantised::Node<N>;
 
