@@ -365,6 +365,25 @@ TEST_CASE("embree says what it cannot do") {
   CHECK_FALSE(accel.visit(visitor));
 }
 
+TEST_CASE("a mesh so small that embree's spatial splits divide by 0 is refused, and does not end the program") {
+  std::size_t refused = 0;
+  for (const int exponent : {-100, -110, -115, -118, -120, -122, -124, -126, -130, -140}) {
+    INFO("2^" << exponent);
+    TriangleMesh mesh = random_triangles(300, 3);
+    for (Vec3f& v : mesh.vertices) v = v * std::ldexp(1.0f, exponent);
+    EmbreeAccel accel;
+    CHECK_NOTHROW(build(accel, mesh, Isa::sse, "medium", "triangle4"));
+    try {
+      build(accel, mesh, Isa::sse, "high", "triangle4");
+    } catch (const UserError& e) {
+      CHECK_THAT(e.what(), Catch::Contains("take medium"));
+      ++refused;
+    }
+  }
+  CHECK(refused > 0);
+  CHECK(refused < 10);
+}
+
 TEST_CASE("an embree device does not limit the threads of others") {
   const TriangleMesh mesh = random_triangles(100, 1);
   const std::size_t before = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
