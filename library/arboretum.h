@@ -132,7 +132,9 @@ class Tracer {
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
   /// The structure itself: its bytes, and its nodes and leaves by visit().
   [[nodiscard]] const Accel& structure() const noexcept { return *accel_; }
-  /// Seconds, peak memory and phases of the build; all zero where the structure was loaded.
+  /// Seconds, peak memory and phases of the build; all zero where the structure was loaded. cpu_seconds and peak_bytes
+  /// are of the process: where other threads work or build meanwhile, cpu_seconds has their time as well, and
+  /// peak_bytes says no more than that it is not below structure().bytes().
   [[nodiscard]] const BuildReport& report() const noexcept { return report_; }
   /// The settings with every key filled in that was left to the others.
   [[nodiscard]] const TracerSettings& settings() const noexcept { return settings_; }

@@ -3,6 +3,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <mutex>
 
 #include "core/error.h"
 #include "core/memory_meter.h"
@@ -15,6 +16,37 @@
 #include "structures/registry.h"
 
 namespace arboretum {
+namespace {
+
+/// What a build holds at most, by the process's meter. Of builds at once the first alone sets the peak back, so that
+/// none loses what it measures by: theirs are of all of them together.
+class BuildMemory {
+ public:
+  BuildMemory() {
+    const std::lock_guard lock(mutex_);
+    if (under_way_++ == 0) MemoryMeter::reset_peak();
+    before_ = MemoryMeter::current();
+  }
+  ~BuildMemory() {
+    const std::lock_guard lock(mutex_);
+    --under_way_;
+  }
+  BuildMemory(const BuildMemory&) = delete;
+  BuildMemory& operator=(const BuildMemory&) = delete;
+
+  /// Never less than the structure's bytes: others may have given back meanwhile what they held before.
+  [[nodiscard]] std::size_t peak_bytes(const Accel& accel) const {
+    const std::size_t peak = MemoryMeter::peak();
+    return std::max(peak > before_ ? peak - before_ : 0, accel.bytes());
+  }
+
+ private:
+  inline static std::mutex mutex_;
+  inline static unsigned under_way_ = 0;
+  std::size_t before_ = 0;
+};
+
+}  // namespace
 
 std::span<const StructureEntry> all_structures() {
   static const std::vector<StructureEntry> entries = [] {
@@ -91,13 +123,12 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
   BuildSettings allowed = settings;
   allowed.threads = allowed_threads(settings.threads);
   tbb::task_arena arena(int(allowed.threads), 1);
-  MemoryMeter::reset_peak();
-  const std::size_t before = MemoryMeter::current();
+  const BuildMemory memory;
   const double wall = wall_seconds(), cpu = process_cpu_seconds();
   arena.execute([&] { accel->build(mesh, allowed, report); });
   report.seconds = wall_seconds() - wall - report.apart_seconds;
   report.cpu_seconds = std::max(process_cpu_seconds() - cpu - report.apart_seconds, 0.0);
-  report.peak_bytes = MemoryMeter::peak() - before;
+  report.peak_bytes = memory.peak_bytes(*accel);
   return accel;
 }
 

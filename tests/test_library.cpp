@@ -2,6 +2,8 @@
 // the header says, and every misuse is one line.
 #include "library/arboretum.h"
 
+#include <algorithm>
+#include <future>
 #include <tuple>
 #include <type_traits>
 
@@ -328,6 +330,24 @@ TEST_CASE("more threads than there are do no harm") {
   const Hit hit = many.closest_hit(ray);
   CHECK(hit.is_hit());
   CHECK(hit.primitive == one.closest_hit(ray).primitive);
+}
+
+TEST_CASE("builds at once report no less memory than the structure takes, and none that there is not") {
+  const TriangleMesh small = sphere(12), large = sphere(40);
+  const auto build_many = [](const TriangleMesh& mesh) {
+    TracerSettings settings;
+    settings.threads = 1;
+    bool holds = true;
+    for (int i = 0; i < 150; ++i) {
+      const Tracer tracer(mesh, settings);
+      const std::size_t peak = tracer.report().peak_bytes;
+      holds = holds && peak >= tracer.structure().bytes() && peak < std::size_t{1} << 30;
+    }
+    return holds;
+  };
+  std::future<bool> other = std::async(std::launch::async, build_many, std::cref(small));
+  CHECK(build_many(large));
+  CHECK(other.get());
 }
 
 TEST_CASE("misuse is told in one line that names the mend") {
