@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/parse_number.h"
+#include "structures/below.h"
 #include "structures/own_parameters.h"
 #include "structures/parameter_limits.h"
 
@@ -55,13 +56,19 @@ bool has_own_choice(const Parameter<Set>& parameter) {
 }
 bool has_own_choice(const OwnParameter&) { return false; }
 
-/// What a word may be: where the table leaves it open, a structure's name. What cannot stand below, the plan says.
+/// Whether the word is one that the parameter may have: where the table leaves it open, a structure's name. What cannot
+/// stand below, the plan says.
+template <class Row>
+bool allows(const Row& parameter, const std::string& word) {
+  if (parameter.words.empty()) return find_structure(word) != nullptr;
+  return std::ranges::find(parameter.words, word) != parameter.words.end();
+}
+
+/// What a word may be, without the structures that never stand below.
 template <class Row>
 std::vector<std::string_view> words_of(const Row& parameter) {
   std::vector<std::string_view> words(parameter.words.begin(), parameter.words.end());
-  if (words.empty())
-    for (const StructureEntry& e : all_structures()) words.push_back(e.info.name);
-  return words;
+  return words.empty() ? names_below() : words;
 }
 
 /// What a value of type T may be, in words.
@@ -78,8 +85,7 @@ std::string expectation(const Row& p) {
 template <class T, class Row>
 std::optional<T> allowed_value(const Row& parameter, const std::string& text) {
   if constexpr (std::is_same_v<T, std::string>) {
-    const std::vector<std::string_view> words = words_of(parameter);
-    return std::ranges::find(words, text) != words.end() ? std::optional(text) : std::nullopt;
+    return allows(parameter, text) ? std::optional(text) : std::nullopt;
   } else {
     if constexpr (std::is_same_v<T, unsigned>) {
       if (has_own_choice(parameter) && text == kOwn) return BuilderParameters::kOwn;

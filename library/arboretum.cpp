@@ -9,6 +9,7 @@
 
 #include "core/mesh_check.h"
 #include "core/names.h"
+#include "structures/below.h"
 #include "structures/build_threads.h"
 #include "structures/parameter_limits.h"
 #include "structures/structure_file.h"
@@ -93,6 +94,7 @@ const KernelRow& resolve_kernel(TracerSettings& s) {
   if (!is_auto(s.leaf)) check_name("leaf", s.leaf, find_structure(s.structure)->info.leaves);
   check_name("intersector", s.intersector, known.intersectors);
   check_name("box", s.box, known.boxes);
+  if (is_auto(s.traversal)) s.traversal = kAuto;
   const std::vector<Isa> isas = allowed_isas(s);
   if (const std::string way = resolve_traversal(s.traversal, isas.front()); way == s.traversal && way != kAuto)
     check_name("traversal", way, known.traversals);
@@ -139,6 +141,8 @@ Tracer::Tracer(TriangleMesh mesh, TracerSettings settings, NotBuiltYet)
     for (const StructureEntry& e : all_structures()) names.push_back(e.info.name);
     check_name("structure", settings_.structure, names);
   }
+  if (is_auto(settings_.parameters.below)) settings_.parameters.below = BuilderParameters{}.below;
+  check_below(entry->info, settings_.parameters.below);
   if (is_auto(settings_.builder)) settings_.builder = default_builder(entry->info, settings_.parameters);
   if (settings_.threads == 0) settings_.threads = std::max(1u, std::thread::hardware_concurrency());
   batch_ = &resolve_kernel(settings_);

@@ -45,6 +45,7 @@ struct TracerSettings {
                                      ///< `hybridN`), where the structure has them
   std::string isa = {};              ///< `auto`: the best of this machine for which there is such a kernel
   unsigned threads = 0;              ///< of the build; 0: one a core. The structure is the same for any number.
+  /// The builder's; `below` may be `auto`, too: bvh8.
   BuilderParameters parameters = {};
 };
 

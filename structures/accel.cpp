@@ -10,6 +10,7 @@
 #include "core/mesh_check.h"
 #include "core/names.h"
 #include "core/timer.h"
+#include "structures/below.h"
 #include "structures/build_threads.h"
 #include "structures/own_parameters.h"
 #include "structures/parameter_limits.h"
@@ -114,6 +115,7 @@ std::unique_ptr<Accel> build_structure(std::string_view name, const TriangleMesh
     throw UserError(why);
 
   check_parameters(settings.parameters);
+  check_below(entry->info, settings.parameters.below);
   check_triangles(mesh, Largest::finite);
   if (!entry->info.holds_motion) check_one_moment(mesh, name);
   if (entry->info.takes_below) check_instances(mesh, Largest::finite);

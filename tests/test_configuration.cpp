@@ -160,6 +160,18 @@ TEST_CASE("a parameter may take the ends of its limits as they are written") {
   CHECK(set_parameter(parameters, "spatial_gain", "0.0099") == "a number from 0.01 to 1");
 }
 
+TEST_CASE("what may stand below is listed without what never can, which the plan tells the reason of") {
+  const std::string values = parameter_values("below");
+  Parameters parameters;
+  CHECK(set_parameter(parameters, "below", "bvh88") == values);
+  for (const StructureEntry& entry : all_structures()) {
+    const std::string name(entry.info.name);
+    INFO(name);
+    CHECK(((values + ",").find(" " + name + ",") != std::string::npos) == why_not_below(entry.info).empty());
+    CHECK(set_parameter(parameters, "below", name).empty());
+  }
+}
+
 TEST_CASE("the command line lays axes over the file") {
   const Folder folder;
   const Registry registry = paper_registry();

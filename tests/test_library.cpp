@@ -130,6 +130,8 @@ TEST_CASE("keys that stand for others mean what they mean on the command line") 
   CHECK(settled({.structure = "bvh8", .traversal = "auto"}).traversal == "auto");
   CHECK(settled({.structure = "grid", .traversal = "auto"}).traversal == "auto");
   CHECK(settled({.structure = "brute_force", .traversal = "auto"}).traversal == "single");
+  CHECK(settled({.structure = "bvh8", .traversal = ""}).traversal == "auto");
+  CHECK(settled({.structure = "brute_force", .traversal = ""}).traversal == "single");
   for (Isa isa : available_isas()) {
     const std::string width = std::to_string(native_width(isa)), name(to_string(isa));
     CHECK(settled({.traversal = "packet", .isa = name}).traversal == "packet" + width);
@@ -446,6 +448,27 @@ TEST_CASE("misuse is told in one line that names the mend") {
   CHECK(Tracer(sphere(4), over_grid).settings().traversal == "packet8");
   over_grid.parameters.below = "brute_force";
   CHECK_THAT(message_of(over_grid), Catch::Contains("two_level over brute_force: brute_force has no packet8"));
+
+  // What stands below, whether or not the structure takes one
+  const auto below = [&](const char* structure, const char* name) {
+    return tuned(structure, [=](BuilderParameters& p) { p.below = name; });
+  };
+  for (const char* structure : {"bvh8", "two_level"}) {
+    CHECK_THAT(below(structure, "xx"),
+               Catch::StartsWith("below: unknown structure 'xx' (valid: ") && !Catch::Contains("two_level"));
+    CHECK_THAT(below(structure, "bvh88"), Catch::Contains("did you mean 'bvh8'?"));
+    for (const char* name : {"", "auto"}) CHECK(below(structure, name).empty());
+  }
+  TracerSettings over_auto = with(&TracerSettings::structure, "two_level");
+  over_auto.parameters.below = "auto";
+  CHECK(Tracer(sphere(4), over_auto).settings().parameters.below == "bvh8");
+  for (const StructureEntry& entry : all_structures()) {
+    const std::string why = why_not_below(entry.info);
+    if (why.empty()) continue;
+    const std::string name(entry.info.name);
+    CHECK(below("two_level", name.c_str()) == "two_level over " + name + ": " + why);
+    CHECK(below("bvh8", name.c_str()).empty());
+  }
 
   const std::string line = message_of(with(&TracerSettings::structure, "bvh8\n\x1b[2J" + std::string(100000, 'x')));
   CHECK_THAT(line, Catch::Contains("unknown structure 'bvh8\\n\\x1b[2Jxxx") && Catch::Contains("(100009 characters)"));

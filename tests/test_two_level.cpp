@@ -524,7 +524,7 @@ TEST_CASE("what cannot stand below is refused in one line") {
       {"two_level", "binned_sah", "triangle4",
        "two_level over two_level: two_level stands above other structures, not below one"},
       {"bvh4_motion", "binned_sah", "triangle4i", "two_level over bvh4_motion: bvh4_motion is for moving scenes"},
-      {"bvh88", "binned_sah", "triangle4", "two_level: below: there is no structure 'bvh88'"},
+      {"bvh88", "binned_sah", "triangle4", "below: unknown structure 'bvh88'; did you mean 'bvh8'? (valid: "},
       {"brute_force", "binned_sah", "triangle4", "two_level over brute_force: brute_force has no builder binned_sah"},
   };
   for (const auto& c : cases) {

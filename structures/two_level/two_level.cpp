@@ -16,6 +16,7 @@
 #include "structures/builders/builders.h"
 #include "structures/builders/phase_clock.h"
 #include "structures/leaves/leaf_names.h"
+#include "structures/below.h"
 #include "structures/own_parameters.h"
 
 namespace arboretum::two_level {
@@ -246,11 +247,10 @@ const StructureInfo& TwoLevel::static_info() {
 }
 
 void TwoLevel::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
+  check_below(static_info(), settings.parameters.below);
   const StructureEntry* entry = find_structure(settings.parameters.below);
-  if (!entry) throw UserError("two_level: below: there is no structure '" + settings.parameters.below + "'");
   const StructureInfo& below = entry->info;
   const std::string pair = "two_level over " + std::string(below.name) + ": ";
-  if (const std::string why = why_not_below(below); !why.empty()) throw UserError(pair + why);
   if (mesh.instancing && !is_searchable(below.name)) {
     throw UserError(pair + "kernels do not know how a ray that was mapped goes through " + std::string(below.name) +
                     "; take " + std::string(bvh::Bvh8::kName));
