@@ -54,7 +54,12 @@ std::string why_none(const TracerSettings& s, Isa isa) {
   const auto why = [&](std::string_view structure) {
     return why_no_kernel(structure, leaf_of(s, isa), s.intersector, s.box, traversal, isa);
   };
-  const std::string of_structure = why(s.structure);
+  std::string of_structure = why(s.structure);
+  const auto has_intersector = [&](const KernelRow& row) {
+    return row.structure == s.structure && row.intersector == s.intersector;
+  };
+  if (std::ranges::none_of(kernel_table(), has_intersector))
+    of_structure.append("; intersector auto takes ").append(resolve_intersector(kAuto, s.structure, kernel_table()));
   if (!of_structure.empty() || !find_structure(s.structure)->info.takes_below) return of_structure;
   return s.structure + " over " + s.parameters.below + ": " + why(s.parameters.below);
 }

@@ -14,7 +14,11 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <span>
+#include <sstream>
+#include <string>
 #include <system_error>
 #include <type_traits>
 #include <vector>
@@ -23,7 +27,9 @@
 #include "core/instances.h"
 #include "core/whole_file.h"
 #include "structures/archive.h"
+#include "structures/own_parameters.h"
 #include "structures/parameter_limits.h"
+#include "structures/parameters_read.h"
 
 namespace arboretum {
 namespace {
@@ -111,6 +117,60 @@ void check_header(const std::filesystem::path& file, const StructureFileHeader& 
     refuse(file, "is truncated: " + std::to_string(bytes) + " of " + std::to_string(header.file_bytes) +
                      " bytes; build and save it again");
   }
+}
+
+using Words = std::map<std::string, std::string, std::less<>>;
+
+/// What text_of() wrote, by name.
+Words values_of(const std::string& text) {
+  Words values;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const std::size_t end = word.find('=');
+    values[word.substr(0, end)] = end == std::string::npos ? "" : word.substr(end + 1);
+  }
+  return values;
+}
+
+/// The parameter's value as a user writes it. One that the text leaves out is a structure's own, and has its default.
+std::string value_in(const Words& values, std::string_view name) {
+  const auto value = values.find(name);
+  if (value == values.end()) {
+    const OwnParameter* own = find_own_parameter(name);
+    return own ? text_of(own->initial) : "none";
+  }
+  const auto has_own_choice = [&](const Parameter<BuilderParameters>& p) { return p.name == name && p.has_own; };
+  return value->second == std::to_string(BuilderParameters::kOwn) &&
+                 std::ranges::any_of(builder_parameter_table(), has_own_choice)
+             ? "auto"
+             : value->second;
+}
+
+/// "bins 32, here 16; collapse optimal, here greedy": what the file was built with otherwise than wanted, of that which
+/// the build reads and what this program does not know. Empty where it is the same.
+std::string other_parameters(const std::string& saved, const StructureInfo& info, const BuildSettings& settings) {
+  const Words before = values_of(saved), here = values_of(parameters_of(info, settings));
+  Words all = before;
+  all.insert(here.begin(), here.end());
+  const auto read = parameters_read(info.name, settings.builder, settings.parameters.below);
+  std::string others;
+  for (const auto& [name, value] : all) {
+    const bool known = find_own_parameter(name) ||
+                       std::ranges::any_of(builder_parameter_table(), [&](const auto& p) { return p.name == name; });
+    if (known && read && std::ranges::find(*read, name) == read->end()) continue;
+    const std::string one = value_in(before, name), other = value_in(here, name);
+    if (one != other) others += (others.empty() ? "" : "; ") + name + " " + one + ", here " + other;
+  }
+  return others;
+}
+
+/// What tells the meshes apart, where their hashes are not the same.
+std::string other_mesh(const StructureFileHeader& saved, const StructureFileHeader& here) {
+  if (saved.mesh_triangles != here.mesh_triangles)
+    return std::to_string(saved.mesh_triangles) + " triangles, this one has " + std::to_string(here.mesh_triangles);
+  if (saved.mesh_vertices != here.mesh_vertices)
+    return std::to_string(saved.mesh_vertices) + " vertices, this one has " + std::to_string(here.mesh_vertices);
+  return "as many triangles, but other positions, indices, key frames or instances";
 }
 
 /// Names in the file, in this order: what `archive` reads is compared with what is wanted.
@@ -260,12 +320,15 @@ std::unique_ptr<Accel> load_structure(std::string_view name, const TriangleMesh&
   check_name(file, archive, "structure", name);
   check_name(file, archive, "builder", settings.builder);
   check_name(file, archive, "leaf", settings.leaf);
-  check_name(file, archive, "parameters", parameters_of(entry->info, settings));
+  std::string parameters;
+  archive(parameters);
+  if (const std::string others = other_parameters(parameters, entry->info, settings); !others.empty())
+    refuse(file, "holds other parameters (" + others + "); ask for what it holds, or build anew");
   const StructureFileHeader wanted = header_of(mesh);
   if (header.mesh_hash != wanted.mesh_hash || header.mesh_vertices != wanted.mesh_vertices ||
       header.mesh_triangles != wanted.mesh_triangles) {
-    refuse(file, "was built from another mesh (" + std::to_string(header.mesh_triangles) + " triangles, this one has " +
-                     std::to_string(mesh.size()) + "); load it with the mesh that it was built from");
+    refuse(file, "was built from another mesh (" + other_mesh(header, wanted) +
+                     "); load it with the mesh that it was built from");
   }
   std::unique_ptr<Accel> accel = entry->create();
   try {

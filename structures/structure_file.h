@@ -41,9 +41,9 @@ void save_structure(Accel& accel, const TriangleMesh& mesh, const BuildSettings&
 enum class BuiltBy { any_program, this_program };
 
 /// Reads a structure back: the one of that name, built from an equal mesh with equal builder, leaf and parameters
-/// (threads and instruction set do not matter). The mesh must outlive it. Throws UserError, one line, where the file is
-/// missing, none of ours, of another version or byte order, truncated, damaged, or of another structure, settings, mesh
-/// or (where `by` says so) program.
+/// (threads, instruction set and parameters that the build does not read do not matter). The mesh must outlive it.
+/// Throws UserError, one line, where the file is missing, none of ours, of another version or byte order, truncated,
+/// damaged, or of another structure, settings, mesh or (where `by` says so) program.
 [[nodiscard]] std::unique_ptr<Accel> load_structure(std::string_view name, const TriangleMesh& mesh,
                                                     const BuildSettings& settings, const std::filesystem::path& file,
                                                     BuiltBy by = BuiltBy::any_program);

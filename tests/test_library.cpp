@@ -271,6 +271,11 @@ TEST_CASE("a saved tracer answers as the one that was built, and a file says wha
   };
   CHECK_THAT(refused(sphere(41), settings), Catch::Contains("another mesh"));
   CHECK_THAT(refused(sphere(40), {}), Catch::Contains("holds builder 'spatial_sah', not 'binned_sah'"));
+  TracerSettings otherwise = settings;
+  otherwise.parameters.bins = 8, otherwise.parameters.spatial_gain = 0.5f, otherwise.parameters.max_depth = 9;
+  CHECK_THAT(refused(sphere(40), otherwise),
+             Catch::EndsWith("holds other parameters (bins 32, here 8; spatial_gain 0.8, here 0.5); ask for what it "
+                             "holds, or build anew"));
   TracerSettings beyond = settings;
   beyond.parameters.bins = 1000;
   CHECK_THAT(refused(sphere(40), beyond), Catch::Contains("bins: 1000 is not within 4 .. 64"));
@@ -468,6 +473,15 @@ TEST_CASE("misuse is told in one line that names the mend") {
     const std::string name(entry.info.name);
     CHECK(below("two_level", name.c_str()) == "two_level over " + name + ": " + why);
     CHECK(below("bvh8", name.c_str()).empty());
+  }
+
+  if (find_structure("embree")) {
+    CHECK_THAT(message_of(with(&TracerSettings::structure, "embree")),
+               Catch::Contains("embree has no watertight kernels for single: it has") &&
+                   Catch::Contains("; intersector auto takes pluecker"));
+    TracerSettings embree = with(&TracerSettings::structure, "embree");
+    embree.intersector = "auto";
+    CHECK(message_of(embree).empty());
   }
 
   const std::string line = message_of(with(&TracerSettings::structure, "bvh8\n\x1b[2J" + std::string(100000, 'x')));

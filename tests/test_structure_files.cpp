@@ -174,7 +174,11 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
     wanted = settings, wanted.builder = "none";
     CHECK(has(refusal("bvh4", mesh, wanted, file), "holds builder 'binned_sah', not 'none'"));
     wanted = settings, wanted.parameters.bins = 16;
-    CHECK(has(refusal("bvh4", mesh, wanted, file), "holds parameters 'bins=32 "));
+    wanted.parameters.reinsertion_top = 7, wanted.parameters.grid_density = 2;
+    CHECK(has(refusal("bvh4", mesh, wanted, file),
+              "holds other parameters (bins 32, here 16; reinsertion_top auto, here 7); ask for"));
+    wanted = settings, wanted.parameters.grid_density = 2, wanted.parameters.below = "bvh2";  // not read
+    CHECK(refusal("bvh4", mesh, wanted, file) == "");
   }
   SECTION("threads and instruction set do not matter") {
     BuildSettings wanted = settings;
@@ -195,7 +199,11 @@ TEST_CASE("a file that does not fit is refused, and the message says why") {
     CHECK(has(refusal("bvh4", changed, settings, file), "was built from another mesh (9 triangles, this one has 8)"));
     changed = mesh;
     changed.vertices[5].y = std::nextafter(changed.vertices[5].y, 9.0f);
-    CHECK(has(refusal("bvh4", changed, settings, file), "another mesh"));
+    CHECK(has(refusal("bvh4", changed, settings, file),
+              "was built from another mesh (as many triangles, but other positions, indices"));
+    changed = mesh;
+    changed.vertices.push_back({});
+    CHECK(has(refusal("bvh4", changed, settings, file), " vertices, this one has "));
     changed = mesh;
     std::swap(changed.triangles[2], changed.triangles[3]);
     CHECK(has(refusal("bvh4", changed, settings, file), "another mesh"));

@@ -171,7 +171,10 @@ std::string why_no_kernel(std::string_view structure, std::string_view leaf, std
   if (!any_row({.structure = structure, .traversal = traversal, .isa = isa}))
     return s + " has no " + t + " traversal on " + a;
   if (!any_row({.structure = structure, .intersector = intersector, .traversal = traversal, .isa = isa}))
-    return s + " has no " + i + " kernels for " + t;
+    return s + " has no " + i + " kernels for " + t + ": it has" +
+           values_of(&KernelRow::intersector, [&](const KernelRow& r) {
+             return r.structure == structure && r.traversal == traversal && r.isa == isa;
+           });
   if (!any_row({.structure = structure, .leaf = leaf, .traversal = traversal, .isa = isa}))
     return why_no_leaf(structure, leaf, traversal, isa);
   if (!any_row(
