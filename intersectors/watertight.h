@@ -28,10 +28,11 @@
 //    all the same. What lies clearly before tnear, as the triangle that a ray has just left, is not computed again.
 // 6. The mean itself, of the rounded corners, is where the ray is within delta of a point of the triangle: within its
 //    box, as pads have it, in whatever structure. What the edge functions' own roundings move it by is 6 u s A / |det|,
-//    A the sum of the squares across: for a triangle seen edge on, or a sliver, any share of s, and boxes might cull
-//    what lies so far before them. Where |det| is below 2^-12 A the mean is made of doubles, whose roundings are nothing
-//    beside it, and a distance of 5 is kept where the ray is in the triangle's box, or left to the mean where the ray
-//    is in the plane.
+//    A the sum of the squares across: for a triangle seen edge on, or long and thin, any share of s, and boxes might
+//    cull what lies so far before them. Their pads are 8 u m or more, m the largest |depth| in units of t. So where
+//    |det| m is below 2^-8 s A the mean is made of doubles, whose roundings are nothing beside it, and a distance of 5
+//    is kept where the ray is in the triangle's box, or left to the mean where the ray is in the plane. (By the bound
+//    that would have to be 2^0, by what is measured 2^-4 or so; but the doubles of large walls are dear.)
 #pragma once
 
 #include <algorithm>
@@ -65,7 +66,7 @@ struct Watertight {
       // What the rare functions are handed is copied, or read from memory again: a reference to the vectors here would
       // keep all of them in memory.
       if (__builtin_expect(open != 0, 0)) {
-        if (__builtin_expect(any(inside & e.in_doubt()), 0)) {
+        if (__builtin_expect(any(inside & e.in_doubt(vf<W>(ray.shear[2]))), 0)) {
           TriangleHits<W> decided = hits;
           inside = decide_in_double(inside, ray, block, decided);
           hits = decided;
@@ -97,7 +98,7 @@ struct Watertight {
     if (inside == 0) return 0;
     const unsigned open = inside & ~e.hits(F::load(rays.tnear + k), F::load(shears.sz + k), hits).bits();
     if (__builtin_expect(open != 0, 0)) {
-      again = open & e.in_doubt().bits();
+      again = open & e.in_doubt(F::load(shears.sz + k)).bits();
       if (const unsigned close = open & ~again) hits.t = plane_distances_of_rays(close, rays, kz, k, block, i, hits.t);
     }
     return inside & ~again;
@@ -121,27 +122,32 @@ struct Watertight {
     /// Of lanes inside, those in which an edge is met, or may be.
     ARBORETUM_INLINE vm<W> ties() const { return sides == F(0.0f); }
     /// And those whose mean floats round too far away.
-    ARBORETUM_INLINE vm<W> in_doubt() const { return ties() | (edge_on(across(), abs(u + v + w)) >= F(0.0f)); }
+    ARBORETUM_INLINE vm<W> in_doubt(F sz) const {
+      const F za = sz * p.a.z, zb = sz * p.b.z, zc = sz * p.c.z;
+      return ties() | (edge_on(across(), abs(u + v + w), nearest(za, zb, zc), farthest(za, zb, zc)) >= F(0.0f));
+    }
 
     /// Sets the hits; returns the lanes that, if inside, are decided: no edge is met, and t is as right as it must be.
     ARBORETUM_INLINE vm<W> hits(F tnear, F sz, TriangleHits<W>& out) const {
       const F det = u + v + w, za = sz * p.a.z, zb = sz * p.b.z, zc = sz * p.c.z;
       out.t = (u * za + v * zb + w * zc) / det;
       out.u_numerator = v, out.v_numerator = w, out.denominator = det;
-      return (sides != F(0.0f)) & clear<true>(tnear, za, zb, zc, det, out.t);
+      return (sides != F(0.0f)) & clear<true>(tnear, nearest(za, zb, zc), farthest(za, zb, zc), det, out.t);
     }
+    static ARBORETUM_INLINE F nearest(F a, F b, F c) { return min_x86(min_x86(a, b), c); }
+    static ARBORETUM_INLINE F farthest(F a, F b, F c) { return max_x86(max_x86(a, b), c); }
     /// What the products that t is a sum of may lose, less than 2^-147, is no more than 2^-23 of this.
     static constexpr float kUnderflow = 0x1p-124f;
     /// Lanes whose t need not be computed again in double for tnear's sake, nor, where asked, for the triangle being
     /// seen edge on; none where it has overflowed.
     template <bool AndEdgeOn>
-    ARBORETUM_INLINE vm<W> clear(F tnear, F za, F zb, F zc, F det, F t) const {
-      const F spread = max_x86(max_x86(za, zb), zc) - min_x86(min_x86(za, zb), zc), area = abs(det);
+    ARBORETUM_INLINE vm<W> clear(F tnear, F near, F far, F det, F t) const {
+      const F spread = far - near, area = abs(det);
       const F sideways = across();
       const F size = madd(p.a.z, p.a.z, madd(p.b.z, p.b.z, madd(p.c.z, p.c.z, sideways)));
       const F beyond = (t - madd(t, F(0.0f), tnear)) * area, error = F(0x1p-19f) * size;  // NaN of an infinite t
       F behind = msub(spread, max_x86(error, F(0x1p-10f) * area), beyond - F(kUnderflow));
-      if constexpr (AndEdgeOn) behind = max_x86(edge_on(sideways, area), behind);
+      if constexpr (AndEdgeOn) behind = max_x86(edge_on(sideways, area, near, far), behind);
       return min_x86(madd(spread, error, beyond + F(kUnderflow)), behind) < F(0.0f);
     }
 
@@ -151,8 +157,10 @@ struct Watertight {
       const auto squares = [](const vf3<W>& q, F more) { return madd(q.x, q.x, madd(q.y, q.y, more)); };
       return squares(p.a, squares(p.b, madd(p.c.x, p.c.x, p.c.y * p.c.y)));
     }
-    /// Negative but where a triangle is seen edge on, or a sliver.
-    static ARBORETUM_INLINE F edge_on(F sideways, F area) { return msub(F(0x1p-12f), sideways, area); }
+    /// Negative but where a triangle is seen edge on, or is long and thin.
+    static ARBORETUM_INLINE F edge_on(F sideways, F area, F near, F far) {
+      return msub(F(0x1p-8f) * (far - near), sideways, max_abs(near, far) * area);
+    }
   };
 
   /// The lanes of `inside` that are hit when ties are decided in double; sets their hits and those of triangles seen
@@ -164,13 +172,16 @@ struct Watertight {
     constexpr int W = Block::kWidth;
     using F = vf<W>;
     const Edges<W> e(ShearedVertices<W>(ray, block));
+    const F tnear(ray.tnear()), sz(ray.shear[2]);
+    // Those that are decided stay as they are: they must not depend on their neighbours.
+    TriangleHits<W> same;
     unsigned hit = inside.bits();
+    const unsigned doubt = hit & ~e.hits(tnear, sz, same).bits() & e.in_doubt(sz).bits();
     float p[9][W], out[4][W];
     const F in[9] = {e.p.a.x, e.p.a.y, e.p.a.z, e.p.b.x, e.p.b.y, e.p.b.z, e.p.c.x, e.p.c.y, e.p.c.z};
     for (int i = 0; i < 9; ++i) in[i].store(p[i]);
     hits.t.store(out[0]), hits.u_numerator.store(out[1]), hits.v_numerator.store(out[2]),
         hits.denominator.store(out[3]);
-    const unsigned doubt = (inside & e.in_doubt()).bits();
     for (unsigned rest = doubt; rest; rest &= rest - 1) {
       const int i = __builtin_ctz(rest);
       const double u = double(p[6][i]) * p[4][i] - double(p[7][i]) * p[3][i];
@@ -185,9 +196,10 @@ struct Watertight {
       out[0][i] = float((u * p[2][i] + v * p[5][i] + w * p[8][i]) / det * ray.shear[2]);
       out[1][i] = float(v / det), out[2][i] = float(w / det), out[3][i] = 1.0f;
     }
-    const F sz(ray.shear[2]), t = F::load(out[0]);
+    const F t = F::load(out[0]);
+    const F za = sz * e.p.a.z, zb = sz * e.p.b.z, zc = sz * e.p.c.z;
     const vm<W> clear =
-        e.template clear<false>(F(ray.tnear()), sz * e.p.a.z, sz * e.p.b.z, sz * e.p.c.z, e.u + e.v + e.w, t);
+        e.template clear<false>(tnear, e.nearest(za, zb, zc), e.farthest(za, zb, zc), e.u + e.v + e.w, t);
     const unsigned near = hit & ~clear.bits();
     float distances[W];
     plane_distances_in_double(near, ray, block, t).store(distances);

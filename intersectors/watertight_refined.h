@@ -4,11 +4,12 @@
 // reported, with its own right distance.
 //
 // t is right to half a unit in the last place, and a little, unless the ray grazes (relative error some 2^-50 times
-// |e1||e2||d| / |N.d|). Where the exact ray passes outside the triangle, by less than the search rounds, the hit is the
-// triangle's nearest point in barycentrics, since the plane at the ray may be far off; t stays within [tnear, tfar]. 36
-// bytes a triangle (vertices) or 12 (indices).
+// |e1||e2||d| / |N.d|). Where the exact ray passes outside the triangle, by less than the search rounds but by more
+// than doubles do, the hit is the triangle's nearest point in barycentrics, since the plane at the ray may be far off;
+// t stays within [tnear, tfar]. 36 bytes a triangle (vertices) or 12 (indices).
 #pragma once
 
+#include "core/exact/double_bounds.h"
 #include "intersectors/leaf_block.h"
 #include "intersectors/moller_trumbore.h"
 #include "intersectors/watertight.h"
@@ -49,7 +50,15 @@ struct WatertightRefined : Watertight {
     const double det = terms.det.v;
     if (det == 0.0) return;  // an answer of the search alone
     double u = terms.u.v / det, v = terms.v.v / det, t = dot(terms.n, terms.c).v / det;
-    if (u < 0.0 || v < 0.0 || u + v > 1.0) {
+    const auto size = [](vd3<1> p) { return std::max({std::abs(p.x.v), std::abs(p.y.v), std::abs(p.z.v)}); };
+    // Of u and v, as of the weights of `exact` (core/exact/hit_arithmetic.cpp).
+    const double scale = double_bounds::kDeterminant * double_bounds::kQuotient / std::abs(det),
+                 error = scale * size(d) * (size(terms.c) * std::max(size(e1), size(e2)) + size(e1) * size(e2)) +
+                         double_bounds::kRounding;
+    const double outside = std::max({-u, -v, 0.5 * (u + v - 1.0)});
+    if (error < 0x1p-10 && outside <= error) {  // beyond, the plane may be anywhere
+      u = std::clamp(u, 0.0, 1.0), v = std::clamp(v, 0.0, 1.0);
+    } else if (outside > 0.0) {
       u = u > 0.0 ? u : 0.0, v = v > 0.0 ? v : 0.0;
       if (u + v > 1.0) {
         const double sum = u + v;
