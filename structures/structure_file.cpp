@@ -154,7 +154,8 @@ std::string other_parameters(const std::string& saved, const StructureInfo& info
   all.insert(here.begin(), here.end());
   const auto read = parameters_read(info.name, settings.builder, settings.parameters.below);
   std::string others;
-  for (const auto& [name, value] : all) {
+  for (const auto& parameter : all) {
+    const std::string& name = parameter.first;
     const bool known = find_own_parameter(name) ||
                        std::ranges::any_of(builder_parameter_table(), [&](const auto& p) { return p.name == name; });
     if (known && read && std::ranges::find(*read, name) == read->end()) continue;
