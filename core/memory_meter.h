@@ -9,7 +9,7 @@ namespace arboretum {
 
 /// Process-wide running total and peak of the bytes allocated through Arena and MeteredVector, and of what a
 /// ReservedArray has handed out and not got back. Thread-safe. A builder's peak is peak() - current() as it was at
-/// reset_peak(); builds are measured one at a time.
+/// reset_peak(); of builds at once structures/accel.cpp says what is measured.
 class MemoryMeter {
  public:
   static void add(std::size_t bytes) noexcept;

@@ -42,8 +42,8 @@ constexpr Summary kTraversals[] = {
     {"stream_incoherent", "Embree's stream of single rays, never with its coherent flag"},
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
     {"auto",
-     "looks at the rays, tile by tile: packets of 64 where they hold together, else streams (rays in flight where they "
-     "share too little on SSE, and in bvh4_aos, bvh4_motion and the quantised BVHs; single rays where neither pays)"},
+     "looks at the rays, tile by tile: packets of 64 where they hold together, else streams in the wide BVHs (on SSE "
+     "rays in flight where they share too little, with four or eight children), single rays in others"},
 };
 constexpr Summary kCallSummaries[] = {
     {"batch", "all rays in one call"},

@@ -57,7 +57,7 @@ struct WatertightRefined : Watertight {
                          double_bounds::kRounding;
     const double outside = std::max({-u, -v, 0.5 * (u + v - 1.0)});
     if (error < 0x1p-10 && outside <= error) {  // beyond, the plane may be anywhere
-      u = std::clamp(u, 0.0, 1.0), v = std::clamp(v, 0.0, 1.0);
+      u = std::clamp(u, 0.0, 1.0), v = std::clamp(v, 0.0, 1.0 - u);
     } else if (outside > 0.0) {
       u = u > 0.0 ? u : 0.0, v = v > 0.0 ? v : 0.0;
       if (u + v > 1.0) {

@@ -1,6 +1,5 @@
-// Moving lanes: within groups of four, from one group to all, and bytes in memory to lanes. What is not plain arrays of
-// floats needs it (bvh4_aos and its leaves, quantised boxes, rays in memory). Include only between simd/target_begin.h and
-// simd/target_end.h.
+// Moving lanes: within groups of four, from one group to all. What is not plain arrays of floats needs it (bvh4_aos and
+// its leaves, rays in memory). Include only between simd/target_begin.h and simd/target_end.h.
 #pragma once
 
 #include "simd/simd.h"
@@ -155,30 +154,6 @@ class SixtyFourBytes {
   __m512i v_[1];
 #endif
 };
-
-/// W unsigned bytes at `p`, one a lane.
-template <int W>
-ARBORETUM_INLINE vi<W> load_bytes(const void* p) {
-#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
-  const auto* byte = static_cast<const std::uint8_t*>(p);
-  return vi<W>::map([&](int i) { return std::int32_t(byte[i]); });
-#else
-  if constexpr (W == 4) {
-    int four;
-    std::memcpy(&four, p, sizeof four);
-    return vi<W>(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(four)));
-  } else {
-#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
-    if constexpr (W == 8) return vi<W>(_mm256_cvtepu8_epi32(_mm_loadl_epi64(static_cast<const __m128i*>(p))));
-#endif
-#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
-    if constexpr (W == 16) return vi<W>(_mm512_cvtepu8_epi32(_mm_loadu_si128(static_cast<const __m128i*>(p))));
-#endif
-    if constexpr (requires(vi<W> b) { b.lo; })
-      return vi<W>(load_bytes<W / 2>(p), load_bytes<W / 2>(static_cast<const std::uint8_t*>(p) + W / 2));
-  }
-#endif
-}
 
 }  // namespace ARBORETUM_ISA_NAMESPACE
 }  // namespace arboretum

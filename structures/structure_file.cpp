@@ -146,8 +146,8 @@ std::string value_in(const Words& values, std::string_view name) {
              : value->second;
 }
 
-/// "bins 32, here 16; collapse optimal, here greedy": what the file was built with otherwise than wanted, of that which
-/// the build reads and what this program does not know. Empty where it is the same.
+/// "bins 32, here 16; collapse optimal, here greedy": what the file was built with otherwise than wanted, of the
+/// parameters that the build reads and of names that this program does not know. Empty where it is the same.
 std::string other_parameters(const std::string& saved, const StructureInfo& info, const BuildSettings& settings) {
   const Words before = values_of(saved), here = values_of(parameters_of(info, settings));
   Words all = before;

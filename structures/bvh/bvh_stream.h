@@ -82,7 +82,7 @@ class Stream {
 
   /// The far planes' offsets are not the near ones'.
   static constexpr bool kTwoOffsets = Padded || !kHasFma;
-  /// Planes that move are rounded by more than pads that are tight along the ray stand.
+  /// Moving planes round by more than pads that are tight along the ray allow for.
   static constexpr bool kMoves = kBoxesMove<Format>;
   /// What nodes need of a ray, in one cache line: BoxRay's r, the distance from which boxes count, the near planes'
   /// offsets and the far ones', and, where boxes move, the ray's time; where the offsets are the same there is room for

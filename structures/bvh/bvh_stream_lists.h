@@ -184,7 +184,7 @@ class StreamLists {
     push(node, planes.plane, tail, direction, free, top);
   }
 
-  /// The children's lists onto the stack, the nearest on top.
+  /// The children's lists onto the stack, the nearest on top (at time 0 where boxes move).
   ARBORETUM_INLINE void push(const std::byte* node, const F (&planes)[6], StackEntry* const (&tail)[N + 1],
                              Vec3f direction, unsigned free, List*& top) {
     alignas(64) float along[W];

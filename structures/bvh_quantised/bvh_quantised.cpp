@@ -74,7 +74,6 @@ void QuantisedNodes<N>::write(Node& node, const Bounds3f* boxes, const bvh::Node
   Bounds3f all;
   for (unsigned i = 0; i < count; ++i) all.extend(boxes[i]), node.child[i] = references[i];
   node.children = std::uint8_t((1u << count) - 1u);
-  if constexpr (requires { node.filler; }) std::memcpy(node.filler, node.kFiller, sizeof node.filler);
   for (int axis = 0; axis < 3; ++axis) {
     const unsigned shift = plane_shift(unsigned(axis));
     const Grid grid = count == 0 ? Grid{0.0f, kBias} : grid_over(all.lower[axis], all.upper[axis]);

@@ -7,8 +7,7 @@
 //
 // Conservative: a plane stands for origin + q * step, exactly, and q is chosen so that the exact value is not above a
 // child's lower and not below its upper plane. A test that rounds that sum to float keeps the property, since rounding
-// is monotonous and the child's plane is a float; a test with FMA computes from the exact value
-// (bvh_quantised_kernels.h).
+// is monotonous and the child's plane is a float.
 #pragma once
 
 #include <cstdint>
@@ -23,15 +22,12 @@ inline constexpr unsigned kPlaneBits = 10, kMostPlane = (1u << kPlaneBits) - 1;
 [[nodiscard]] constexpr std::uint32_t plane_mask(unsigned axis) noexcept { return kMostPlane << plane_shift(axis); }
 
 /// 128 bytes for N = 8, 64 for N = 4: whole cache lines. Children come first.
-/// Kernels load origin and steps as four floats each: the fourth is no subnormal number, which would be slow, and of no
-/// consequence.
 template <int N>
 struct NodeHead {
   float origin[3];
   std::uint8_t children;  ///< a bit for each child that there is
   std::uint8_t filler[3];
-  float step[4];  ///< 2^(-10 axis) times the grid's step
-  static constexpr std::uint8_t kFiller[3] = {0, 0x80, 0x3f};
+  float step[4];  ///< 2^(-10 axis) times the grid's step; the last fills a line
 };
 template <>
 struct NodeHead<4> {

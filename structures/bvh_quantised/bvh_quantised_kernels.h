@@ -1,7 +1,8 @@
 // Rays against the quantised boxes of a node: planes are decoded to floats, one `and`, one conversion and one operation
 // each, and then met as those of bvh::SoaNodes (traversal/box_test.h), whose promises these are: a decoded plane is
-// rounded, which keeps it conservative (bvh_quantised.h), and so is a box like any other. q * step is exact, so it
-// makes no difference whether the sum is fused.
+// rounded, which keeps it conservative (bvh_quantised.h), and so is a box's like any other. It reaches to 1.004 M at
+// most, which pads have room for: they are twice what the roundings of planes within M need. q * step is exact, or
+// infinite for an upper plane, so it makes no difference whether the sum is fused.
 #pragma once
 
 #include "traversal/usual_leaves.h"

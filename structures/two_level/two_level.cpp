@@ -13,10 +13,10 @@
 #include "core/rounding.h"
 #include "core/zero_area.h"
 #include "structures/archive.h"
+#include "structures/below.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/phase_clock.h"
 #include "structures/leaves/leaf_names.h"
-#include "structures/below.h"
 #include "structures/own_parameters.h"
 
 namespace arboretum::two_level {

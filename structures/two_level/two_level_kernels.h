@@ -25,7 +25,7 @@
 //     1.1 u (M + 2 |o'_i|) + 2^-48 (k (M + |o'|) + |R||T| + |c|).
 // So at t the mapped ray is, along axis i, within 1.1 u (M + 2 |o'_i|) + p of the box, where
 //   p = 32 u k (M + |o'|) + 1.01 m + 2^-45 (|R||T| + |c|).
-// A box test's own roundings are 5.1 u (M + |o'_i|) at most (box_test.h, bvh_quantised_kernels.h, kdtree_single.h), its
+// A box test's own roundings are 5.1 u (M + |o'_i|) at most (box_test.h, kdtree_single.h), its
 // pad for a largest coordinate of M + P is 8 u (M + P + |o'_i|), and so with P = p / 8 u
 //   5.1 u (M + |o'_i|) + 1.1 u (M + 2 |o'_i|) + p < 8 u (M + P + |o'_i|):
 // the box is met, within any interval that holds t. P is Placed::pad + Placed::pad_per_distance |o'|, both rounded up,
