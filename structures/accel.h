@@ -67,7 +67,7 @@ struct BuildSettings {
 /// What a build took. `seconds` is wall time from mesh to a structure ready for rays.
 struct BuildReport {
   double seconds = 0.0;
-  double cpu_seconds = 0.0;    ///< of all threads
+  double cpu_seconds = 0.0;    ///< of all threads, others of the program included
   std::size_t peak_bytes = 0;  ///< most memory held at once while building, the structure included, the mesh not
   /// Wall seconds of one thread within build() that are no part of the times above: a library that is made ready once
   /// for any number of builds, as Embree's device.

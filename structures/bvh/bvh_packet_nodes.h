@@ -32,24 +32,46 @@ struct SoaPacketNodes {
   static unsigned boxes(const std::byte* node) { return Single<true>::boxes(node); }
 };
 
-/// Six planes of all children of a node in registers, in the order of `side`, which says of each its k; for streams.
+/// The planes of all children of a node in registers, for a stream's rays, which are of one octant.
 template <class Format>
-struct NodePlanes {
+class NodePlanes {
   using F = vf<Format::kLanes>;
-  static constexpr bool kMoves = kBoxesMove<Format>;
-  F plane[6], motion[kMoves ? 6 : 1];
+  using Planes = vf3<Format::kLanes>;
 
-  ARBORETUM_INLINE NodePlanes(const std::byte* node, const unsigned (&side)[6]) {
-    for (int i = 0; i < 6; ++i) {
-      plane[i] = Format::planes(node, side[i]);
-      if constexpr (kMoves) motion[i] = Format::motion(node, side[i]);
+ public:
+  ARBORETUM_INLINE NodePlanes(const std::byte* node, unsigned octant) {
+    const unsigned x = octant & 1u, y = 2 + (octant >> 1 & 1u), z = 4 + (octant >> 2);
+    near_ = {Format::planes(node, x), Format::planes(node, y), Format::planes(node, z)};
+    far_ = {Format::planes(node, x ^ 1u), Format::planes(node, y ^ 1u), Format::planes(node, z ^ 1u)};
+    if constexpr (kMoves) {
+      near_moves_ = {Format::motion(node, x), Format::motion(node, y), Format::motion(node, z)};
+      far_moves_ = {Format::motion(node, x ^ 1u), Format::motion(node, y ^ 1u), Format::motion(node, z ^ 1u)};
     }
   }
-  /// The i-th for a ray of that time, where boxes move.
-  ARBORETUM_INLINE F of(unsigned i, [[maybe_unused]] float time) const {
-    if constexpr (kMoves) return madd(motion[i], F(time), plane[i]);
-    return plane[i];
+  /// Which children a ray meets, as BoxLanes::meets(), at that time where boxes move.
+  template <class Lanes>
+  ARBORETUM_INLINE auto met(const Lanes& ray, [[maybe_unused]] float time, F tnear, F tfar, F& entry) const {
+    if constexpr (kMoves) {
+      return ray.meets(at(near_, near_moves_, F(time)), at(far_, far_moves_, F(time)), tnear, tfar, entry);
+    } else {
+      return ray.meets(near_, far_, tnear, tfar, entry);
+    }
   }
+  /// Where the children's centres lie along a direction (at time 0), times two.
+  [[nodiscard]] ARBORETUM_INLINE F centres(Vec3f direction) const {
+    return (near_.x + far_.x) * F(direction.x) + (near_.y + far_.y) * F(direction.y) +
+           (near_.z + far_.z) * F(direction.z);
+  }
+
+ private:
+  static constexpr bool kMoves = kBoxesMove<Format>;
+  struct Nothing {};
+  static ARBORETUM_INLINE Planes at(const Planes& from, const Planes& motion, F time) {
+    return {madd(motion.x, time, from.x), madd(motion.y, time, from.y), madd(motion.z, time, from.z)};
+  }
+
+  Planes near_, far_;
+  [[no_unique_address]] std::conditional_t<kMoves, Planes, Nothing> near_moves_, far_moves_;
 };
 
 /// What a packet reads of a node's planes: the node itself, or, for formats whose planes are decoded once for all rays

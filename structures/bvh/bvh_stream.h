@@ -230,21 +230,16 @@ class Stream {
   }
 
   ARBORETUM_INLINE void node(Group& g, bvh::NodeReference target, std::uint64_t rays) {
-    constexpr unsigned kSide = Box::kSide;
     [[maybe_unused]] constexpr unsigned kChildren = (1u << N) - 1u, kSlots = Format::template Single<Padded>::kSlots;
     const std::byte* const node = base_ + bvh::offset_of(target);
-    const unsigned x = g.octant & 1u, y = 2 + (g.octant >> 1 & 1u), z = 4 + (g.octant >> 2);
-    const unsigned side[6] = {x, x ^ 1u, y, y ^ 1u, z, z ^ 1u};
-    const NodePlanes<Format> planes(node, side);
+    const NodePlanes<Format> planes(node, g.octant);
     MetChildren<N, AnyHit> met;
     for (std::uint64_t rest = rays; rest; rest &= rest - 1) {
       const unsigned i = unsigned(__builtin_ctzll(rest));
       const float *const c = g.line[i].number, *const f = c + 4, *const far = kTwoOffsets ? f + 3 : f;
-      BoxLanes<N, Padded> box(Box({c[0], c[1], c[2]}, {f[0], f[1], f[2]}, {far[0], far[1], far[2]}));
-      box.near_x = 0, box.near_y = 2 * kSide, box.near_z = 4 * kSide;
+      const BoxLanes<N, Padded> box(Box({c[0], c[1], c[2]}, {f[0], f[1], f[2]}, {far[0], far[1], far[2]}));
       F entry;
-      const vm<W> meets =
-          box.meets([&](unsigned offset) { return planes.of(offset / kSide, c[kTime]); }, F(c[3]), F(g.t[i]), entry);
+      const vm<W> meets = planes.met(box, c[kTime], F(c[3]), F(g.t[i]), entry);
       met.add(i, meets, entry);
       if constexpr (Counting::kCounting)
         counting_.node(Format::boxes(node), kSlots, unsigned(__builtin_popcount(meets.bits() & kChildren)));

@@ -109,9 +109,7 @@ class StreamLists {
 
   /// Everything that the rays of `root` meet. They have the same octant. Entries from `free` on are unused.
   void octant(const List& root, Vec3f direction, unsigned free) {
-    const Box& box = states_[ray_of(entries_[root.begin])].box;
-    const unsigned x = box.octant & 1u, y = 2 + (box.octant >> 1 & 1u), z = 4 + (box.octant >> 2);
-    const unsigned sides[6] = {x, x ^ 1u, y, y ^ 1u, z, z ^ 1u};
+    const unsigned octant = states_[ray_of(entries_[root.begin])].box.octant;
     List* const bottom = lists_.data();
     List* top = bottom;
     *top++ = root;
@@ -127,7 +125,7 @@ class StreamLists {
         leaf(list);
       } else {
         List* const first = top;
-        node(list, sides, direction, list.begin < free ? free : list.begin, top, depths.current());
+        node(list, octant, direction, list.begin < free ? free : list.begin, top, depths.current());
         depths.push(first - bottom, top - bottom);
       }
     }
@@ -148,10 +146,10 @@ class StreamLists {
     list.count = unsigned(out - first);
   }
 
-  void node(const List& list, const unsigned (&side)[6], Vec3f direction, unsigned free, List*& top,
+  void node(const List& list, unsigned octant, Vec3f direction, unsigned free, List*& top,
             typename Counting::Depth depth) {
     const std::byte* const node = base_ + bvh::offset_of(list.target);
-    const NodePlanes<Format> planes(node, side);
+    const NodePlanes<Format> planes(node, octant);
     StackEntry* tail[N + 1];
     for (int i = 0; i <= N; ++i) tail[i] = children_.data() + std::size_t(i) * group_;
     alignas(64) std::uint32_t key[W + 1];
@@ -159,11 +157,9 @@ class StreamLists {
     for (const StackEntry *e = entries_.data() + list.begin, *end = e + list.count; e != end; ++e) {
       const unsigned ray = ray_of(*e);
       const State& s = states_[ray];
-      BoxLanes<N, Padded> box(s.box);
-      box.near_x = 0, box.near_y = 2 * Box::kSide, box.near_z = 4 * Box::kSide;
       F entry;
-      unsigned hit = box.test_planes([&](unsigned offset) { return planes.of(offset / Box::kSide, s.time); },
-                                     F(s.first), F(s.nearest), entry);
+      unsigned hit = planes.met(BoxLanes<N, Padded>(s.box), s.time, F(s.first), F(s.nearest), entry).bits();
+      if constexpr (N != W) hit &= (1u << N) - 1u;
       if constexpr (Counting::kCounting)
         counting_.node(Format::boxes(node), Test::kSlots, unsigned(__builtin_popcount(hit)));
       entry.store(key);
@@ -181,16 +177,14 @@ class StreamLists {
       counting_.share_node(list.count);
       counting_.at_depth(depth, list.count * Test::kSlots, list.count * Format::boxes(node));
     }
-    push(node, planes.plane, tail, direction, free, top);
+    push(node, planes.centres(direction), tail, free, top);
   }
 
-  /// The children's lists onto the stack, the nearest on top (at time 0 where boxes move).
-  ARBORETUM_INLINE void push(const std::byte* node, const F (&planes)[6], StackEntry* const (&tail)[N + 1],
-                             Vec3f direction, unsigned free, List*& top) {
+  /// The children's lists onto the stack, the nearest on top, by where their centres lie along the rays.
+  ARBORETUM_INLINE void push(const std::byte* node, F centres, StackEntry* const (&tail)[N + 1], unsigned free,
+                             List*& top) {
     alignas(64) float along[W];
-    ((planes[0] + planes[1]) * F(direction.x) + (planes[2] + planes[3]) * F(direction.y) +
-     (planes[4] + planes[5]) * F(direction.z))
-        .store(along);
+    centres.store(along);
     const bvh::NodeReference* const child = Format::children(node);
     unsigned order[N], children = 0;
     std::size_t total = 0;
