@@ -132,6 +132,13 @@ Words values_of(const std::string& text) {
   return values;
 }
 
+/// The row of that parameter, but of a structure's own; nullptr where there is none.
+const Parameter<BuilderParameters>* find_parameter(std::string_view name) {
+  const auto table = builder_parameter_table();
+  const auto row = std::ranges::find(table, name, &Parameter<BuilderParameters>::name);
+  return row == table.end() ? nullptr : &*row;
+}
+
 /// The parameter's value as a user writes it. One that the text leaves out is a structure's own, and has its default.
 std::string value_in(const Words& values, std::string_view name) {
   const auto value = values.find(name);
@@ -139,11 +146,9 @@ std::string value_in(const Words& values, std::string_view name) {
     const OwnParameter* own = find_own_parameter(name);
     return own ? text_of(own->initial) : "none";
   }
-  const auto has_own_choice = [&](const Parameter<BuilderParameters>& p) { return p.name == name && p.has_own; };
-  return value->second == std::to_string(BuilderParameters::kOwn) &&
-                 std::ranges::any_of(builder_parameter_table(), has_own_choice)
-             ? "auto"
-             : value->second;
+  const auto* parameter = find_parameter(name);
+  const bool is_own = parameter && parameter->has_own && value->second == std::to_string(BuilderParameters::kOwn);
+  return is_own ? "auto" : value->second;
 }
 
 /// "bins 32, here 16; collapse optimal, here greedy": what the file was built with otherwise than wanted, of the
@@ -156,8 +161,7 @@ std::string other_parameters(const std::string& saved, const StructureInfo& info
   std::string others;
   for (const auto& parameter : all) {
     const std::string& name = parameter.first;
-    const bool known = find_own_parameter(name) ||
-                       std::ranges::any_of(builder_parameter_table(), [&](const auto& p) { return p.name == name; });
+    const bool known = find_own_parameter(name) || find_parameter(name);
     if (known && read && std::ranges::find(*read, name) == read->end()) continue;
     const std::string one = value_in(before, name), other = value_in(here, name);
     if (one != other) others += (others.empty() ? "" : "; ") + name + " " + one + ", here " + other;
