@@ -162,7 +162,7 @@ TEST_CASE("a reference that a plane cuts is never lost") {
                           : box.lower[k] + (box.upper[k] - box.lower[k]) * dice.uniform(0, 1);
       if (side_of(box, split) != kdtree::Side::both) continue;
       Bounds3f left, right;
-      divide_reference(mesh, {box, 0}, split, cell, left, right);
+      divide_reference(mesh, BoxPads(mesh, mesh.bounds()), {box, 0}, split, cell, left, right);
       REQUIRE_FALSE((left.empty() && right.empty()));
       if (!left.empty()) REQUIRE(left_of(cell, split).contains(left));
       if (!right.empty()) REQUIRE(right_of(cell, split).contains(right));

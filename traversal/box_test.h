@@ -34,6 +34,9 @@
 // where shears are fused and 4.5 u where not, the corners' errors being averaged as their depths are: with x's own 4 u
 // and z's 2 or 3 u that is 9.5 or 11.5 u of the 20, where r is subnormal 15.5 or 17.5).
 //
+// Where few triangles have coordinates as large as M, the wide BVHs put a smaller number in M's place, and widen the
+// boxes of those triangles instead (structures/box_pads.h).
+//
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once
 
@@ -64,7 +67,7 @@ struct BoxPad {
   /// At least; more than what underflow takes from products.
   static constexpr float kLeast = 0x1p-100f;
 
-  float max_coordinate;  ///< the scene's largest
+  float max_coordinate;  ///< M
   bool tight = false;    ///< along the axis where the direction is largest
 
   /// What the interval's ends are scaled by.

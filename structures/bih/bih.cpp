@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
+#include "structures/box_pads.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
@@ -20,9 +21,11 @@ namespace {
 /// Turns a binary tree with boxes into nodes with planes.
 class Converter {
  public:
-  Converter(const BinaryTree& tree, const Collapse& collapse, const CollapseSettings& costs, MeteredVector<Node>& nodes,
-            LeafLists& lists)
-      : tree_(tree), collapse_(collapse), costs_(costs), nodes_(nodes), lists_(lists), cost_(tree.node_count) {
+  Converter(const TriangleMesh& mesh, const BinaryTree& tree, const BoxPads& pads, const Collapse& collapse,
+            const CollapseSettings& costs, MeteredVector<Node>& nodes, LeafLists& lists)
+      : mesh_(mesh), tree_(tree), pads_(pads), collapse_(collapse), costs_(costs), nodes_(nodes), lists_(lists),
+        cost_(tree.node_count) {
+    if (tree.duplicates && pads.any()) largest_.assign(tree.node_count, 0.0f), find_largest(0);
     price(0);
     nodes_.resize(1);
     place(0, 0, box_of(0), 0);
@@ -33,7 +36,17 @@ class Converter {
   [[nodiscard]] double sah_cost() const noexcept { return sah_cost_; }
 
  private:
-  [[nodiscard]] Bounds3f box_of(std::uint32_t node) const { return {tree_.nodes[node].lower, tree_.nodes[node].upper}; }
+  [[nodiscard]] Bounds3f box_of(std::uint32_t node) const {
+    const Bounds3f box{tree_.nodes[node].lower, tree_.nodes[node].upper};
+    return largest_.empty() ? pads_.widened(box) : BoxPads::widened(box, pads_.pad(largest_[node]));
+  }
+  float find_largest(std::uint32_t index) {
+    const BinaryNode& node = tree_.nodes[index];
+    if (!node.is_leaf()) return largest_[index] = std::max(find_largest(node.left), find_largest(node.left + 1));
+    for (std::size_t i = tree_.begin_of(index), end = i + node.count; i < end; ++i)
+      largest_[index] = std::max(largest_[index], largest_coordinate(mesh_.bounds(tree_.primitives[i])));
+    return largest_[index];
+  }
 
   /// Expected cost below a node for a ray that meets its box.
   float price(std::uint32_t node) {
@@ -123,20 +136,24 @@ class Converter {
     return std::uint32_t(first);
   }
 
+  const TriangleMesh& mesh_;
   const BinaryTree& tree_;
+  const BoxPads& pads_;
   const Collapse& collapse_;
   const CollapseSettings& costs_;
   MeteredVector<Node>& nodes_;
   LeafLists& lists_;
   MeteredVector<float> cost_;
+  /// The largest |coordinate| of the triangles below each node, where boxes do not tell it.
+  MeteredVector<float> largest_;
   std::size_t deepest_ = 0;
   double sah_cost_ = 0.0;
 };
 
-double sah_cost_of(const BinaryTree& tree, const CollapseSettings& how) {
+double sah_cost_of(const TriangleMesh& mesh, const BinaryTree& tree, const BoxPads& pads, const CollapseSettings& how) {
   MeteredVector<Node> nodes;
   LeafLists lists;
-  return Converter(tree, Collapse(tree, how), how, nodes, lists).sah_cost();
+  return Converter(mesh, tree, pads, Collapse(tree, how), how, nodes, lists).sah_cost();
 }
 
 }  // namespace
@@ -159,7 +176,7 @@ void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildRe
   require_triangles(kName, mesh.size());
   static_cast<void>(require_leaf_form(kName, settings.leaf));
   LeafLists lists;
-  nodes_.clear(), bounds_ = mesh.bounds(), stack_entries_ = 1, max_coordinate_ = largest_coordinate(bounds_);
+  nodes_.clear(), bounds_ = mesh.bounds(), stack_entries_ = 1, max_coordinate_ = 0.0f;
   if (mesh.size() == 0) {  // an empty leaf, behind an empty box
     nodes_.push_back({{0.0f, 0.0f}, Node::kLeaf});
     lists.begin.assign(2, 0);
@@ -174,10 +191,12 @@ void Bih::build(const TriangleMesh& mesh, const BuildSettings& settings, BuildRe
                                  .node_bytes = 2 * sizeof(Node),
                                  .block_bytes = sizeof(Block)};
       BinaryTree tree;
+      const BoxPads pads(mesh, bounds_);
       build_binary_tree(mesh, settings, unsigned(Block::kWidth), tree, report,
-                        {2, [&](const BinaryTree& t) { return sah_cost_of(t, how); }});
+                        {2, [&](const BinaryTree& t) { return sah_cost_of(mesh, t, pads, how); }});
       const double start = wall_seconds();
-      stack_entries_ = Converter(tree, Collapse(tree, how), how, nodes_, lists).pairs_deep() + 1;
+      stack_entries_ = Converter(mesh, tree, pads, Collapse(tree, how), how, nodes_, lists).pairs_deep() + 1;
+      bounds_ = pads.widened(bounds_), max_coordinate_ = pads.common();
       nodes_.shrink_to_fit();
       report.phases.emplace_back("planes", wall_seconds() - start);
     });

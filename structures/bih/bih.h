@@ -53,6 +53,7 @@ class Bih final : public Accel {
   [[nodiscard]] const Node* nodes() const noexcept { return nodes_.data(); }  ///< the root first
   [[nodiscard]] const Bounds3f& bounds() const noexcept { return bounds_; }
   [[nodiscard]] const LeafStore& leaves() const noexcept { return leaves_; }
+  /// What padded intervals scale their pad with (structures/box_pads.h).
   [[nodiscard]] float max_coordinate() const noexcept { return max_coordinate_; }
   /// Most children that can wait while a ray goes down.
   [[nodiscard]] std::size_t stack_entries() const noexcept { return stack_entries_; }

@@ -1,13 +1,11 @@
 #include "structures/bvh/bvh.h"
 
-#include "core/coordinates.h"
 #include "structures/bvh/wide_bvh.h"
 
 namespace arboretum::bvh {
 
-void BvhBase::set_scene(const TriangleMesh& mesh, const Bounds3f& bounds) noexcept {
-  vertices_ = mesh.vertices.data(), triangles_ = mesh.size(), bounds_ = bounds,
-  max_coordinate_ = largest_coordinate(bounds);
+void BvhBase::set_scene(const TriangleMesh& mesh, const Bounds3f& bounds, float max_coordinate) noexcept {
+  vertices_ = mesh.vertices.data(), triangles_ = mesh.size(), bounds_ = bounds, max_coordinate_ = max_coordinate;
 }
 
 template class WideBvh<SoaNodes<2>>;

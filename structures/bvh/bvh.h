@@ -30,15 +30,16 @@ class BvhBase : public Accel {
   [[nodiscard]] NodeReference root() const noexcept { return root_; }
   /// Entries that a traversal stack can need, the root's included.
   [[nodiscard]] std::size_t stack_entries() const noexcept { return stack_entries_; }
-  /// Largest |coordinate| of the scene's bounds: what padded box tests scale their pad with.
+  /// What padded box tests scale their pad with: the largest |coordinate| of the scene, or where that is not a common
+  /// one, less (structures/box_pads.h).
   [[nodiscard]] float max_coordinate() const noexcept { return max_coordinate_; }
   [[nodiscard]] const std::string& leaf() const noexcept { return leaf_; }
   /// The mesh's vertices, which leaf blocks of indices name.
   [[nodiscard]] const Vec3f* vertices() const noexcept { return vertices_; }
 
  protected:
-  /// Takes note of the mesh that rays will meet and of its bounds.
-  void set_scene(const TriangleMesh& mesh, const Bounds3f& bounds) noexcept;
+  /// Takes note of the mesh that rays will meet, of the root's box, and of what boxes are padded for.
+  void set_scene(const TriangleMesh& mesh, const Bounds3f& bounds, float max_coordinate) noexcept;
 
   Arena arena_;
   NodeReference root_ = 0;

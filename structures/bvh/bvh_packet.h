@@ -74,10 +74,12 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     Mask mask;
   };
   /// Bounds of a group of rays by axis: of 1/d, of the origin at the near and at the far planes, and what they are
-  /// widened by.
+  /// widened by. That makes good what is rounded along an axis where planes are no further than max_coordinate_; where
+  /// they are (structures/box_pads.h) roundings are 8 u of the distance at most, for which the first and the last one
+  /// are scaled by `earlier` and `later`.
   struct Interval {
     float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
-    float tnear;
+    float tnear, earlier, later;
     bool usable, from_end;
     unsigned near[3];  ///< the near planes; the far one of axis a is 4 a + 1 less that
   };
@@ -139,8 +141,11 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
       Base::set_axis(a, o[a].low, o[a].high, mask);
     }
+    // Distances that count from a ray's end are negative.
+    v.earlier = v.from_end ? 1.0f + kSlack : 1.0f - kSlack, v.later = v.from_end ? 1.0f - kSlack : 1.0f + kSlack;
     return v;
   }
+  static constexpr float kSlack = 0x1p-21f;
 
   /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together, or by a subnormal number's
   /// last place.
@@ -200,8 +205,8 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       near = max_x86(min_x86(n * low, n * high) - pad, near);
       far = min_x86(max_x86(f * low, f * high) + pad, far);
     }
-    entry = near;
-    const unsigned bits = (near <= far).bits();
+    entry = near * Children(v.earlier);
+    const unsigned bits = (entry <= far * Children(v.later)).bits();
     return N == kLanes ? bits : bits & ((1u << N) - 1u);
   }
 

@@ -9,9 +9,11 @@
 
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
+#include "structures/box_pads.h"
 #include "structures/builders/box4.h"
 #include "structures/builders/builders.h"
 #include "structures/builders/collapse.h"
@@ -46,8 +48,12 @@ class Emitter {
  public:
   using Node = typename Format::Node;
 
-  Emitter(const TriangleMesh& mesh, const LeafForm& form, const WideTree& tree, std::byte* base)
-      : mesh_(mesh), boxes_(mesh), form_(form), tree_(tree), base_(base) {}
+  /// `split`: boxes may hold parts of triangles.
+  Emitter(const TriangleMesh& mesh, const LeafForm& form, const BoxPads& pads, const WideTree& tree, bool split,
+          std::byte* base)
+      : mesh_(mesh), boxes_(mesh), form_(form), pads_(pads), tree_(tree), base_(base) {
+    if (split && pads.any()) largest_.assign(tree.nodes.size(), 0.0f), find_largest(tree.nodes[0]);
+  }
 
   /// Returns the depth of the deepest leaf below.
   unsigned subtree(const WideNode& from, std::size_t offset) const {
@@ -64,7 +70,7 @@ class Emitter {
     Bounds3f boxes[kMaxBranching];
     NodeReference references[kMaxBranching] = {};
     for (unsigned i = 0; i < count; ++i) {
-      boxes[i] = children[i].box;
+      boxes[i] = widened(children[i]);
       references[i] = reference(children[i], child_offset[i]);
     }
     Format::write(*node, boxes, references, count);
@@ -106,6 +112,22 @@ class Emitter {
   }
 
  private:
+  [[nodiscard]] std::size_t index_of(const WideNode& node) const { return std::size_t(&node - &tree_.nodes[0]); }
+  float find_largest(const WideNode& node) {
+    float& largest = largest_[index_of(node)];
+    if (node.is_leaf()) {
+      LeafPrimitives room;
+      for (const std::uint32_t id : tree_.leaf_primitives(node, room))
+        largest = std::max(largest, largest_coordinate(mesh_.bounds(id)));
+    } else {
+      for (const WideNode& child : tree_.children(node)) largest = std::max(largest, find_largest(child));
+    }
+    return largest;
+  }
+  [[nodiscard]] Bounds3f widened(const WideNode& node) const {
+    if (largest_.empty()) return pads_.widened(node.box);
+    return BoxPads::widened(node.box, pads_.pad(largest_[index_of(node)]));
+  }
   /// Of a node with all below, or of a leaf.
   [[nodiscard]] std::size_t bytes(const WideNode& node) const noexcept {
     return node.is_leaf() ? round_up<Format>(node.blocks() * form_.bytes) : node.granules() * Format::kGranule;
@@ -114,7 +136,10 @@ class Emitter {
   const TriangleMesh& mesh_;
   const TriangleBoxes boxes_;
   const LeafForm& form_;
+  const BoxPads& pads_;
   const WideTree& tree_;
+  /// The largest |coordinate| of the triangles below each node, where boxes do not tell it.
+  MeteredVector<float> largest_;
   std::byte* base_;
 };
 
@@ -157,6 +182,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
       mesh, settings, form.width, tree, report,
       {how.branching, [&](const BinaryTree& t) { return sah_cost(t, how); }, may_fill ? &blocks : nullptr});
 
+  const bool split = tree.duplicates;
   double start = wall_seconds();
   const WideTree wide = collapse(std::move(tree), how);
   report.phases.emplace_back("collapse", wall_seconds() - start);
@@ -167,7 +193,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
     arena_ = Arena(round_up<Format>(sizeof(typename Format::Node)));
     Format::write(*new_node<Format>(arena_.data()), nullptr, nullptr, 0);
     root_ = 0, stack_entries_ = 2 * kBranching;
-    set_scene(mesh, {});
+    set_scene(mesh, {}, 0.0f);
     return;
   }
   const WideNode& root = wide.nodes[0];
@@ -179,7 +205,8 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
   }
   arena_ = {};
   arena_ = wide.in_blocks ? blocks.take(node_bytes) : Arena(node_bytes);
-  const Emitter<Format> emitter(mesh, form, wide, arena_.data());
+  const BoxPads pads(mesh, root.box);
+  const Emitter<Format> emitter(mesh, form, pads, wide, split, arena_.data());
   std::size_t next = nodes_begin;
   const std::size_t at = emitter.place(root, next);
   root_ = emitter.reference(root, at);
@@ -190,7 +217,7 @@ void WideBvh<Format>::build(const TriangleMesh& mesh, const BuildSettings& setti
     depth = emitter.subtree(root, at);
   }
   stack_entries_ = std::size_t(depth) * (kBranching - 1) + kBranching + 1;
-  set_scene(mesh, root.box);
+  set_scene(mesh, pads.widened(root.box), pads.common());
   report.phases.emplace_back("leaves", wall_seconds() - start);
 }
 

@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/mesh_check.h"
+#include "structures/box_pads.h"
 #include "structures/builders/collapse.h"
 #include "structures/bvh/bvh.h"
 #include "structures/leaves/leaf_form.h"
@@ -20,7 +21,8 @@ namespace arboretum::bvh {
 template <class Format>
 class Refitter {
  public:
-  Refitter(const TriangleMesh& mesh, const LeafForm& form, std::byte* base) : mesh_(mesh), form_(form), base_(base) {}
+  Refitter(const TriangleMesh& mesh, const LeafForm& form, const BoxPads& pads, std::byte* base)
+      : mesh_(mesh), form_(form), pads_(pads), base_(base) {}
 
   /// The new box of what is below `reference`.
   Bounds3f subtree(NodeReference reference, unsigned depth) const {
@@ -36,9 +38,9 @@ class Refitter {
     } else {
       for (unsigned i = 0; i < count; ++i) descend(i);
     }
-    Format::write(node, boxes, references, count);
     Bounds3f box;
-    for (unsigned i = 0; i < count; ++i) box.extend(boxes[i]);
+    for (unsigned i = 0; i < count; ++i) box.extend(boxes[i]), boxes[i] = pads_.widened(boxes[i]);
+    Format::write(node, boxes, references, count);
     return box;
   }
 
@@ -60,6 +62,7 @@ class Refitter {
 
   const TriangleMesh& mesh_;
   const LeafForm& form_;
+  const BoxPads& pads_;
   std::byte* base_;
 };
 
@@ -71,7 +74,10 @@ void WideBvh<Format>::refit(const TriangleMesh& mesh) {
   }
   check_triangles(mesh);
   check_one_moment(mesh, kName);
-  set_scene(mesh, Refitter<Format>(mesh, *find_leaf_form(leaf_), arena_.data()).subtree(root_, 0));
+  // A leaf's box is made of its triangles: of whole ones, whatever builders split.
+  const BoxPads pads(mesh, mesh.bounds());
+  const Bounds3f bounds = Refitter<Format>(mesh, *find_leaf_form(leaf_), pads, arena_.data()).subtree(root_, 0);
+  set_scene(mesh, pads.widened(bounds), pads.common());
 }
 
 }  // namespace arboretum::bvh

@@ -30,6 +30,7 @@
 #include "core/timer.h"
 #include "intersectors/blocks.h"
 #include "structures/archive.h"
+#include "structures/box_pads.h"
 #include "structures/builders/builders.h"
 
 namespace arboretum::bvh4_motion {
@@ -54,6 +55,15 @@ class Converter {
     bounds_.resize(mesh.size());
     tbb::parallel_for(std::size_t{0}, mesh.size(),
                       [&](std::size_t i) { bounds_[i] = linear_bounds(mesh, std::uint32_t(i)); });
+    Bounds3f at_any_time;
+    for (const LinearBounds& b : bounds_) at_any_time.extend(b.at0), at_any_time.extend(b.at1);
+    pads_ = BoxPads(mesh, at_any_time);
+  }
+  [[nodiscard]] const BoxPads& pads() const noexcept { return pads_; }
+  /// The box as a node has it.
+  [[nodiscard]] LinearBounds widened(const LinearBounds& box) const noexcept {
+    const double pad = pads_.pad(std::max(largest_coordinate(box.at0), largest_coordinate(box.at1)));
+    return pad > 0.0 ? LinearBounds{BoxPads::widened(box.at0, pad), BoxPads::widened(box.at1, pad)} : box;
   }
 
   [[nodiscard]] std::size_t bytes() const {
@@ -96,11 +106,12 @@ class Converter {
     Node& node = *new (base + offset) Node;
     std::memset(base + offset + kNodePadding, 0, sizeof(Node) - kNodePadding);
     for (unsigned i = 0; i < 4; ++i) {
+      const LinearBounds box = widened(child[i]);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const float lower = child[i].at0.lower[axis], upper = child[i].at0.upper[axis];
+        const float lower = box.at0.lower[axis], upper = box.at0.upper[axis];
         node.planes[2 * axis][i] = lower, node.planes[2 * axis + 1][i] = upper;
-        node.motion[2 * axis][i] = i < count ? rounded_down(double(child[i].at1.lower[axis]) - lower) : 0.0f;
-        node.motion[2 * axis + 1][i] = i < count ? rounded_up(double(child[i].at1.upper[axis]) - upper) : 0.0f;
+        node.motion[2 * axis][i] = i < count ? rounded_down(double(box.at1.lower[axis]) - lower) : 0.0f;
+        node.motion[2 * axis + 1][i] = i < count ? rounded_up(double(box.at1.upper[axis]) - upper) : 0.0f;
       }
       node.child[i] = written[i];
       if (i < count) bounds.extend(child[i]);
@@ -119,6 +130,7 @@ class Converter {
 
   const bvh::Bvh4& from_;
   MeteredVector<LinearBounds> bounds_;  // of each triangle
+  BoxPads pads_;
 };
 
 }  // namespace
@@ -187,8 +199,7 @@ void Bvh4Motion::build(const TriangleMesh& mesh, const BuildSettings& settings, 
   std::size_t next = 0;
   root_ = converter.write(arena_.data(), still.root(), next, bounds);
   stack_entries_ = still.stack_entries();
-  set_scene(mesh, at_half_time(bounds));
-  max_coordinate_ = std::max(largest_coordinate(bounds.at0), largest_coordinate(bounds.at1));
+  set_scene(mesh, at_half_time(converter.widened(bounds)), converter.pads().common());
   report.phases.emplace_back("moving boxes", wall_seconds() - start);
 }
 

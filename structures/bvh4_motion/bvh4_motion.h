@@ -45,7 +45,7 @@ class Bvh4Motion final : public bvh::BvhBase {
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
 
  private:
-  /// The base's bounds are those at time 0.5, its largest coordinate that of any time.
+  /// The base's bounds are those at time 0.5, its max_coordinate() is for any time.
   const TriangleMesh* mesh_ = nullptr;
 };
 

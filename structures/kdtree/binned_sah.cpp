@@ -69,8 +69,8 @@ class Binned {
     }
   };
 
-  Binned(const TriangleMesh& mesh, const CostModel& model, unsigned bins)
-      : mesh_(mesh), model_(model), max_bins_(bins) {}
+  Binned(const TriangleMesh& mesh, const BoxPads& pads, const CostModel& model, unsigned bins)
+      : mesh_(mesh), pads_(pads), model_(model), max_bins_(bins) {}
 
   Split find(const State& state, const Bounds3f& cell, bool parallel) const {
     const References& references = state.references;
@@ -203,7 +203,7 @@ class Binned {
         case Side::right: right.push_back(*r); break;
         case Side::both: {
           Bounds3f l, h;
-          divide_reference(mesh_, *r, split, cell, l, h);
+          divide_reference(mesh_, pads_, *r, split, cell, l, h);
           if (!l.empty()) left.push_back({l, r->id});
           if (!h.empty()) right.push_back({h, r->id});
         }
@@ -222,18 +222,19 @@ class Binned {
   }
 
   const TriangleMesh& mesh_;
+  const BoxPads& pads_;
   const CostModel& model_;
   const unsigned max_bins_;
 };
 
 }  // namespace
 
-void build_binned(const TriangleMesh& mesh, const BuilderParameters& parameters, const CostModel& model,
-                  const Limits& limits, const Bounds3f& cell, Part& out, BuildReport& report) {
+void build_binned(const TriangleMesh& mesh, const BoxPads& pads, const BuilderParameters& parameters,
+                  const CostModel& model, const Limits& limits, const Bounds3f& cell, Part& out, BuildReport& report) {
   PhaseClock phase(report);
-  Binned::State root{make_references(mesh)};
+  Binned::State root{make_references(mesh, pads)};
   phase.ends("references");
-  const Binned method(mesh, model, parameters.bins);
+  const Binned method(mesh, pads, model, parameters.bins);
   TopDown<Binned>(method, model, limits).build(std::move(root), cell, out);
   phase.ends("splits");
 }

@@ -5,11 +5,11 @@
 
 #include <tbb/parallel_for.h>
 
-#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "intersectors/blocks.h"
 #include "structures/archive.h"
+#include "structures/box_pads.h"
 #include "structures/interval_rays.h"
 #include "structures/kdtree/builders.h"
 #include "structures/kdtree/emit.h"
@@ -52,15 +52,16 @@ void KdTree::build(const TriangleMesh& mesh, const BuildSettings& settings, Buil
   static_cast<void>(require_leaf_form(kName, settings.leaf));
   with_block(settings.leaf, [&]<class Block>(std::type_identity<Block>) {
     leaf_ = settings.leaf, vertices_ = mesh.vertices.data();
-    bounds_ = mesh.size() == 0 ? Bounds3f{{0, 0, 0}, {0, 0, 0}} : mesh.bounds();
-    max_coordinate_ = largest_coordinate(bounds_);
+    const Bounds3f bounds = mesh.size() == 0 ? Bounds3f{{0, 0, 0}, {0, 0, 0}} : mesh.bounds();
+    const BoxPads pads(mesh, bounds);
+    bounds_ = pads.widened(bounds), max_coordinate_ = pads.common();
     Part tree;
     if (mesh.size() == 0) {
       tree.nodes.push_back({0.0f, 3, 0, 0});
     } else {
       const CostModel model(settings.parameters, unsigned(Block::kWidth));
       const Limits limits{depth_limit(settings.parameters, mesh.size()), kReferences * mesh.size()};
-      builder(mesh, settings.parameters, model, limits, bounds_, tree, report);
+      builder(mesh, pads, settings.parameters, model, limits, bounds_, tree, report);
     }
     const double start = wall_seconds();
     arena_ = Arena();

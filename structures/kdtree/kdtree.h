@@ -55,11 +55,11 @@ class KdTree final : public Accel {
 
   [[nodiscard]] const std::byte* base() const noexcept { return arena_.data(); }
   [[nodiscard]] Node root() const noexcept { return root_; }
-  /// The root's cell: the scene's bounds.
+  /// The root's cell: the scene's bounds, as structures/box_pads.h widens them.
   [[nodiscard]] const Bounds3f& bounds() const noexcept { return bounds_; }
   /// Entries that a traversal stack can need.
   [[nodiscard]] std::size_t stack_entries() const noexcept { return depth_ + 2; }
-  /// Largest |coordinate| of the bounds: what padded planes scale their pad with.
+  /// What padded planes scale their pad with (structures/box_pads.h).
   [[nodiscard]] float max_coordinate() const noexcept { return max_coordinate_; }
   /// The mesh's vertices, which leaf blocks of indices name.
   [[nodiscard]] const Vec3f* vertices() const noexcept { return vertices_; }

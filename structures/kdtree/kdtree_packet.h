@@ -113,11 +113,13 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     float r0[3], r1[3], low_origin[3], high_origin[3], pad[3];
     bool usable;
 
-    /// No ray meets the plane before `low` or behind `high`, padded or not.
+    /// No ray meets the plane before `low` or behind `high`, padded or not. The pad makes good what is rounded where
+    /// the plane is no further than max_coordinate_; where it is (structures/box_pads.h), 8 u of the distance does.
     ARBORETUM_INLINE void distances(float plane, unsigned axis, float& low, float& high) const {
       const float a = plane - low_origin[axis], b = plane - high_origin[axis];
       const float a0 = a * r0[axis], a1 = a * r1[axis], b0 = b * r0[axis], b1 = b * r1[axis];
       low = (a0 < a1 ? a0 : a1) - pad[axis], high = (b0 > b1 ? b0 : b1) + pad[axis];
+      low -= 0x1p-21f * __builtin_fabsf(low), high += 0x1p-21f * __builtin_fabsf(high);
     }
   };
 

@@ -3,7 +3,8 @@
 //
 // A cell's interval of t is what its planes leave of the ray. A plane at s on an axis with origin o and direction d is
 // met at t = (s - o) / d, computed as s * r - o * r. Padded, the side that the ray comes from ends at t + e and the
-// other begins at t - e, with e = 2^-21 (M + |o|)|r|, M the scene's largest |coordinate|; traversal/box_test.h proves
+// other begins at t - e, with e = 2^-21 (M + |o|)|r|, M the scene's largest |coordinate| (or less, and then triangles
+// are thicker: structures/box_pads.h); traversal/box_test.h proves
 // for boxes that this covers the rounding of r, o * r and t, fused or not (unfused, s * r rounds by another u M |r|: 5
 // u in all, still under e). So no cell is missed that the exact ray touches, neither cells without thickness nor
 // neighbours across a plane that the ray lies in: a component below 2^-60 of the largest gets r = 2^60 / |d|max, and

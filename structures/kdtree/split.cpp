@@ -4,6 +4,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "core/coordinates.h"
 #include "structures/kdtree/builders.h"
 #include "structures/kdtree/clip.h"
 
@@ -18,21 +19,30 @@ namespace {
 
 }  // namespace
 
-void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell,
-                      Bounds3f& left, Bounds3f& right) noexcept {
+void divide_reference(const TriangleMesh& mesh, const BoxPads& pads, const Reference& reference, const Split& split,
+                      const Bounds3f& cell, Bounds3f& left, Bounds3f& right) noexcept {
   const std::size_t axis = std::size_t(split.axis);
   Bounds3f left_half = reference.box, right_half = reference.box;
   left_half.upper[axis] = right_half.lower[axis] = split.plane;
-  clipped_bounds(mesh.corners(reference.id), cell, split.axis, split.plane, left, right);
+  const std::array<Vec3f, 3> corners = mesh.corners(reference.id);
+  const double pad = pads.pad(largest_coordinate(mesh.bounds(reference.id)));
+  if (pad > 0.0) {
+    const auto thick_part = [&](const Bounds3f& half) {
+      return BoxPads::widened(clipped_bounds(corners, BoxPads::widened(half, pad)), pad);
+    };
+    left = thick_part(left_half), right = thick_part(right_half);
+  } else {
+    clipped_bounds(corners, cell, split.axis, split.plane, left, right);
+  }
   const bool in_left = cut_to(left, left_half), in_right = cut_to(right, right_half);
   if (!in_left && !in_right) left = left_half, right = right_half;
 }
 
-References make_references(const TriangleMesh& mesh) {
+References make_references(const TriangleMesh& mesh, const BoxPads& pads) {
   References references(mesh.size());
   tbb::parallel_for(std::size_t{0}, (mesh.size() + kChunk - 1) / kChunk, [&](std::size_t c) {
     for (std::size_t i = c * kChunk, end = std::min(mesh.size(), i + kChunk); i < end; ++i) {
-      references[i] = {mesh.bounds(i), std::uint32_t(i)};
+      references[i] = {pads.widened(mesh.bounds(i)), std::uint32_t(i)};
     }
   });
   return references;

@@ -8,6 +8,7 @@
 #include "core/memory_meter.h"
 #include "core/mesh.h"
 #include "structures/accel.h"
+#include "structures/box_pads.h"
 
 namespace arboretum::kdtree {
 
@@ -49,9 +50,10 @@ enum class Side : std::uint8_t { left, right, both };
 }
 
 /// Parts a reference of a cell that the plane cuts. A side that the triangle does not reach gets an empty box, but
-/// never both of them: where rounding says so, both keep the reference's own box, cut at the plane.
-void divide_reference(const TriangleMesh& mesh, const Reference& reference, const Split& split, const Bounds3f& cell,
-                      Bounds3f& left, Bounds3f& right) noexcept;
+/// never both of them: where rounding says so, both keep the reference's own box, cut at the plane. A triangle that is
+/// thicker by `pads` reaches so much further.
+void divide_reference(const TriangleMesh& mesh, const BoxPads& pads, const Reference& reference, const Split& split,
+                      const Bounds3f& cell, Bounds3f& left, Bounds3f& right) noexcept;
 
 inline constexpr std::size_t kChunk = 1u << 13;  ///< references that a task takes at a time, within one cell
 

@@ -54,7 +54,8 @@ class Sweep {
     std::vector<std::uint32_t> to_left, to_right;
   };
 
-  Sweep(const TriangleMesh& mesh, const CostModel& model) : mesh_(mesh), model_(model) {}
+  Sweep(const TriangleMesh& mesh, const BoxPads& pads, const CostModel& model)
+      : mesh_(mesh), pads_(pads), model_(model) {}
 
   static void start(State& root) {
     const References& references = root.references;
@@ -91,7 +92,7 @@ class Sweep {
         state.sides[i] = std::uint8_t(side);
         if (side != Side::both) continue;
         auto& [l, r] = cut[c].emplace_back();
-        divide_reference(mesh_, in[i], split, cell, l, r);
+        divide_reference(mesh_, pads_, in[i], split, cell, l, r);
       }
     };
     if (parallel) {
@@ -176,19 +177,20 @@ class Sweep {
   }
 
   const TriangleMesh& mesh_;
+  const BoxPads& pads_;
   const CostModel& model_;
 };
 
 }  // namespace
 
-void build_sweep(const TriangleMesh& mesh, const BuilderParameters&, const CostModel& model, const Limits& limits,
-                 const Bounds3f& cell, Part& out, BuildReport& report) {
+void build_sweep(const TriangleMesh& mesh, const BoxPads& pads, const BuilderParameters&, const CostModel& model,
+                 const Limits& limits, const Bounds3f& cell, Part& out, BuildReport& report) {
   PhaseClock phase(report);
   Sweep::State root;
-  root.references = make_references(mesh);
+  root.references = make_references(mesh, pads);
   Sweep::start(root);
   phase.ends("sort");
-  const Sweep method(mesh, model);
+  const Sweep method(mesh, pads, model);
   TopDown<Sweep>(method, model, limits).build(std::move(root), cell, out);
   phase.ends("splits");
 }
