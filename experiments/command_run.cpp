@@ -172,7 +172,7 @@ void remove_files(const std::filesystem::path& folder, const std::vector<std::st
 /// All that a run writes into its folder.
 std::vector<std::string> files_of_run(const std::filesystem::path& folder) {
   std::vector<std::string> names = concluding_files(folder);
-  names.insert(names.end(), {"cells.jsonl", "repetitions.jsonl", "effective.yaml", kPlanFile});
+  names.insert(names.end(), {"cells.jsonl", "repetitions.jsonl", "effective.yaml", kPlanFile, kCrashFile});
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
@@ -245,7 +245,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   before.take_up_scenes(scenes);
   context["scenes"] = scenes;
   if (!command.benchmark.out.empty()) require_writable(command.benchmark.out);
-  if (!command.resume) set_aside(folder);
+  if (!command.resume) set_aside(folder), remove_files(folder, present(folder, {kCrashFile}));
   Journal journal(folder, hash, whole, command.resume);
   keep_measured(plan, record, whole, journal.done());
   const double seconds = seconds_left(
@@ -273,9 +273,13 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   RunOutcome outcome;
   {
     const InterruptNote note;
-    const CrashNote crash("; cells that ended are kept, and the same command with --resume goes on after them");
+    const CrashNote crash("; cells that ended are kept, and the same command with --resume leaves this out and goes on",
+                          folder / kCrashFile);
     outcome = run_plan(experiment, plan, registry, journal,
-                       {.fail_fast = command.fail_fast, .geometry = record.geometry, .origin = origin_of(context)},
+                       {.fail_fast = command.fail_fast,
+                        .geometry = record.geometry,
+                        .origin = origin_of(context),
+                        .crashed = recorded_crashes(folder / kCrashFile)},
                        std::move(loaded));
   }
   name_origins(outcome.results, before.origin());

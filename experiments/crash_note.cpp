@@ -1,11 +1,13 @@
 #include "experiments/crash_note.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstring>
+#include <fstream>
 #include <vector>
 
 namespace arboretum {
@@ -19,6 +21,7 @@ struct State {
   std::array<char, kMost> what{};
   std::atomic<std::size_t> length{0};  ///< of `what`; 0 while it is written
   std::string_view after;
+  std::array<char, 4096> record{};  ///< a path, or nothing
   bool terminal = false;
   std::array<struct sigaction, CrashNote::kSignals.size()> before{};
   stack_t stack_before{};
@@ -54,6 +57,11 @@ void tell(int signal, siginfo_t* info, void*) {
   add(state.after);
   add("\n");
   static_cast<void>(!::write(STDERR_FILENO, line.data(), size));
+  if (length > 0 && state.record[0] != 0) {
+    const int file = ::open(state.record.data(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    size = 0, add({state.what.data(), length}), add("\n");
+    if (file >= 0) static_cast<void>(!::write(file, line.data(), size)), ::close(file);
+  }
   for (std::size_t i = 0; i < CrashNote::kSignals.size(); ++i)
     if (CrashNote::kSignals[i] == signal) ::sigaction(signal, &state.before[i], nullptr);
   // A fault comes again when its instruction does; one that was sent has to be sent again.
@@ -69,8 +77,11 @@ void set_under_way(std::string_view what) {
 
 }  // namespace
 
-CrashNote::CrashNote(std::string_view after) {
+CrashNote::CrashNote(std::string_view after, const std::filesystem::path& record) {
   static std::vector<char> stack(kStack);
+  const std::string path = record.empty() ? std::string() : std::filesystem::absolute(record).string();
+  state.record.fill(0);
+  if (path.size() < state.record.size()) std::ranges::copy(path, state.record.begin());
   state.after = after, state.terminal = ::isatty(STDERR_FILENO) == 1;
   stack_t own{};
   own.ss_sp = stack.data(), own.ss_size = stack.size();
@@ -88,6 +99,13 @@ CrashNote::~CrashNote() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &state.before[i], nullptr);
   ::sigaltstack(&state.stack_before, nullptr);
   set_under_way({});
+}
+
+std::set<std::string, std::less<>> recorded_crashes(const std::filesystem::path& record) {
+  std::set<std::string, std::less<>> crashes;
+  std::ifstream file(record);
+  for (std::string line; std::getline(file, line);) crashes.insert(line);
+  return crashes;
 }
 
 UnderWay::UnderWay(std::string_view what) : before_(state.what.data(), state.length) { set_under_way(what); }

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <csignal>
+#include <filesystem>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -13,14 +15,19 @@ namespace arboretum {
 /// stack that overflows in a thread other than the one that made the note is not told of.
 class CrashNote {
  public:
-  /// `after` ends the line; it must live as long.
-  explicit CrashNote(std::string_view after);
+  /// `after` ends the line; it must live as long. A file `record` gets a line, too: what was under way.
+  explicit CrashNote(std::string_view after, const std::filesystem::path& record = {});
   CrashNote(const CrashNote&) = delete;
   CrashNote& operator=(const CrashNote&) = delete;
   ~CrashNote();
 
   static constexpr std::array kSignals{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 };
+
+/// That of a run, in its folder.
+inline constexpr const char* kCrashFile = "crashes.txt";
+/// What such a file has; nothing where there is none.
+[[nodiscard]] std::set<std::string, std::less<>> recorded_crashes(const std::filesystem::path& record);
 
 /// While it lives `what` is under way; then what was before.
 class UnderWay {

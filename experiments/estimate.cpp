@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "experiments/passes.h"
 #include "scenes/catalogue.h"
@@ -15,9 +18,12 @@ namespace {
 
 /// What a scene is likely to hold, without loading it.
 std::size_t expected_triangles(const SceneSpec& spec) {
-  constexpr std::size_t kUnknown = 200'000;
+  constexpr std::size_t kUnknown = 200'000, kBytesOfOne = 50;  // of a triangle in a file, roughly
   if (!spec.generator.empty()) return spec.triangles;
-  return spec.catalogue.empty() ? kUnknown : find_catalogue_entry(spec.catalogue).triangles;
+  if (!spec.catalogue.empty()) return find_catalogue_entry(spec.catalogue).triangles;
+  std::error_code error;
+  const std::uintmax_t bytes = spec.file.empty() ? 0 : std::filesystem::file_size(spec.file, error);
+  return bytes == 0 || error ? kUnknown : std::size_t(bytes / kBytesOfOne) + 1;
 }
 
 /// Triangles a second of a builder with one thread, roughly (docs/performance.md); reinsertion after it not counted.

@@ -126,7 +126,10 @@ void add_facts(Json& facts, const Counters& c, std::size_t of_rays, std::string_
     Json& children = facts["children_hit"] = Json::array();
     for (std::uint64_t visits : c.children_hit) children.push_back(share(visits, c.nodes));
   }
-  if (!c.depths.empty()) {
+  // In `two_level` over what follows no depth, those of the top would be there alone.
+  std::uint64_t followed = 0;
+  for (const Counters::Depth& d : c.depths) followed += d.visits;
+  if (followed > 0 && followed == c.nodes - c.nodes_shared) {
     Json &visits = facts["visits_by_depth"] = Json::array(),
          &lanes = facts["lane_utilization_by_depth"] = Json::array();
     for (const Counters::Depth& d : c.depths) {

@@ -127,8 +127,7 @@ class Runner {
       do {
         const auto& cells = by_structure[order[next++]];
         if (try_for(cells, [&] {
-              const UnderWay building("the build for " + cells.front()->name());
-              (void)pool.get(*cells.front());
+              begin_to("the build for " + cells.front()->name(), [&] { (void)pool.get(*cells.front()); });
             }))
           batch.insert(batch.end(), cells.begin(), cells.end());
       } while (next < order.size() && pool.held_bytes() + pool.expected_bytes(*by_structure[order[next]].front()) <=
@@ -177,14 +176,13 @@ class Runner {
     for (const Cell* cell : cells) {
       Json facts = Json::object();
       const auto prepare = [&] {
-        const UnderWay preparing(cell->name());
         const Accel& accel = pool.get(*cell);
         facts.update(pool.facts(*cell, accel));
         facts.update(data.facts());
         pool.add_build_facts(*cell, facts);
         jobs.emplace_back(*cell, accel, rays, buffers).prepare(facts, data, experiment_.measure);
       };
-      if (!try_for({cell}, prepare)) continue;
+      if (!try_for({cell}, [&] { begin_to(cell->name(), prepare); })) continue;
       Job& job = jobs.back();
       Running& running = begin(*cell);
       running.result.facts.update(facts);
@@ -214,11 +212,8 @@ class Runner {
     for (const Cell* cell : cells) {
       BuildJob& job = jobs.emplace_back(*cell, data.mesh(), registry_);
       Json facts = Json::object();
-      const auto prepare = [&] {
-        const UnderWay preparing(cell->name());
-        job.prepare(facts, pool, experiment_.measure);
-      };
-      if (!try_for({cell}, prepare)) continue;
+      const auto prepare = [&] { job.prepare(facts, pool, experiment_.measure); };
+      if (!try_for({cell}, [&] { begin_to(cell->name(), prepare); })) continue;
       Running& running = begin(*cell);
       running.result.facts.update(facts);
       interleaved.push_back(
@@ -287,6 +282,15 @@ class Runner {
       outcome += fmt::format(", {} wrong", result.facts["wrong_answers"].get<std::uint64_t>());
     progress_.cell_done(name, outcome);
     finished_.insert_or_assign(name, std::move(result));
+  }
+
+  /// Does what crashes would name so; nothing that crashed before.
+  void begin_to(const std::string& what, const std::function<void()>& work) const {
+    if (options_.crashed.contains(what))
+      throw UserError(fmt::format("left out, since {} crashed before; to try it again remove its line from {}", what,
+                                  (journal_.folder() / kCrashFile).string()));
+    const UnderWay under_way(what);
+    work();
   }
 
   /// Runs `work`; a UserError of it fails the cells and is no end of the run.

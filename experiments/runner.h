@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct RunOptions {
   bool fail_fast = false;                            ///< stop after the first cell with a wrong answer
   std::map<std::string, std::string> geometry = {};  ///< of scenes as the run began: PlanRecord::geometry
   Origin origin = {};                                ///< of what is measured now
+  std::set<std::string, std::less<>> crashed = {};   ///< what was under way in crashes before: left out
 };
 
 struct RunOutcome {

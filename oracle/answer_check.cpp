@@ -101,7 +101,8 @@ Judgement judge_closest_hit(const TriangleMesh& mesh, const Ray& ray, float time
     something_behind = difference > tolerance && j.wrong_primitive && is_behind(mesh, ray, at, truth, answer);
     if ((!j.wrong_surface || !j.wrong_primitive) && std::isfinite(truth.hit.t)) {
       const double error = std::fabs(difference) / ulp_of(truth.hit.t);
-      j.t_error_ulp = std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
+      constexpr double kMost = std::numeric_limits<float>::max();
+      j.t_error_ulp = error <= kMost ? error : kMost;  // a NaN, too
     }
     if (answer.primitive == truth.hit.primitive) j.uv_error = uv_error(truth.hit, answer);
   }

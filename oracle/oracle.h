@@ -48,7 +48,7 @@ struct AnswerCheck {
   /// silhouette, as SurfaceAdjacency::passes_through() has it. 0 for any hit.
   std::uint64_t cracks = 0;
   /// |t - exact t| in units of the last place of the exact t's float32, over the rays with the right surface
-  /// or primitive.
+  /// or primitive; what is no number, or too large for one, counts as the largest float.
   double t_error_ulp_median = 0, t_error_ulp_p99 = 0, t_error_ulp_max = 0;
   /// Of hits of the exact answer's own primitive: u or v off by more than kWrongUv; no part of wrong_answers().
   std::uint64_t wrong_uv = 0;

@@ -119,7 +119,7 @@ TEST_CASE("each wrong answer is counted for what it is") {
       {"t one ulp off", inside, {next, 0, 0, 0}, 0, 0, 0, 0, 0, 1},
       {"t within the tolerance", inside, {1 + 0x1p-13f, 0, 0, 0}, 0, 0, 0, 0, 0, 1024},
       {"right triangle, t beyond the tolerance", inside, {1 + 0x1p-11f, 0, 0, 0}, 0, 0, 1, 0, 0, 4096},
-      {"right triangle, t not a number", inside, {nan, 0, 0, 0}, 0, 0, 1, 0, 0, kInf},
+      {"right triangle, t not a number", inside, {nan, 0, 0, 0}, 0, 0, 1, 0, 0, std::numeric_limits<float>::max()},
       {"a triangle that is not there", inside, {1, 0, 0, 77}, 0, 0, 0, 1, 0, 0},
       {"edge: the other of two ties", on_edge, {1, 0, 0, 1}, 0, 0, 0, 0, 0, 0},
       {"edge: crack", on_edge, {2, 0, 0, 2}, 0, 0, 1, 1, 1, -1},

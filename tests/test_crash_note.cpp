@@ -10,6 +10,7 @@
 
 #include "experiments/crash_note.h"
 #include "tests/catch.h"
+#include "tests/folder.h"
 
 using namespace arboretum;
 
@@ -102,6 +103,25 @@ TEST_CASE("without anything under way a crash says so; after the note's life it 
   });
   CHECK(after.said.empty());
   CHECK(WTERMSIG(after.status) == SIGABRT);
+}
+
+TEST_CASE("what crashed is recorded, a line a crash, and read again") {
+  const test::Folder folder;
+  const std::filesystem::path record = folder.path() / kCrashFile;
+  CHECK(recorded_crashes(record).empty());
+  for (const char* what : {"a cell", "the build for another"}) {
+    const End end = end_of([&] {
+      const CrashNote note("", record);
+      const UnderWay cell(what);
+      std::abort();
+    });
+    CHECK(WTERMSIG(end.status) == SIGABRT);
+  }
+  (void)end_of([&] {
+    const CrashNote note("", record);
+    std::abort();  // between cells: nothing can be left out
+  });
+  CHECK(recorded_crashes(record) == std::set<std::string, std::less<>>{"a cell", "the build for another"});
 }
 
 TEST_CASE("of a name that is too long its beginning is said") {

@@ -379,6 +379,22 @@ class CommandLine(CommandLineCase):
                         self.assertIn(said[2], names)
                         self.assertIn("--resume", said[3])
 
+    def test_resume_leaves_out_what_crashed(self):
+        self.assertIn(self.run_small("--out", "out").returncode, (0, 1))
+        out = self.folder / "out"
+        cells = [cell["name"] for cell in read_jsonl(out / "cells.jsonl") if cell["metric"] == "trace"]
+        crashed = cells[-1]
+        for file in ("cells.jsonl", "repetitions.jsonl"):
+            lines = (out / file).read_text().splitlines(keepends=True)
+            (out / file).write_text("".join(line for line in lines if json.loads(line)["name"] != crashed))
+        (out / "crashes.txt").write_text(crashed + "\n")
+        result = self.run_small("--out", "out", "--resume")
+        self.assertIn(f"left out, since {crashed} crashed before", result.stdout + result.stderr)
+        self.assertNotIn(crashed, [cell["name"] for cell in read_jsonl(out / "cells.jsonl")])
+        (out / "crashes.txt").unlink()
+        self.assertIn(self.run_small("--out", "out", "--resume").returncode, (0, 1))
+        self.assertIn(crashed, [cell["name"] for cell in read_jsonl(out / "cells.jsonl")])
+
     def test_resume_on_a_full_disk_leaves_the_results_there(self):
         self.assertIn(self.run_small("--out", "out", "--filter", "bvh4").returncode, (0, 1))
         before = {p.name: p.read_bytes() for p in (self.folder / "out").iterdir()}
