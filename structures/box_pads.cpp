@@ -19,7 +19,9 @@ BoxPads::BoxPads(const TriangleMesh& mesh, const Bounds3f& bounds)
   for (std::size_t i = 0; i < mesh.size(); i += step) samples.push_back(largest_coordinate(mesh.bounds(i)));
   const auto near = samples.begin() + std::ptrdiff_t(samples.size() / kOneIn);
   std::nth_element(samples.begin(), near, samples.end());
-  common_ = std::min(largest_, std::max(kWithin * *near, kLeast * largest_));
+  // Where floats end boxes could not be wider.
+  if (largest_ < 0.5f * std::numeric_limits<float>::max())
+    common_ = std::min(largest_, std::max(kWithin * *near, kLeast * largest_));
 }
 
 double BoxPads::pad(float largest) const noexcept {
@@ -33,11 +35,10 @@ Bounds3f BoxPads::widened(const Bounds3f& box) const noexcept {
 }
 
 Bounds3f BoxPads::widened(const Bounds3f& box, double pad) noexcept {
-  constexpr float kMost = std::numeric_limits<float>::max();
   Bounds3f wide;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    wide.lower[axis] = std::max(rounded_down(double(box.lower[axis]) - pad), -kMost);
-    wide.upper[axis] = std::min(rounded_up(double(box.upper[axis]) + pad), kMost);
+    wide.lower[axis] = rounded_down(double(box.lower[axis]) - pad);
+    wide.upper[axis] = rounded_up(double(box.upper[axis]) + pad);
   }
   return wide;
 }

@@ -13,7 +13,7 @@
 // is widened by s (common() + |o|) + kShare (M - common()), which is no less. M is of whole triangles: a box that holds
 // them tells it, one that holds parts of split ones does not. Only along axes on which a ray does as good as not move
 // is the scene as a whole spoken of: there 2^39 common() has to be larger than twice its largest coordinate, of which
-// common() is 2^-32 at least.
+// common() is 2^-32 at least. (Where that underflows, boxes are wider by more than the rays' constants would have.)
 //
 // In a kd-tree cells share their planes, so a triangle with a coordinate of M > common() is thicker instead: it stands
 // in every cell that is within kShare (M - common()) of it. A plane at s is met with an error of 8 u |s| at most (u =
@@ -43,7 +43,7 @@ class BoxPads {
   [[nodiscard]] double pad(float largest) const noexcept;
   /// A box of whole triangles as a node has it.
   [[nodiscard]] Bounds3f widened(const Bounds3f& box) const noexcept;
-  /// The box wider by that on each side, rounded outwards, and no further than floats reach.
+  /// The box wider by that on each side, rounded outwards.
   [[nodiscard]] static Bounds3f widened(const Bounds3f& box, double pad) noexcept;
 
  private:

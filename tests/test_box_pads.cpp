@@ -52,7 +52,7 @@ TEST_CASE("pads are for the scene's largest coordinate where that is a common on
 }
 
 TEST_CASE("where few triangles have the largest coordinates pads are smaller, and their boxes wider") {
-  for (const float size : {1e3f, 1e6f, 0x1p39f, 0x1p100f, std::numeric_limits<float>::max()}) {
+  for (const float size : {1e3f, 1e6f, 0x1p39f, 0x1p100f, 0x1p126f}) {
     const TriangleMesh mesh = over_ground(5000, size);
     const BoxPads pads = pads_of(mesh);
     CAPTURE(size, pads.common());
@@ -72,10 +72,42 @@ TEST_CASE("where few triangles have the largest coordinates pads are smaller, an
                    above = double(wide.upper[axis]) - double(box.upper[axis]);
       CHECK(std::isfinite(wide.lower[axis]));
       CHECK(std::isfinite(wide.upper[axis]));
-      if (size < std::numeric_limits<float>::max()) CHECK(std::min(below, above) >= lacking);
+      CHECK(std::min(below, above) >= lacking);
       CHECK(std::max(below, above) <= 1.1 * lacking);
     }
   }
+}
+
+TEST_CASE("where floats end no box is wider, and pads are for the scene's largest coordinate") {
+  constexpr float kMost = std::numeric_limits<float>::max();
+  TriangleMesh mesh = random_triangles(200, 0.1f, 5);
+  add_triangle(mesh, {kMost, -1, -1}, {kMost, 2, -1}, {kMost, -1, 2});
+  CHECK_FALSE(pads_of(mesh).any());
+  CHECK(pads_of(mesh).common() == kMost);
+  // From far before the last plane to it, tnear at the hit: its box must be met there.
+  std::vector<Ray> rays;
+  for (std::uint64_t i = 0; i < 300; ++i) {
+    Ray ray{uniform_point(7, i, 0, {{-0x1p102f, 0, 0}, {0, 0.5f, 0.5f}}), 0.0f, {0x1p100f, 0, 0}, kInfinity};
+    ray.tnear = float((double(kMost) - double(ray.origin.x)) / 0x1p100);
+    rays.push_back(ray);
+  }
+  Structures structures(mesh);
+  std::size_t rows = 0, hits = 0;
+  for (const KernelRow& row : kernel_table()) {
+    if (!is_available(row.isa) || row.box != "padded" || row.intersector != "exact" ||
+        std::ranges::find(kWithPads, row.structure) == std::end(kWithPads) ||
+        row.leaf != default_leaf(row.structure, row.intersector, row.isa))
+      continue;
+    INFO(name_of(row));
+    const KernelRow* alone = find_kernel("brute_force", row.leaf, row.intersector, row.box, "single", row.isa);
+    if (!alone) continue;
+    const std::vector<Hit> expected = closest_hit(*alone, structures.get(*alone), rays);
+    CHECK(same_bits(closest_hit(row, structures.get(row), rays), expected));
+    ++rows;
+    for (const Hit& hit : expected) hits += hit.is_hit();
+  }
+  CHECK(rows >= 40);
+  CHECK(hits >= rows);
 }
 
 TEST_CASE("a ground that reaches to the horizon: every structure's answers are those without one") {

@@ -34,8 +34,8 @@
 // where shears are fused and 4.5 u where not, the corners' errors being averaged as their depths are: with x's own 4 u
 // and z's 2 or 3 u that is 9.5 or 11.5 u of the 20, where r is subnormal 15.5 or 17.5).
 //
-// Where few triangles have coordinates as large as M, the wide BVHs put a smaller number in M's place, and widen the
-// boxes of those triangles instead (structures/box_pads.h).
+// Where few triangles have coordinates as large as M, structures put a smaller number in M's place, and widen the boxes
+// of those triangles instead (structures/box_pads.h).
 //
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once

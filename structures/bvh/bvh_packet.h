@@ -12,9 +12,11 @@
 // The interval test. With r = 1/d and o within the packet's bounds a plane b is met at (b - o) r, whose ends over the
 // packet are products of ends. What a ray's own test computes is off it by less than 2^-20 (M + |o|)|r|
 // (traversal/box_test.h: its pad and roundings are three quarters of that, the interval's own roundings less than the
-// rest), by which the interval is widened: no child is lost that a ray's test takes. Without FMA r may be infinite;
-// such a packet has no interval test. Rays with a common end instead of a common origin, as those towards a point
-// light, are bounded from there.
+// rest), by which the interval is widened: no child is lost that a ray's test takes. Planes may be beyond M
+// (structures/box_pads.h): what they are rounded by more is relative to the distance that comes out, by which the last
+// of the three entries and the first of the three exits are moved once more (Interval); the others do not matter.
+// Without FMA r may be infinite; such a packet has no interval test. Rays with a common end instead of a common origin,
+// as those towards a point light, are bounded from there.
 //
 // Every ray visits at least the leaves that it would visit alone, up to those that begin beyond its nearest hit. So
 // with padded boxes the answers are those of single rays, bit for bit.
@@ -74,9 +76,7 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     Mask mask;
   };
   /// Bounds of a group of rays by axis: of 1/d, of the origin at the near and at the far planes, and what they are
-  /// widened by. That makes good what is rounded along an axis where planes are no further than max_coordinate_; where
-  /// they are (structures/box_pads.h) roundings are 8 u of the distance at most, for which the first and the last one
-  /// are scaled by `earlier` and `later`.
+  /// widened by. `earlier` and `later`: what entries and exits are scaled by, 8 u, for planes beyond max_coordinate_.
   struct Interval {
     float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
     float tnear, earlier, later;

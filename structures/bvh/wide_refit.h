@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include "core/error.h"
 #include "core/mesh_check.h"
@@ -75,7 +77,14 @@ void WideBvh<Format>::refit(const TriangleMesh& mesh) {
   check_triangles(mesh);
   check_one_moment(mesh, kName);
   // A leaf's box is made of its triangles: of whole ones, whatever builders split.
-  const BoxPads pads(mesh, mesh.bounds());
+  const Bounds3f all = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, mesh.size(), std::size_t{1} << 14), Bounds3f{},
+      [&](const tbb::blocked_range<std::size_t>& range, Bounds3f box) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) box.extend(mesh.bounds(i));
+        return box;
+      },
+      [](Bounds3f a, const Bounds3f& b) { return a.extend(b), a; });
+  const BoxPads pads(mesh, all);
   const Bounds3f bounds = Refitter<Format>(mesh, *find_leaf_form(leaf_), pads, arena_.data()).subtree(root_, 0);
   set_scene(mesh, pads.widened(bounds), pads.common());
 }

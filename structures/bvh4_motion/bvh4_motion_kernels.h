@@ -1,8 +1,9 @@
 // Rays of a time each through the moving four-wide BVH: planes and vertices are interpolated in registers. The ways of
 // traversal are those of the other wide BVHs (structures/bvh/), with a time beside each ray.
 //
-// Padded boxes: a plane is p + q t with |p|, |p + q| <= M, so |q| <= 2 M; computing it is off by u |q t| + u M <= 3 u M
-// (one rounding less where it is fused). Times |r| that is less than what box_test.h leaves of its pad: it needs 4 u (M
+// Padded boxes: a plane is p + q t with |p|, |p + q| <= M, the box's own (structures/box_pads.h), so |q| <= 2 M;
+// computing it is off by u |q t| + u M <= 3 u M (one rounding less where it is fused). Times |r| that is less than what
+// box_test.h leaves of its pad: it needs 4 u (M
 // + |o|)|r| of 8 u (M + |o|)|r|.
 //
 // A packet's interval test takes planes where they are farthest out between its rays' first and last time. p + q t, as

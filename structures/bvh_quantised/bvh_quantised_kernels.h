@@ -1,8 +1,10 @@
 // Rays against the quantised boxes of a node: planes are decoded to floats, one `and`, one conversion and one operation
 // each, and then met as those of bvh::SoaNodes (traversal/box_test.h), whose promises these are: a decoded plane is
 // rounded, which keeps it conservative (bvh_quantised.h), and so is a box's like any other. It reaches to 1.004 M at
-// most, which pads have room for: they are twice what the roundings of planes within M need. q * step is exact, or
-// infinite for an upper plane, so it makes no difference whether the sum is fused.
+// most, M the node's, which pads have room for: they are twice what the roundings of planes within M need. Where pads
+// are for the less that a box itself has (structures/box_pads.h) a plane at p beyond that lies |p| less that beyond the
+// box, and its roundings are a few 2^-24 |p|. q * step is exact, or infinite for an upper plane, so it makes no
+// difference whether the sum is fused.
 #pragma once
 
 #include "traversal/usual_leaves.h"

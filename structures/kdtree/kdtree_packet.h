@@ -17,8 +17,9 @@
 // The packet's interval. With r and o of the rays within [r0, r1] and [o0, o1], r of one sign, a plane at s is met at
 // (s - o) r, whose ends are products of ends. What a ray computes is off by its pad, 8 u (M + |o|)|r|, and by the
 // roundings of kdtree_single.h, 5 u (M + |o|)|r|; the interval's own roundings are 4 u (M + |o|)|r|: it is widened by
-// 2^-19 (M + |o|)|r| = 32 u (M + |o|)|r|. Where that is not far below float's range (a ray that gets r = 2^60 / |d|max
-// may have such an r) there is no interval, and all rays are tested everywhere.
+// 2^-19 (M + |o|)|r| = 32 u (M + |o|)|r|, and for planes beyond M (structures/box_pads.h) by 8 u of the distance, to
+// which what they are rounded by more is relative. Where that is not far below float's range (a ray that gets r = 2^60
+// / |d|max may have such an r) there is no interval, and all rays are tested everywhere.
 #pragma once
 
 #include "structures/kdtree/kdtree_single.h"

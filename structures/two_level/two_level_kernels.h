@@ -28,9 +28,10 @@
 // A box test's own roundings are 5.1 u (M + |o'_i|) at most (box_test.h, kdtree_single.h), its
 // pad for a largest coordinate of M + P is 8 u (M + P + |o'_i|), and so with P = p / 8 u
 //   5.1 u (M + |o'_i|) + 1.1 u (M + 2 |o'_i|) + p < 8 u (M + P + |o'_i|):
-// the box is met, within any interval that holds t. P is Placed::pad + Placed::pad_per_distance |o'|, both rounded up,
-// pad_per_distance = 4.01 k. The top's boxes hold the flat mesh's corners, and the ray is itself there. In a packet all
-// rays have the largest pad of theirs.
+// the box is met, within any interval that holds t. (Where the structure below is made for less than M, its boxes are
+// wider by more than the difference's 8 u: structures/box_pads.h.) P is Placed::pad + Placed::pad_per_distance |o'|,
+// both rounded up, pad_per_distance = 4.01 k. The top's boxes hold the flat mesh's corners, and the ray is itself
+// there. In a packet all rays have the largest pad of theirs.
 #pragma once
 
 #include "structures/two_level/instances_kernels.h"
