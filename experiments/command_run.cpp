@@ -245,7 +245,7 @@ ExitStatus measure(const Experiment& experiment, Plan plan, const Plan& whole, P
   before.take_up_scenes(scenes);
   context["scenes"] = scenes;
   if (!command.benchmark.out.empty()) require_writable(command.benchmark.out);
-  if (!command.resume) set_aside(folder), remove_files(folder, present(folder, {kCrashFile}));
+  if (!command.resume) set_aside(folder), remove_files(folder, {kCrashFile});
   Journal journal(folder, hash, whole, command.resume);
   keep_measured(plan, record, whole, journal.done());
   const double seconds = seconds_left(

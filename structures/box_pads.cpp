@@ -9,6 +9,12 @@
 
 namespace arboretum {
 
+float largest_coordinate(const TriangleMesh& mesh, std::span<const std::uint32_t> ids) noexcept {
+  float largest = 0.0f;
+  for (const std::uint32_t id : ids) largest = std::max(largest, largest_coordinate(mesh.bounds(id)));
+  return largest;
+}
+
 BoxPads::BoxPads(const TriangleMesh& mesh, const Bounds3f& bounds)
     : largest_(largest_coordinate(bounds)), common_(largest_) {
   if (mesh.size() == 0) return;

@@ -24,10 +24,16 @@
 // cell stands in it.
 #pragma once
 
+#include <cstdint>
+#include <span>
+
 #include "core/bounds.h"
 #include "core/mesh.h"
 
 namespace arboretum {
+
+/// The largest |coordinate| of the triangles with these ids.
+[[nodiscard]] float largest_coordinate(const TriangleMesh& mesh, std::span<const std::uint32_t> ids) noexcept;
 
 class BoxPads {
  public:

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
@@ -25,7 +24,7 @@ class Converter {
             const CollapseSettings& costs, MeteredVector<Node>& nodes, LeafLists& lists)
       : mesh_(mesh), tree_(tree), pads_(pads), collapse_(collapse), costs_(costs), nodes_(nodes), lists_(lists),
         cost_(tree.node_count) {
-    if (tree.duplicates && pads.any()) largest_.assign(tree.node_count, 0.0f), find_largest(0);
+    if (tree.duplicates && pads.any()) largest_.resize(tree.node_count), find_largest(0);
     price(0);
     nodes_.resize(1);
     place(0, 0, box_of(0), 0);
@@ -43,9 +42,7 @@ class Converter {
   float find_largest(std::uint32_t index) {
     const BinaryNode& node = tree_.nodes[index];
     if (!node.is_leaf()) return largest_[index] = std::max(find_largest(node.left), find_largest(node.left + 1));
-    for (std::size_t i = tree_.begin_of(index), end = i + node.count; i < end; ++i)
-      largest_[index] = std::max(largest_[index], largest_coordinate(mesh_.bounds(tree_.primitives[i])));
-    return largest_[index];
+    return largest_[index] = largest_coordinate(mesh_, {&tree_.primitives[tree_.begin_of(index)], node.count});
   }
 
   /// Expected cost below a node for a ray that meets its box.

@@ -9,7 +9,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "core/coordinates.h"
 #include "core/error.h"
 #include "core/timer.h"
 #include "structures/archive.h"
@@ -117,8 +116,7 @@ class Emitter {
     float& largest = largest_[index_of(node)];
     if (node.is_leaf()) {
       LeafPrimitives room;
-      for (const std::uint32_t id : tree_.leaf_primitives(node, room))
-        largest = std::max(largest, largest_coordinate(mesh_.bounds(id)));
+      largest = largest_coordinate(mesh_, tree_.leaf_primitives(node, room));
     } else {
       for (const WideNode& child : tree_.children(node)) largest = std::max(largest, find_largest(child));
     }

@@ -4,7 +4,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "core/coordinates.h"
 #include "structures/kdtree/builders.h"
 #include "structures/kdtree/clip.h"
 
@@ -25,7 +24,7 @@ void divide_reference(const TriangleMesh& mesh, const BoxPads& pads, const Refer
   Bounds3f left_half = reference.box, right_half = reference.box;
   left_half.upper[axis] = right_half.lower[axis] = split.plane;
   const std::array<Vec3f, 3> corners = mesh.corners(reference.id);
-  const double pad = pads.any() ? pads.pad(largest_coordinate(mesh.bounds(reference.id))) : 0.0;
+  const double pad = pads.any() ? pads.pad(largest_coordinate(mesh, {&reference.id, 1})) : 0.0;
   if (pad > 0.0) {
     const auto thick_part = [&](const Bounds3f& half) {
       return BoxPads::widened(clipped_bounds(corners, BoxPads::widened(half, pad)), pad);
