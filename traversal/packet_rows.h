@@ -15,11 +15,12 @@ constexpr int register_lanes(int rays_each) {
 }
 
 /// A family as most structures have it: whole registers. `ForNearRays`: `auto` takes packets for rays that only start
-/// near each other, too (traversal/auto_rows.h).
+/// near each other, too (traversal/auto_tiles.h): within kNear of the extent of all origins.
 template <class S, template <int W, class Leaves, bool AnyHit, class Counting> class P, bool ForNearRays>
 struct PacketFamily {
   using Structure = S;
-  static constexpr bool kFewerLanes = false, kForNearRays = ForNearRays;
+  static constexpr bool kFewerLanes = false;
+  static constexpr float kNear = ForNearRays ? 0.125f : 0.0f;
   template <int W, class Leaves, bool AnyHit, class Counting>
   using Packets = P<W, Leaves, AnyHit, Counting>;
 };

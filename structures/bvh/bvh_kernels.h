@@ -24,7 +24,8 @@ void add_kernels(std::type_identity<bvh::Bvh<N>>, KernelRows& rows) {
   add_queued_rows<bvh::Bvh<N>, BvhQueue<N>::template Of, typename BvhQueue<N>::Single>(rows, BatchLeaves{});
   add_packet_rows<bvh::Bvh<N>, BvhPacketFamily<SoaPacketNodes<N>>>(rows, BatchLeaves{});
   using Incoherent = IncoherentInStreams<SoaPacketNodes<N>, BvhQueue<N>::template Of, typename BvhQueue<N>::Single>;
-  add_rows<bvh::Bvh<N>, AutoFunctions<BvhPacketFamily<SoaPacketNodes<N>>, BatchLeaves, Incoherent, Single>>(
+  add_rows<bvh::Bvh<N>,
+           AutoFunctions<BvhPacketFamily<SoaPacketNodes<N>>, BatchLeaves, kBesideStreams, Incoherent, Single>>(
       rows, "auto", BatchLeaves{});
   add_stream_rows<bvh::Bvh<N>, SoaPacketNodes<N>>(rows);
 }

@@ -415,7 +415,7 @@ template <class Format>
 struct BvhPacketFamily {
   using Structure = bvh::BvhBase;
   static constexpr bool kFewerLanes = true;
-  static constexpr bool kForNearRays = false;
+  static constexpr float kNear = 0.0f;
   template <int W, class Leaves, bool AnyHit, class Counting>
   using Packets = BvhPackets<Format, W, Leaves, AnyHit, Counting>;
 };

@@ -110,7 +110,8 @@ inline void add_kernels(std::type_identity<bvh4_aos::Bvh4Aos>, KernelRows& rows)
   add_queued_rows<Structure, BvhNodeQueue<AosNodeTest>::Of, Single>(rows, BatchLeaves{});
   add_packet_rows<Structure, Packets>(rows, TypeList<>{});
   using Incoherent = IncoherentInStreams<AosPacketNodes, BvhNodeQueue<AosNodeTest>::Of, Single>;
-  add_rows<Structure, AutoFunctions<Packets, TypeList<>, Incoherent, Single>>(rows, "auto", BatchLeaves{});
+  add_rows<Structure, AutoFunctions<Packets, TypeList<>, kBesideStreams, Incoherent, Single>>(rows, "auto",
+                                                                                              BatchLeaves{});
   add_stream_rows<Structure, AosPacketNodes>(rows);
 }
 

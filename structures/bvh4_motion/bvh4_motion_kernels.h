@@ -177,7 +177,8 @@ inline void add_kernels(std::type_identity<bvh4_motion::Bvh4Motion>, KernelRows&
   add_rows<Structure, MovingRays::Single>(rows, "single", TypeList<>{});
   add_queued_rows<Structure, MovingRays::Queue, MovingRays::Single>(rows, TypeList<>{});
   add_packet_rows<Structure, MovingRays::PacketFamily>(rows, TypeList<>{});
-  add_rows<Structure, AutoFunctions<MovingRays::PacketFamily, TypeList<>, Incoherent, MovingRays::Single>>(
+  add_rows<Structure,
+           AutoFunctions<MovingRays::PacketFamily, TypeList<>, kBesideStreams, Incoherent, MovingRays::Single>>(
       rows, "auto", TypeList<>{});
   add_stream_rows<Structure, MovingPacketNodes, TypeList<>, TypeList<>, MovingRays::OneStream, MovingRays::Lists>(rows);
 }

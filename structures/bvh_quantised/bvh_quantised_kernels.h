@@ -123,7 +123,8 @@ void add_kernels(std::type_identity<bvh::WideBvh<bvh_quantised::QuantisedNodes<N
   add_queued_rows<Structure, Queue::template Of, Single>(rows, BatchLeaves{});
   add_packet_rows<Structure, Packets>(rows, TypeList<>{});
   using Incoherent = IncoherentInStreams<QuantisedPacketNodes<N>, Queue::template Of, Single>;
-  add_rows<Structure, AutoFunctions<Packets, BatchLeaves, Incoherent, Single>>(rows, "auto", BatchLeaves{});
+  add_rows<Structure, AutoFunctions<Packets, BatchLeaves, kBesideStreams, Incoherent, Single>>(rows, "auto",
+                                                                                               BatchLeaves{});
   add_stream_rows<Structure, QuantisedPacketNodes<N>>(rows);
 }
 

@@ -33,7 +33,9 @@ inline void add_kernels(std::type_identity<grid::Grid>, KernelRows& rows) {
   using Single = ListedLeaves<grid::Grid, GridSingle>;
   Single::add(rows);
   add_packet_rows<grid::Grid, GridPacketFamily>(rows, BatchLeaves{});
-  add_rows<grid::Grid, AutoFunctions<GridPacketFamily, BatchLeaves, Single::Functions>>(rows, "auto", BatchLeaves{});
+  add_rows<grid::Grid,
+           AutoFunctions<GridPacketFamily, BatchLeaves, AutoLimits{}, Single::Functions, Single::Functions>>(
+      rows, "auto", BatchLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

@@ -15,11 +15,15 @@ namespace ARBORETUM_ISA_NAMESPACE {
 using KdPacketFamily = PacketFamily<kdtree::KdTree, KdPackets, true>;
 
 inline void add_kernels(std::type_identity<kdtree::KdTree>, KernelRows& rows) {
-  add_rows<kdtree::KdTree, SingleRayFunctions<KdKernel>>(rows, "single", UsualLeaves{});
-  add_queued_rows<kdtree::KdTree, KdQueued, SingleRayFunctions<KdKernel>>(rows, UsualLeaves{});
+  using Single = SingleRayFunctions<KdKernel>;
+  add_rows<kdtree::KdTree, Single>(rows, "single", UsualLeaves{});
+  add_queued_rows<kdtree::KdTree, KdQueued, Single>(rows, UsualLeaves{});
   add_packet_rows<kdtree::KdTree, KdPacketFamily>(rows, KdPacketLeaves{});
-  add_rows<kdtree::KdTree, AutoFunctions<KdPacketFamily, KdPacketLeaves, SingleRayFunctions<KdKernel>>>(rows, "auto",
-                                                                                                        UsualLeaves{});
+  using Incoherent = std::conditional_t<kRegisterWidth == 1, Single, QueuedFunctions<KdQueued, Single, 32, 64>>;
+  constexpr AutoLimits limits{.near_closest = kRegisterWidth == 4 ? 1600 : AutoLimits::kNone,
+                              .near_any = kRegisterWidth == 4 ? 1300 : 1650};
+  add_rows<kdtree::KdTree, AutoFunctions<KdPacketFamily, KdPacketLeaves, limits, Incoherent, Single>>(rows, "auto",
+                                                                                                      UsualLeaves{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

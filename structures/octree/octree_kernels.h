@@ -32,8 +32,12 @@ inline void add_kernels(std::type_identity<octree::Octree>, KernelRows& rows) {
   Single::add(rows);
   add_queued_rows<octree::Octree, OctreeQueued, Single::Functions>(rows, TypeList<>{});
   add_packet_rows<octree::Octree, OctreePacketFamily>(rows, TypeList<>{});
-  add_rows<octree::Octree, AutoFunctions<OctreePacketFamily, TypeList<>, Single::Functions>>(rows, "auto",
-                                                                                             TypeList<>{});
+  using Incoherent = std::conditional_t<kRegisterWidth == 1, Single::Functions,
+                                        QueuedFunctions<OctreeQueued, Single::Functions, 32, 64>>;
+  constexpr AutoLimits limits{.near_closest = kRegisterWidth == 4 ? 2800 : 3000,
+                              .near_any = kRegisterWidth == 4 ? 2500 : AutoLimits::kNone};
+  add_rows<octree::Octree, AutoFunctions<OctreePacketFamily, TypeList<>, limits, Incoherent, Single::Functions>>(
+      rows, "auto", TypeList<>{});
 }
 
 }  // namespace ARBORETUM_ISA_NAMESPACE

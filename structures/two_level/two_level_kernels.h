@@ -61,7 +61,8 @@ class TwoLevelKernel
 /// As traversal/packet_rows.h wants it. What of a packet goes into an instance counts as a packet of its own.
 struct TwoLevelPacketFamily {
   using Structure = two_level::TwoLevel;
-  static constexpr bool kFewerLanes = false, kForNearRays = false;
+  static constexpr bool kFewerLanes = false;
+  static constexpr float kNear = std::numeric_limits<float>::infinity();  ///< all that are not coherent
 
   template <int W, class, bool AnyHit, class Counting>
   class Packets {
@@ -133,7 +134,8 @@ inline void add_kernels(std::type_identity<two_level::TwoLevel>, KernelRows& row
   // a register holds eight (docs/performance/other-structures.md).
   using Hybrid = PacketFunctions<TwoLevelPacketFamily, 16, kFewOfHybrid16>;
   using Incoherent = std::conditional_t<(kRegisterWidth >= 8), Hybrid, Single>;
-  using Auto = AutoFunctions<TwoLevelPacketFamily, TypeList<>, Incoherent, Single, false>;
+  constexpr AutoLimits limits{.near_closest = 1350, .near_any = 600};
+  using Auto = AutoFunctions<TwoLevelPacketFamily, TypeList<>, limits, Incoherent, Single>;
   add_rows<Structure, OrBelow<Auto>>(rows, "auto", TypeList<>{});
 }
 
