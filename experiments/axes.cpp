@@ -43,8 +43,8 @@ constexpr Summary kTraversals[] = {
     {"stream_lists", "groups of 1024 rays go down together, sorted into a list for each child"},
     {"auto",
      "looks at the rays, tile by tile: packets of 64 where they hold together, else streams in the wide BVHs (on SSE "
-     "rays in flight where they share too little, with four or eight children), hybrid16 in two_level, single rays in "
-     "others"},
+     "rays in flight where they share too little, with four or eight children), rays in flight in kdtree and octree, "
+     "hybrid16 in two_level (single rays on SSE), single rays in bih and grid"},
 };
 constexpr Summary kCallSummaries[] = {
     {"batch", "all rays in one call"},

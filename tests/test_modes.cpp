@@ -211,6 +211,49 @@ TEST_CASE("rays that are not valid do not count in what auto sees of a batch") {
   CHECK(seen >= 9);
 }
 
+TEST_CASE("auto tries packets with rays that start near each other, and leaves them where they fall apart") {
+  const TriangleMesh fine = random_triangles(60'000, 0.01f, 5), coarse = random_triangles(40, 0.5f, 6);
+  for (const TriangleMesh* mesh : {&fine, &coarse}) {
+    Structures structures(*mesh);
+    // Each at a place of its own; 64 at a time at one place among the triangles, in all directions.
+    const std::vector<Ray> anywhere = generic_rays(*mesh, 20'001, 7);
+    std::vector<Ray> near;
+    for (std::size_t i = 0; i < anywhere.size(); ++i) {
+      const Ray& place = anywhere[i / 64];
+      near.push_back({place.origin + place.direction, 0.0f, anywhere[i].direction, kInfinity});
+    }
+    for (std::string_view structure : {"kdtree", "octree", "bih", "grid"}) {
+      for (const Isa isa : {Isa::scalar, Isa::sse}) {
+        const KernelRow* row = find_kernel(structure, "triangle4", "moller_trumbore", "padded", "auto", isa);
+        if (!row) continue;
+        const KernelRow& single = *find_kernel(structure, "triangle4", "moller_trumbore", "padded", "single", isa);
+        INFO(name_of(*row) << ", " << mesh->size() << " triangles");
+        const Accel& accel = structures.get(*row);
+        const auto counted = [&](std::span<const Ray> rays) {
+          Counters counters;
+          CHECK(same_bits(closest_hit(*row, accel, rays, {}, &counters), closest_hit(single, accel, rays, {})));
+          CHECK(same_bits(closest_hit(*row, accel, rays, {}), closest_hit(single, accel, rays, {})));
+          CHECK(counters.rays == rays.size());
+          return counters;
+        };
+        const bool has_near = structure != "grid", in_flight = isa == Isa::sse && structure != "bih" && has_near;
+        const Counters apart = counted(anywhere), together = counted(near);
+        CHECK(apart.rays_in_packets == 0);
+        CHECK(apart.rays_in_flight == (in_flight ? anywhere.size() : 0));
+        if (!has_near) {
+          CHECK(together.rays_in_packets == 0);
+        } else if (structure == "kdtree" && in_flight && mesh == &fine) {
+          CHECK(together.rays_in_packets > 0);
+          CHECK(together.rays_in_packets < near.size() / 2);
+          CHECK(together.rays_in_flight > near.size() / 2);
+        } else {
+          CHECK(together.rays_in_packets > near.size() - 64);
+        }
+      }
+    }
+  }
+}
+
 TEST_CASE("auto on SSE leaves streams for rays in flight where rays share little, and only there") {
   if (!is_available(Isa::sse)) return;
   const TriangleMesh fine = random_triangles(60'000, 0.01f, 5), coarse = random_triangles(40, 0.5f, 6);

@@ -17,16 +17,19 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
-/// Packets lose to the other way where more than so many of a thousand of their rays go on alone: of rays that are
-/// coherent; of those that only start near each other, asked for the closest or for any hit.
+/// Packets lose to the other way where a thousand of their rays go on alone more often than this: rays that are
+/// coherent; those that only start near each other, asked for the closest or for any hit.
 struct AutoLimits {
-  static constexpr unsigned kNone = 1'000'000;
+  static constexpr unsigned kNone = std::numeric_limits<unsigned>::max();
   unsigned coherent = kNone, near_closest = kNone, near_any = kNone;
+
+  /// Scalar kernels are the reference, not a race: none for them.
+  static constexpr unsigned on(unsigned sse, unsigned wider) {
+    return kRegisterWidth == 1 ? kNone : (kRegisterWidth == 4 ? sse : wider);
+  }
 };
-/// Where the other way is streams, of which SSE has less. Scalar kernels have none.
-inline constexpr AutoLimits kBesideStreams{.coherent = kRegisterWidth == 1   ? AutoLimits::kNone
-                                                       : kRegisterWidth == 4 ? 150
-                                                                             : 100};
+/// Where the other way is streams, of which SSE has less.
+inline constexpr AutoLimits kBesideStreams{.coherent = AutoLimits::on(150, 100)};
 
 /// `Family` as in traversal/packet_rows.h; `CompiledPackets`: a TypeList of the leaves that its packets have compiled
 /// in. `Incoherent` and `Alone` (traversal/kernel_rows.h): the other way, and the one for batches of a few rays.
@@ -115,9 +118,14 @@ struct AutoFunctions {
     }
   };
 
+  template <class Leaves, class... Compiled>
+  static constexpr bool holds(TypeList<Compiled...>) {
+    return (std::is_same_v<Leaves, Compiled> || ...);
+  }
+
   template <class Leaves, bool Padded>
   static RowFunctions timed() {
-    using Packets = CompiledOr<CompiledPackets, Leaves>;
+    using Packets = std::conditional_t<holds<Leaves>(CompiledPackets{}), Leaves, CalledLeaves>;
     using B = Batch<PacketBatch<Family, kNativeWidth, Packets, NoCounters>, &Incoherent::template timed<Leaves, Padded>,
                     &Alone::template timed<Leaves, Padded>>;
     return {&B::closest_hit, &B::any_hit};

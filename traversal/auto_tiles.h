@@ -59,14 +59,10 @@ struct AutoTiles {
   /// Calls run(end, kind) for runs of tiles of one kind, in their order: each begins where the last one ended.
   template <class Run>
   static void for_each_run(const RayBatch& rays, float cone, const Run& run) {
-    float near = 0.0f;
-    if constexpr (Family::kNear > 0.0f) {
-      // Not 0, as kNear may be infinite
-      constexpr float least = std::numeric_limits<float>::min();
-      near = Family::kNear * std::max(spread(&rays[0], rays.size(), 64, &Ray::origin).extent, least);
-    }
-    Kind kind = Kind::any;
-    std::size_t others = 0, change = 0;  // tiles of another kind, one after the other, and where they begin
+    const float near =
+        Family::kNear > 0.0f ? Family::kNear * spread(&rays[0], rays.size(), 64, &Ray::origin).extent : 0.0f;
+    Kind kind = Kind::any, next = Kind::any;
+    std::size_t others = 0, change = 0;  // tiles of the kind `next`, one after the other, and where they begin
     std::size_t alike = 0, last = 0;     // tiles of `kind`, one after the other, and the last of them
     for (std::size_t at = 0; at < rays.size(); at += kTile) {
       const Kind now = kind_of(&rays[at], std::min(kTile, rays.size() - at), cone, near);
@@ -83,8 +79,8 @@ struct AutoTiles {
         continue;
       }
       alike = 0;
-      if (others++ == 0) change = at;
-      if (others < kSwitch) continue;
+      if (others == 0 || now != next) others = 0, change = at, next = now;
+      if (++others < kSwitch) continue;
       run(change, kind);
       kind = now, others = 0;
     }

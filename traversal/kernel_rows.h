@@ -16,14 +16,6 @@ void for_each_test(const Visit& visit) {
     if (tests.isa == kIsa && std::find(leaves.begin(), leaves.end(), tests.leaf) != leaves.end()) visit(tests);
 }
 
-template <class Leaves, class... Compiled>
-constexpr bool is_among(TypeList<Compiled...>) {
-  return (std::is_same_v<Leaves, Compiled> || ...);
-}
-/// `Leaves` where it is among `Compiled`, a TypeList, else CalledLeaves.
-template <class Compiled, class Leaves>
-using CompiledOr = std::conditional_t<is_among<Leaves>(Compiled{}), Leaves, CalledLeaves>;
-
 /// Adds the rows of one way of traversal. `Functions` makes a row's functions:
 ///   template <class Leaves, bool Padded> static RowFunctions timed();
 ///   template <bool Padded> static RowFunctions counting();

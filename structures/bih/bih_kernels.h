@@ -33,7 +33,7 @@ inline void add_kernels(std::type_identity<bih::Bih>, KernelRows& rows) {
   Single::add(rows);
   add_queued_rows<bih::Bih, BihQueued, Single::Functions>(rows, TypeList<>{});
   add_packet_rows<bih::Bih, BihPacketFamily>(rows, TypeList<>{});
-  constexpr AutoLimits limits{.near_any = kRegisterWidth == 4 ? 1000 : AutoLimits::kNone};
+  constexpr AutoLimits limits{.near_any = AutoLimits::on(1000, AutoLimits::kNone)};
   add_rows<bih::Bih, AutoFunctions<BihPacketFamily, TypeList<>, limits, Single::Functions, Single::Functions>>(
       rows, "auto", TypeList<>{});
 }

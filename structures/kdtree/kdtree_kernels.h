@@ -20,8 +20,8 @@ inline void add_kernels(std::type_identity<kdtree::KdTree>, KernelRows& rows) {
   add_queued_rows<kdtree::KdTree, KdQueued, Single>(rows, UsualLeaves{});
   add_packet_rows<kdtree::KdTree, KdPacketFamily>(rows, KdPacketLeaves{});
   using Incoherent = std::conditional_t<kRegisterWidth == 1, Single, QueuedFunctions<KdQueued, Single, 32, 64>>;
-  constexpr AutoLimits limits{.near_closest = kRegisterWidth == 4 ? 1600 : AutoLimits::kNone,
-                              .near_any = kRegisterWidth == 4 ? 1300 : 1650};
+  constexpr AutoLimits limits{.near_closest = AutoLimits::on(1600, AutoLimits::kNone),
+                              .near_any = AutoLimits::on(1300, 1650)};
   add_rows<kdtree::KdTree, AutoFunctions<KdPacketFamily, KdPacketLeaves, limits, Incoherent, Single>>(rows, "auto",
                                                                                                       UsualLeaves{});
 }

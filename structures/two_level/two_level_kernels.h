@@ -62,7 +62,8 @@ class TwoLevelKernel
 struct TwoLevelPacketFamily {
   using Structure = two_level::TwoLevel;
   static constexpr bool kFewerLanes = false;
-  static constexpr float kNear = std::numeric_limits<float>::infinity();  ///< all that are not coherent
+  /// All but those that start anywhere: neighbours in a picture that trees stand in are far apart, too.
+  static constexpr float kNear = kRegisterWidth == 1 ? 0.0f : 0.5f;
 
   template <int W, class, bool AnyHit, class Counting>
   class Packets {
@@ -134,7 +135,7 @@ inline void add_kernels(std::type_identity<two_level::TwoLevel>, KernelRows& row
   // a register holds eight (docs/performance/other-structures.md).
   using Hybrid = PacketFunctions<TwoLevelPacketFamily, 16, kFewOfHybrid16>;
   using Incoherent = std::conditional_t<(kRegisterWidth >= 8), Hybrid, Single>;
-  constexpr AutoLimits limits{.near_closest = 1350, .near_any = 600};
+  constexpr AutoLimits limits{.near_closest = AutoLimits::on(1350, 1350), .near_any = AutoLimits::on(600, 600)};
   using Auto = AutoFunctions<TwoLevelPacketFamily, TypeList<>, limits, Incoherent, Single>;
   add_rows<Structure, OrBelow<Auto>>(rows, "auto", TypeList<>{});
 }
