@@ -80,11 +80,15 @@ struct QueuedFunctions {
   }
 };
 
-/// `queued` with the numbers of rays in flight that paid most (docs/performance.md) or that the batch sets, and rows
-/// with fixed numbers.
+/// With the numbers of rays in flight that paid most (docs/performance.md), or as many as the batch sets where it
+/// `Chooses`.
+template <template <class, bool, bool> class Queue, class Single, bool Chooses = false>
+using UsualQueuedFunctions = QueuedFunctions<Queue, Single, 32, 64, Chooses>;
+
+/// `queued`, of which a batch may set how many rays are in flight, and rows with fixed numbers.
 template <class Structure, template <class, bool, bool> class Queue, class Single, class... Compiled>
 void add_queued_rows(KernelRows& rows, TypeList<Compiled...> leaves) {
-  add_rows<Structure, QueuedFunctions<Queue, Single, 32, 64, true>>(rows, "queued", leaves);
+  add_rows<Structure, UsualQueuedFunctions<Queue, Single, true>>(rows, "queued", leaves);
   add_rows<Structure, QueuedFunctions<Queue, Single, 8>>(rows, "queued8", leaves);
   add_rows<Structure, QueuedFunctions<Queue, Single, 16>>(rows, "queued16", leaves);
   add_rows<Structure, QueuedFunctions<Queue, Single, 32>>(rows, "queued32", leaves);

@@ -21,7 +21,7 @@ class BvhStreamsOrQueue {
   /// each time that the answer is the same twice as many, and so many at most.
   static constexpr std::size_t kProbe = 4096, kThen = 8 * kProbe, kMost = 8 * kThen;
   static constexpr float kShared = 4.5f;
-  using Queued = QueuedFunctions<Queue, Single, 32, 64>;
+  using Queued = UsualQueuedFunctions<Queue, Single>;
 
  public:
   template <class Leaves, bool Padded>

@@ -19,7 +19,7 @@ inline void add_kernels(std::type_identity<kdtree::KdTree>, KernelRows& rows) {
   add_rows<kdtree::KdTree, Single>(rows, "single", UsualLeaves{});
   add_queued_rows<kdtree::KdTree, KdQueued, Single>(rows, UsualLeaves{});
   add_packet_rows<kdtree::KdTree, KdPacketFamily>(rows, KdPacketLeaves{});
-  using Incoherent = std::conditional_t<kRegisterWidth == 1, Single, QueuedFunctions<KdQueued, Single, 32, 64>>;
+  using Incoherent = std::conditional_t<kRegisterWidth == 1, Single, UsualQueuedFunctions<KdQueued, Single>>;
   constexpr AutoLimits limits{.near_closest = AutoLimits::on(1600, AutoLimits::kNone),
                               .near_any = AutoLimits::on(1300, 1650)};
   add_rows<kdtree::KdTree, AutoFunctions<KdPacketFamily, KdPacketLeaves, limits, Incoherent, Single>>(rows, "auto",

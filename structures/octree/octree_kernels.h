@@ -32,8 +32,8 @@ inline void add_kernels(std::type_identity<octree::Octree>, KernelRows& rows) {
   Single::add(rows);
   add_queued_rows<octree::Octree, OctreeQueued, Single::Functions>(rows, TypeList<>{});
   add_packet_rows<octree::Octree, OctreePacketFamily>(rows, TypeList<>{});
-  using Incoherent = std::conditional_t<kRegisterWidth == 1, Single::Functions,
-                                        QueuedFunctions<OctreeQueued, Single::Functions, 32, 64>>;
+  using Incoherent =
+      std::conditional_t<kRegisterWidth == 1, Single::Functions, UsualQueuedFunctions<OctreeQueued, Single::Functions>>;
   constexpr AutoLimits limits{.near_closest = AutoLimits::on(2800, 3000),
                               .near_any = AutoLimits::on(2500, AutoLimits::kNone)};
   add_rows<octree::Octree, AutoFunctions<OctreePacketFamily, TypeList<>, limits, Incoherent, Single::Functions>>(

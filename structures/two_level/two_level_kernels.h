@@ -135,7 +135,7 @@ inline void add_kernels(std::type_identity<two_level::TwoLevel>, KernelRows& row
   // a register holds eight (docs/performance/other-structures.md).
   using Hybrid = PacketFunctions<TwoLevelPacketFamily, 16, kFewOfHybrid16>;
   using Incoherent = std::conditional_t<(kRegisterWidth >= 8), Hybrid, Single>;
-  constexpr AutoLimits limits{.near_closest = AutoLimits::on(1350, 1350), .near_any = AutoLimits::on(600, 600)};
+  constexpr AutoLimits limits{.near_closest = 1350, .near_any = 600};
   using Auto = AutoFunctions<TwoLevelPacketFamily, TypeList<>, limits, Incoherent, Single>;
   add_rows<Structure, OrBelow<Auto>>(rows, "auto", TypeList<>{});
 }
