@@ -71,8 +71,16 @@ struct AutoFunctions {
           waiting += count, trial.other_way -= count;
         } else {
           send_waiting();
-          count = std::min(count, trial.next_packets);
-          if (packets(begin, count) * 1000 > count * trial.limit) {
+          const std::size_t most = std::min(count, trial.next_packets);
+          // What is in doubt goes packet by packet: they end as soon as too many of their rays went on alone.
+          const std::size_t step = trial.next_packets == kProbe ? kTile : most;
+          std::size_t alone = 0;
+          count = 0;
+          while (count < most && alone * 1000 <= most * trial.limit) {
+            const std::size_t some = std::min(step, most - count);
+            alone += packets(begin + count, some), count += some;
+          }
+          if (alone * 1000 > most * trial.limit) {
             trial.other_way = trial.next_other;
             trial.next_other = std::min(2 * trial.next_other, kMostOther), trial.next_packets = kProbe;
           } else {
