@@ -210,12 +210,12 @@ struct Exact {
     if (__builtin_expect((d.candidates & (d.candidates - 1)) == 0, 1)) {
       if (certain == 0) return 0;
       const int i = __builtin_ctz(certain);
-      return d.low[i] >= tnear && d.high[i] - d.low[i] <= exact_filter::kWide * __builtin_fabsf(d.high[i]) ? certain
-                                                                                                           : 0;
+      return d.low[i] >= tnear && (d.high[i] - d.low[i]) * exact_filter::kNarrow <= __builtin_fabsf(d.high[i]) ? certain
+                                                                                                               : 0;
     }
     const F low = F::load(d.low), high = F::load(d.high);
     const vm<W> narrow =
-        vm<W>::from_bits(certain) & (low >= F(tnear)) & (high - low <= F(exact_filter::kWide) * abs(high));
+        vm<W>::from_bits(certain) & (low >= F(tnear)) & ((high - low) * F(exact_filter::kNarrow) <= abs(high));
     const float least = reduce_min(select(narrow, high, F(std::numeric_limits<float>::infinity())));
     // One without an interval (NaN) may be anywhere.
     const unsigned first = d.candidates & ~(low > F(least)).bits();

@@ -1,6 +1,8 @@
 // The distances that the filter of `exact` leaves open, in doubles: t of triangles' planes with bounds on its error.
 #pragma once
 
+#include <limits>
+
 #include "core/exact/double_bounds.h"
 #include "intersectors/triangle_hits.h"
 #include "simd/double.h"
@@ -53,8 +55,8 @@ struct NarrowIntervals {
   /// Of these intervals and those given what both hold.
   ARBORETUM_INLINE void narrow(vf<W>& l, vf<W>& h) const {
     using F = vf<W>;
-    // Rounding to floats takes at most half of this from either end.
-    const auto ulp = [](F x) { return madd(abs(x), F(0x1p-23f), F(0x1p-149f)); };
+    // Rounding to floats takes at most half of this from either end. (Of a subnormal t much less; but see kLeast.)
+    const auto ulp = [](F x) { return madd(abs(x), F(0x1p-23f), F(std::numeric_limits<float>::min())); };
     const vm<W> narrowed = vm<W>::from_bits(usable);
     const F new_low = to_floats<W>(low), new_high = to_floats<W>(high);
     l = select(narrowed, max_x86(new_low - ulp(new_low), l), l);

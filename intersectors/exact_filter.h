@@ -11,10 +11,11 @@
 // An edge function U = x^_c y^_b - y^_c x^_b is then off by
 //   4 L delta + 2 delta^2, and by its own roundings, 3 u L^2 fused and 4 u L^2 not: by less than
 //   u (12 L Z + 11 L^2) + 18 u^2 Z^2 + higher terms fused, u (14 L Z + 12 L^2) + 25 u^2 Z^2 not; hence
-//   E = k u (L + 7 u Z) (L + Z) + 2^-140,  k = 12.5 fused, 14.5 not.
-// At least 3.5 % are left for E's own five roundings, and 2^-140 is more than all underflows. U, V, W all beyond E on
-// one side: certainly hit; one beyond E, another beyond -E: certainly missed; else exact arithmetic. An overflow of z^,
-// x^, y^ or of a product makes E infinite or NaN, since (L + 7 u Z) (L + Z) is no less than any product, and then
+//   E = k u (L + 7 u Z) (L + Z) + 2^-126,  k = 12.5 fused, 14.5 not.
+// At least 3.5 % are left for E's own five roundings, and 2^-126 is more than all underflows (2^-140 would do; but
+// where it is added in a fused operation, a subnormal number takes Intel's cores some 150 cycles). U, V, W all beyond E
+// on one side: certainly hit; one beyond E, another beyond -E: certainly missed; else exact arithmetic. An overflow of
+// z^, x^, y^ or of a product makes E infinite or NaN, since (L + 7 u Z) (L + Z) is no less than any product, and then
 // nothing is certain. (A NaN x^ comes of an infinite z^ or of a NaN shear alone, so max_abs may drop it.) Denormals
 // must not be flushed.
 //
@@ -23,7 +24,7 @@
 //   (E / |U + V + W|) (|z_a - t| + |z_b - t| + |z_c - t|) <= 2 (E / |U + V + W|) (z_max - z_min);
 // the roundings of weights, z and their sum by 4, 3 and 3 u max |z|, those of z_max - z_min by 4 u max |z| more, as
 // E < |U + V + W| / 3. The interval about t is padded by
-//   3 E / |U + V + W| (z_max - z_min) + 20 u max |z| + 2^-140.
+//   3 E / |U + V + W| (z_max - z_min) + 20 u max |z| + 2^-126.
 // A hit that the filter has not decided lies within [z_min, z_max], padded by 8 u max |z|. Where these intervals leave
 // open which hit counts, doubles narrow them (DoubleDistances), for all triangles of a block at once.
 #pragma once
@@ -37,10 +38,9 @@ namespace ARBORETUM_ISA_NAMESPACE {
 namespace exact_filter {
 
 inline constexpr float kBound = (kHasFma ? 12.5f : 14.5f) * 0x1p-24f;
-inline constexpr float kLeast = 0x1p-140f;
-/// Width of an interval, relative to t, above which doubles narrow it: a wide one lets boxes through that lie behind
-/// the hit.
-inline constexpr float kWide = 0x1p-14f;
+inline constexpr float kLeast = std::numeric_limits<float>::min();  ///< 2^-126, the least that is not subnormal
+/// Doubles narrow an interval that is wider than t / kNarrow: a wide one lets boxes through that lie behind the hit.
+inline constexpr float kNarrow = 0x1p14f;
 
 /// A block after the filter: sheared depths, edge functions, the least and the greatest of these, their bound.
 template <int W>
@@ -101,7 +101,7 @@ template <int W>
 template <bool AnyHit, int W>
 [[nodiscard]] ARBORETUM_INLINE unsigned settled(vf<W> low, vf<W> high, vm<W> certain, vf<W> tnear, vf<W> tfar) {
   vm<W> all = certain & (low >= tnear) & (high <= tfar);
-  if constexpr (!AnyHit) all = all & (high - low <= vf<W>(kWide) * abs(high));
+  if constexpr (!AnyHit) all = all & ((high - low) * vf<W>(kNarrow) <= abs(high));
   return all.bits();
 }
 

@@ -94,6 +94,27 @@ ARBORETUM_INLINE vf<4> four(float x, float y, float z, float w) {
 #endif
 }
 
+/// x y z x of x y z w: where w, which may be anything, would be reckoned with.
+ARBORETUM_INLINE vf<4> xyzx(vf<4> a) { return permute_in_fours<0, 1, 2, 0>(a); }
+
+/// N floats in the first lanes, 0 in the others: what stands behind them in memory may be subnormal numbers as floats,
+/// and multiplying these takes Intel's cores some 150 cycles, whether anybody looks at those lanes or not.
+template <int N>
+ARBORETUM_INLINE vf<lanes_for(N)> load_first(const void* p) {
+  if constexpr (N == lanes_for(N)) {
+    return vf<N>::load(p);
+  } else {
+    static_assert(N == 2);
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+    float lanes[4] = {};
+    std::memcpy(lanes, p, N * sizeof(float));
+    return vf<4>::load(lanes);
+#else
+    return vf<4>(_mm_castsi128_ps(_mm_loadl_epi64(static_cast<const __m128i*>(p))));
+#endif
+  }
+}
+
 /// Rows to columns: lane k of row i becomes lane i of row k.
 ARBORETUM_INLINE void transpose(vf<4> (&row)[4]) {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR

@@ -40,7 +40,7 @@
 // Near and far planes are told apart by the sign bit of r, so that -0 goes with the negative directions.
 #pragma once
 
-#include "simd/simd.h"
+#include "simd/swizzle.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -89,7 +89,8 @@ struct BoxRay {
   /// The axes stand in lanes: some forty instructions fewer a ray than one axis after the other.
   ARBORETUM_INLINE BoxRay(const Ray& ray, float max_coordinate) {
     using F = vf<4>;
-    const F o = F::load(&ray.origin), d = F::load(&ray.direction);
+    // Behind the direction stands tfar: of the largest float the reciprocal is subnormal.
+    const F o = F::load(&ray.origin), d = xyzx(F::load(&ray.direction));
     F rs, nears, fars;
     constants<Padded>(
         o, d, F(largest_component(ray.direction)), [&] { return F(largest_component(ray.origin)); }, F(max_coordinate),
@@ -181,7 +182,7 @@ struct BoxLanes {
 
   /// Entry distances (at least tnear) and, as bits, the children whose interval within [tnear, tfar] is not empty.
   ARBORETUM_INLINE unsigned test(const std::byte* node, F tnear, F tfar, F& entry) const {
-    return test_planes([node](unsigned offset) { return F::load(node + offset); }, tnear, tfar, entry);
+    return test_planes([node](unsigned offset) { return load_first<N>(node + offset); }, tnear, tfar, entry);
   }
 
   /// The same for planes that are made from the node: `planes(offset)` gives those that lie `offset` bytes behind its

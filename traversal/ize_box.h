@@ -26,7 +26,7 @@ struct IzeLanes {
   unsigned near_x, near_y, near_z;       ///< where a node's near planes lie: in bytes from its begin
 
   ARBORETUM_INLINE explicit IzeLanes(const Ray& ray) : ox(ray.origin.x), oy(ray.origin.y), oz(ray.origin.z) {
-    const vf<4> r = vf<4>(1.0f) / vf<4>::load(&ray.direction);
+    const vf<4> r = vf<4>(1.0f) / xyzx(vf<4>::load(&ray.direction));
     // Infinite, or nearly: it stays.
     const vf<4> wider = select(abs(r) < vf<4>(0x1p127f), vf<4>::from_int_bits(r.as_int() + vi<4>(2)), r);
     rx = F(lane<0>(r)), ry = F(lane<1>(r)), rz = F(lane<2>(r));
@@ -38,7 +38,7 @@ struct IzeLanes {
 
   /// As BoxLanes::test.
   ARBORETUM_INLINE unsigned test(const std::byte* node, F tnear, F tfar, F& entry) const {
-    const auto planes = [node](unsigned offset) { return F::load(node + offset); };
+    const auto planes = [node](unsigned offset) { return load_first<N>(node + offset); };
     const F nx = (planes(near_x) - ox) * rx, ny = (planes(near_y) - oy) * ry, nz = (planes(near_z) - oz) * rz;
     const F lx = (planes(near_x ^ kSide) - ox) * gx, ly = (planes(5 * kSide - near_y) - oy) * gy,
             lz = (planes(9 * kSide - near_z) - oz) * gz;

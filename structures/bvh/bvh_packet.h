@@ -147,10 +147,10 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   }
   static constexpr float kSlack = 0x1p-21f;
 
-  /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together, or by a subnormal number's
-  /// last place.
+  /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together, or, where they are
+  /// subnormal, by less than 2^-126.
   static float rounding(const Bounds& o, const Bounds& end) {
-    return 0x1p-21f * (o.largest() + end.largest()) + 0x1p-148f;
+    return 0x1p-21f * (o.largest() + end.largest()) + 0x1p-126f;
   }
 
   /// Rays towards a light have no common origin, but their ends o + tfar d lie close together. Then the bounds of the

@@ -18,7 +18,7 @@ struct SoaPacketNodes {
   using Single = SoaNodeTest<N, Padded>;
 
   static ARBORETUM_INLINE vf<kLanes> planes(const std::byte* node, unsigned k) {
-    return vf<kLanes>::load(node + k * (N * sizeof(float)));
+    return load_first<N>(node + k * (N * sizeof(float)));
   }
   template <class F>
   static ARBORETUM_INLINE F distance(const std::byte* node, unsigned k, int i, F r, F c) {

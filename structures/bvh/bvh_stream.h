@@ -103,7 +103,7 @@ class Stream {
   struct alignas(64) Group {
     Line line[kRays];
     [[no_unique_address]] std::conditional_t<kTwoOffsets, std::array<Ray, kRays>, Nothing> rays;
-    float t[kRays];  ///< the distance up to which boxes count: to the nearest hit so far
+    float t[kRays] = {};  ///< the distance up to which boxes count: to the nearest hit so far; all are compared
     NearestHit best[kRays];
     std::uint32_t index[kRays];
     alignas(64) std::byte data[kKeepsData ? kRays * sizeof(RayData) : 1];

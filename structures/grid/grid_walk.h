@@ -9,6 +9,7 @@
 #pragma once
 
 #include "intersectors/leaf_block.h"
+#include "simd/swizzle.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -28,7 +29,7 @@ struct GridRay {
     const F size = abs(direction);
     fixed = (size <= F(largest_component(ray.direction) * 0x1p-60f)) | vm<4>::from_bits(8);
     negative = direction.as_int() < vi<4>(0);
-    reciprocal = F(1.0f) / direction;
+    reciprocal = F(1.0f) / xyzx(direction);
   }
 };
 

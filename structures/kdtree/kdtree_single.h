@@ -74,7 +74,7 @@ struct KdRay {
     using F = vf<4>;  // the axes stand in lanes
     F rs, in, out;
     constants(
-        F::load(&ray.origin), F::load(&ray.direction), F(largest_component(ray.direction)),
+        F::load(&ray.origin), xyzx(F::load(&ray.direction)), F(largest_component(ray.direction)),
         [&] { return F(largest_component(ray.origin)); }, max_coordinate, pad, rs, in, out);
     rs.store(r), in.store(enter), out.store(leave);
     const unsigned negative = sign_mask(rs);
