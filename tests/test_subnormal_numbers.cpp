@@ -1,6 +1,6 @@
-// Subnormal numbers: where one is multiplied, Intel's cores take some 150 cycles, AMD's fewer. So a kernel that reckons
-// with them looks well on one machine and is several times slower on another, with right answers on both: the
-// processor's own flags tell.
+// Subnormal numbers: where one is multiplied, Intel's cores take some 150 cycles. So a kernel that reckons with them
+// may look well on another machine and be several times slower there, with right answers on both: the processor's own
+// flags tell.
 #include <immintrin.h>
 
 #include "tests/catch.h"
@@ -40,7 +40,7 @@ TEST_CASE("the flags tell of subnormal numbers") {
   CHECK(flags_of([&] { half = small * small; }) == kResult);
 }
 
-TEST_CASE("no kernel reckons with subnormal numbers where there are none") {
+TEST_CASE("kernels bring in no subnormal numbers") {
   const TriangleMesh mesh = random_triangles(600, 0.1f, 3);
   std::vector<Ray> rays = aimed_rays(mesh, mesh.bounds().center() + mesh.bounds().extent() * 2.0f, 96, 61);
   const std::vector<Ray> generic = generic_rays(mesh, 96, 62);
