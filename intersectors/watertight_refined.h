@@ -4,12 +4,14 @@
 // reported, with its own right distance.
 //
 // t is right to half a unit in the last place, and a little, unless the ray grazes (relative error some 2^-50 times
-// |e1||e2||d| / |N.d|). Where the exact ray passes outside the triangle, by less than the search rounds but by more
-// than doubles do, the hit is the triangle's nearest point in barycentrics, since the plane at the ray may be far off;
-// t stays within [tnear, tfar]. 36 bytes a triangle (vertices) or 12 (indices).
+// |e1||e2||d| / |N.d|). Where doubles leave open where in the triangle the ray is, exact arithmetic says whether it
+// meets it, and where. Where the exact ray passes outside the triangle, by less than the search rounds but by more than
+// doubles do, the hit is the triangle's nearest point in barycentrics, since the plane at the ray may be far off; t
+// stays within [tnear, tfar]. 36 bytes a triangle (vertices) or 12 (indices).
 #pragma once
 
 #include "core/exact/double_bounds.h"
+#include "core/exact/hit_arithmetic.h"
 #include "intersectors/leaf_block.h"
 #include "intersectors/moller_trumbore.h"
 #include "intersectors/watertight.h"
@@ -55,6 +57,8 @@ struct WatertightRefined : Watertight {
     const double scale = double_bounds::kDeterminant * double_bounds::kQuotient / std::abs(det),
                  error = scale * size(d) * (size(terms.c) * std::max(size(e1), size(e2)) + size(e1) * size(e2)) +
                          double_bounds::kRounding;
+    // Where doubles cannot tell where in the triangle the ray is, or whether it is: seen edge on, or a needle.
+    if (__builtin_expect(!(error < 0x1p-10), 0) && round_if_met(ray, best)) return;
     const double outside = std::max({-u, -v, 0.5 * (u + v - 1.0)});
     if (error < 0x1p-10 && outside <= error) {  // beyond, the plane may be anywhere
       u = std::clamp(u, 0.0, 1.0), v = std::clamp(v, 0.0, 1.0 - u);
@@ -70,6 +74,19 @@ struct WatertightRefined : Watertight {
     const float rounded = float(t);
     best.t = rounded < ray.tnear() ? ray.tnear() : rounded > ray.tfar ? ray.tfar : rounded;
     best.u = float(u), best.v = float(v);
+  }
+
+ private:
+  /// The hit by exact arithmetic, if the exact ray meets the triangle within its interval; else false, and nothing.
+  static __attribute__((noinline)) bool round_if_met(const RayData& ray, NearestHit& best) {
+    const auto point = [](const float(&p)[3]) { return Vec3f{p[0], p[1], p[2]}; };
+    const Ray exact{point(ray.origin), ray.tnear(), point(ray.towards), ray.tfar};
+    const std::array<Vec3f, 3> corners{point(ray.corner[0]), point(ray.corner[1]), point(ray.corner[2])};
+    DistanceInterval interval;
+    if (!meets_exactly(exact, corners, interval)) return false;
+    const RoundedHit hit = round_exactly(exact, corners);
+    best.t = std::clamp(hit.t, exact.tnear, exact.tfar), best.u = hit.u, best.v = hit.v;
+    return true;
   }
 };
 

@@ -386,6 +386,42 @@ TEST_CASE("watertight_refined meets a triangle at 0 where the ray starts on its 
   }
 }
 
+// Needles, two corners an ulp apart, met near the rim: doubles cannot tell whether the rays are inside. A watertight
+// test may put them on either side of an open edge.
+TEST_CASE("the distance of watertight_refined is the exact one where doubles cannot tell u and v") {
+  struct Case {
+    std::vector<Vec3f> corners;
+    Ray ray;
+    float t;
+  };
+  const Case cases[] = {
+      {{{0.92703587f, -0.9853362f, -0.040116318f},
+        {0.927036f, -0.9853362f, -0.040116318f},
+        {0.89554465f, -0.04935862f, -0.38466844f}},
+       {{0.89662135f, -0.08011281f, -0.3733467f}, 0, {-1156096, 33022056, -12156640}, kInfinity},
+       0x1p-30f},
+      {{{0.5417437f, 0.0003389483f, 0.72030926f},
+        {0.5417438f, 0.0003389483f, 0.72030926f},
+        {0.2902671f, 0.27170044f, -0.9278951f}},
+       {{0.19494823f, 0.37455595f, -1.5526235f}, 0, {0.09531888f, -0.1028555f, 0.6247284f}, kInfinity},
+       1.0f},
+  };
+  for (const Case& c : cases) {
+    const TriangleMesh mesh = of_corners(c.corners);
+    Structures structures(mesh);
+    int hits = 0;
+    for (const KernelRow& row : runnable_rows()) {
+      if (row.intersector != "watertight_refined" || row.box != "padded") continue;
+      const Hit hit = closest_hit(row, structures.get(row), std::span(&c.ray, 1))[0];
+      if (!hit.is_hit()) continue;
+      INFO(name_of(row));
+      CHECK(hit.t == c.t);
+      ++hits;
+    }
+    CHECK(hits > 0);
+  }
+}
+
 TEST_CASE("a triangle behind a ray that starts in its plane is not met") {
   TriangleMesh mesh;
   mesh.vertices = {{40, 55, -30}, {36, 61, -28}, {49, 55, -27}};
