@@ -92,6 +92,41 @@ struct Exact {
     return d.candidates != 0 && any_within(ray, block, d, tnear, tfar);
   }
 
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+  template <class Block>
+  using ForTwoRays = const Block&;
+  /// What closest_hit_block() or any_hit_block() do, for two rays.
+  template <bool AnyHit, class Block>
+  static ARBORETUM_INLINE unsigned test_two(RayData& low, RayData& high, const Block& block, const Ray& low_ray,
+                                            const Ray& high_ray, NearestHit& low_best, NearestHit& high_best) {
+    const Edges<16> edges(ShearedVertices<16>(low, high, block));
+    const unsigned met = edges.candidates();
+    if (__builtin_expect(met == 0, 1)) return 0;
+    const Intervals<16> t(edges, in_halves(low.shear[2], high.shear[2]));
+    const vf<16> tnear = in_halves(low_ray.tnear, high_ray.tnear),
+                 tfar = AnyHit ? in_halves(low_ray.tfar, high_ray.tfar) : in_halves(low_best.t, high_best.t);
+    const unsigned within = met & exact_filter::possible(t.low, t.high, tnear, tfar), certain = t.certain.bits();
+    if (within == 0) return 0;
+    const auto one = [&block](RayData& ray, unsigned candidates, unsigned its_certain, vf<8> least, vf<8> most,
+                              const Ray& r, NearestHit& best) {
+      if (candidates == 0) return false;
+      Distances<8> d{candidates, its_certain, {}, {}};
+      least.store(d.low), most.store(d.high);
+      if constexpr (AnyHit) {
+        return any_within(ray, block, d, r.tnear, r.tfar);
+      } else {
+        return __builtin_expect(take_foremost(ray, block, d, r.tnear, best), 1) ||
+               nearest(ray, block, d, r.tnear, best);
+      }
+    };
+    const bool first =
+        one(low, within & 0xffu, certain & 0xffu, lower_half(t.low), lower_half(t.high), low_ray, low_best);
+    const bool second =
+        one(high, within >> 8, certain >> 8, upper_half(t.low), upper_half(t.high), high_ray, high_best);
+    return unsigned(first) | unsigned(second) << 1;
+  }
+#endif
+
   template <int W>
   using FilteredRays = exact_filter::FilteredRays<W>;
   template <class Block>

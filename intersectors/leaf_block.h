@@ -15,6 +15,8 @@
 //     instead of those below;
 //   ForManyRays<Block>(const Block&): a block with what is the same for all rays, which intersect() takes in the
 //     block's place, with the same answers; streams, rays of a packet that go one by one;
+//   ForTwoRays<Block> and intersect_two() or test_two(): two rays at a time (intersectors/two_rays.h); streams on
+//     AVX-512;
 //   kDepthBetweenCorners: boxes may be tight along the ray (traversal/box_test.h); streams.
 // For packets, whose rays stand in lanes (traversal/packet_leaves.h):
 //   PacketData: what is kept for a packet: kGroups, rays of one group sharing a form of the test; clear();

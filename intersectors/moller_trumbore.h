@@ -93,6 +93,31 @@ struct MollerTrumbore {
     }
   };
 
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+  /// A block of eight in both halves of the lanes, and its normals.
+  template <class Block>
+  struct ForTwoRays {
+    const std::uint32_t (&id)[8];
+    vec3<vf<16>> v0, e1, e2, n;
+
+    ARBORETUM_INLINE explicit ForTwoRays(const Block& b) : id(b.id) {
+      const auto t = corners(b, [](const float(&p)[8]) { return in_both_halves(vf<8>::load(p)); });
+      v0 = t.v0, e1 = t.e1, e2 = t.e2, n = normal(b, t);
+    }
+  };
+  template <class Block>
+  static ARBORETUM_INLINE vm<16> intersect_two(const RayData& low, const RayData& high, const ForTwoRays<Block>& block,
+                                               TriangleHits<16>& hits) {
+    const auto both = [](Vec3f a, Vec3f b) {
+      return vf3<16>{in_halves(a.x, b.x), in_halves(a.y, b.y), in_halves(a.z, b.z)};
+    };
+    MollerTrumboreTerms<vf<16>> terms(block.n, block.v0 - both(low.origin, high.origin));
+    terms.meet(block.e1, block.e2, both(low.direction, high.direction));
+    return decide(
+        terms.det, terms.u, terms.v, [&] { return dot(terms.n, terms.c); }, hits);
+  }
+#endif
+
   /// What a packet keeps beside its rays: nothing.
   struct PacketData {
     static constexpr int kGroups = 1;

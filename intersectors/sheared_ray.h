@@ -108,6 +108,28 @@ struct ShearedVertices {
     };
     a = shear(block.v0), b = shear(block.v1), c = shear(block.v2);
   }
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+  /// A block of eight as one ray sees it, in the lower half of the lanes, and as another does, in the upper.
+  template <class Block>
+  ARBORETUM_INLINE ShearedVertices(const ShearedRay& low, const ShearedRay& high,
+                                   const Block& block) requires(W == 16) {
+    const auto number = [](const float(&of_low)[4], const float(&of_high)[4], int i) {
+      return in_halves(of_low[i], of_high[i]);
+    };
+    const F ox = number(low.from, high.from, 0), oy = number(low.from, high.from, 1),
+            oz = number(low.from, high.from, 2), sx = number(low.shear, high.shear, 0),
+            sy = number(low.shear, high.shear, 1);
+    const AxisOrder &one = *low.order, &other = *high.order;
+    const auto shear = [&](const float(&p)[3][8]) {
+      const auto row = [&p](std::uint32_t of_low, std::uint32_t of_high) {
+        return in_halves(vf<8>::load(ShearedRay::row(p, of_low)), vf<8>::load(ShearedRay::row(p, of_high)));
+      };
+      const F pz = oz - row(one.z, other.z);
+      return vf3<W>{nmadd(sx, pz, ox - row(one.x, other.x)), nmadd(sy, pz, oy - row(one.y, other.y)), pz};
+    };
+    a = shear(block.v0), b = shear(block.v1), c = shear(block.v2);
+  }
+#endif
   /// Of one ray a lane: points as their origins are seen from them.
   ARBORETUM_INLINE ShearedVertices(F sx, F sy, vf3<W> p0, vf3<W> p1, vf3<W> p2) {
     const auto shear = [&](vf3<W> p) { return vf3<W>{nmadd(sx, p.z, p.x), nmadd(sy, p.z, p.y), p.z}; };

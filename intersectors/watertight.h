@@ -78,6 +78,27 @@ struct Watertight {
     return inside;
   }
 
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+  template <class Block>
+  using ForTwoRays = const Block&;
+  template <class Block>
+  static ARBORETUM_INLINE vm<16> intersect_two(const ShearedRay& low, const ShearedRay& high, const Block& block,
+                                               TriangleHits<16>& hits) {
+    const Edges<16> e(ShearedVertices<16>(low, high, block));
+    vm<16> inside = e.inside();
+    if (const unsigned met = inside.bits()) {
+      const vf<16> sz = in_halves(low.shear[2], high.shear[2]);
+      const unsigned open = met & ~e.hits(in_halves(low.tnear(), high.tnear()), sz, hits).bits();
+      if (__builtin_expect(open != 0, 0)) {
+        TriangleHits<16> settled = hits;
+        inside = settle_two(open, inside & e.in_doubt(sz), inside, low, high, block, settled);
+        hits = settled;
+      }
+    }
+    return inside;
+  }
+#endif
+
   struct PacketData : ShearedPacket {
     /// RayData of ray i.
     [[nodiscard]] ARBORETUM_INLINE RayData alone(const Ray& ray, int i) const {
@@ -162,6 +183,33 @@ struct Watertight {
       return msub(F(0x1p-8f) * (far - near), sideways, max_abs(near, far) * area);
     }
   };
+
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+  /// What intersect() does with lanes that are open, for each of the two rays.
+  template <class Block>
+  static __attribute__((noinline)) vm<16> settle_two(unsigned open, vm<16> in_doubt, vm<16> inside,
+                                                     const ShearedRay& low, const ShearedRay& high, const Block& block,
+                                                     TriangleHits<16>& hits) {
+    TriangleHits<8> half[2] = {
+        {lower_half(hits.t), lower_half(hits.u_numerator), lower_half(hits.v_numerator), lower_half(hits.denominator)},
+        {upper_half(hits.t), upper_half(hits.u_numerator), upper_half(hits.v_numerator), upper_half(hits.denominator)}};
+    unsigned met = inside.bits();
+    for (int i = 0; i < 2; ++i) {
+      const auto lanes = [shift = 8 * i](unsigned bits) { return bits >> shift & 0xffu; };
+      if (lanes(open) == 0) continue;
+      const ShearedRay& ray = i == 0 ? low : high;
+      if (lanes(in_doubt.bits()) != 0) {
+        const unsigned hit = decide_in_double(vm<8>::from_bits(lanes(met)), ray, block, half[i]).bits();
+        met ^= (lanes(met) ^ hit) << 8 * i;
+      } else {
+        half[i].t = plane_distances_in_double(lanes(open), ray, block, half[i].t);
+      }
+    }
+    hits = {in_halves(half[0].t, half[1].t), in_halves(half[0].u_numerator, half[1].u_numerator),
+            in_halves(half[0].v_numerator, half[1].v_numerator), in_halves(half[0].denominator, half[1].denominator)};
+    return vm<16>::from_bits(met);
+  }
+#endif
 
   /// The lanes of `inside` that are hit when ties are decided in double; sets their hits and those of triangles seen
   /// edge on, and distances close to tnear, again.

@@ -94,6 +94,17 @@ ARBORETUM_INLINE vf<4> four(float x, float y, float z, float w) {
 #endif
 }
 
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+/// Sixteen lanes in halves, the lower of one thing, the upper of another.
+ARBORETUM_INLINE vf<16> in_halves(vf<8> low, vf<8> high) { return vf<16>(_mm512_insertf32x8(_mm512_castps256_ps512(low.v), high.v, 1)); }
+ARBORETUM_INLINE vf<16> in_halves(float low, float high) {
+  return vf<16>(_mm512_mask_blend_ps(0xff00, _mm512_set1_ps(low), _mm512_set1_ps(high)));
+}
+ARBORETUM_INLINE vf<16> in_both_halves(vf<8> a) { return vf<16>(_mm512_broadcast_f32x8(a.v)); }
+ARBORETUM_INLINE vf<8> lower_half(vf<16> a) { return vf<8>(_mm512_castps512_ps256(a.v)); }
+ARBORETUM_INLINE vf<8> upper_half(vf<16> a) { return vf<8>(_mm512_extractf32x8_ps(a.v, 1)); }
+#endif
+
 /// x y z x of x y z w: where w, which may be anything, would be reckoned with.
 ARBORETUM_INLINE vf<4> xyzx(vf<4> a) { return permute_in_fours<0, 1, 2, 0>(a); }
 

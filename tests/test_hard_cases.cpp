@@ -215,6 +215,34 @@ TEST_CASE("every kernel gives the exact answer of the hard cases, but for the kn
   }
 }
 
+// Rays that visit a leaf together are tested together, some that doubles or exact arithmetic decide beside some that
+// they need not.
+TEST_CASE("a ray of the hard cases gets beside others what it gets alone, bit for bit") {
+  for (const HardCase& c : load_hard_cases()) {
+    const Sanitised s = sanitised(c);
+    std::vector<Ray> rays{c.ray, c.ray, c.ray, c.ray, c.ray};
+    rays[1].direction = c.ray.direction * 2.0f;
+    rays[2].tfar = std::min(c.ray.tfar, 1.0f);
+    if (s.mesh.size() != 0) {
+      const auto corners = s.mesh.corners(0);
+      rays[3].direction = (corners[0] + corners[1] + corners[2]) * (1.0f / 3.0f) - c.ray.origin;
+    }
+    Structures structures(s.mesh);
+    for (const KernelRow& row : runnable_rows()) {
+      if (row.structure == "embree" || row.traversal == "single") continue;
+      INFO(c.id << " on " << name_of(row));
+      std::vector<Hit> alone;
+      std::vector<std::uint8_t> occluded;
+      for (const Ray& ray : rays) {
+        alone.push_back(closest_hit(row, structures.get(row), std::span(&ray, 1))[0]);
+        occluded.push_back(any_hit(row, structures.get(row), std::span(&ray, 1))[0]);
+      }
+      CHECK(same_bits(closest_hit(row, structures.get(row), rays), alone));
+      CHECK(any_hit(row, structures.get(row), rays) == occluded);
+    }
+  }
+}
+
 TEST_CASE("a ray through the diagonal of a quad hits it, in every watertight and Pluecker kernel") {
   // E01 of the hard cases, and others like it: with fused edge functions both triangles of every other quad
   // are missed.

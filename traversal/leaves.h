@@ -7,6 +7,7 @@
 #pragma once
 
 #include "intersectors/leaf_block.h"
+#include "intersectors/two_rays.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -65,6 +66,7 @@ struct CompiledLeaves {
   /// The intersector can test many rays against one triangle as well (packets).
   static constexpr bool kRaysInLanes = requires { typename Intersector::PacketData; };
   /// Many rays are better tested with one block after the other (test_block_by_block()).
+  static constexpr bool kTwoRays = kTwoAtATime<Intersector, Block>;
   static constexpr bool kBlockByBlock = kSharesBlocks<Intersector, Block>;
   static constexpr std::size_t kBytesAhead = sizeof(Block);
 };
@@ -104,16 +106,29 @@ inline constexpr bool kTestsMany = requires {
   Leaves::kMany;
 };
 
+/// Leaves whose blocks are tested with two rays at a time (intersectors/two_rays.h).
+template <class Leaves>
+inline constexpr bool kTestsTwo = requires {
+  requires Leaves::kTwoRays;
+};
+
 /// Tests a leaf with `rays`, a bit each: one ray after the other, or one block after the other where that is better.
 /// `ray(i)` and `data(i)`: the i-th ray and what the intersector keeps for it. Of any hit `hit(i)` is called once, for
 /// one that has met something; of the closest, when `best(i)`, its nearest hit so far, is a new one.
-template <bool AnyHit, class Leaves, class Counting, class RayAt, class DataOf, class BestOf, class OnHit>
+/// `Two`: two rays at a time, where the leaves can (streams; packets lose by it).
+template <bool AnyHit, bool Two = false, class Leaves, class Counting, class RayAt, class DataOf, class BestOf,
+          class OnHit>
 ARBORETUM_INLINE void test_leaf(const Leaves& leaves, [[maybe_unused]] const LeafForm& form,
                                 [[maybe_unused]] const Counting& counting, const std::byte* blocks, unsigned count,
                                 std::uint64_t rays, const RayAt& ray, const DataOf& data, const BestOf& best,
                                 const OnHit& hit) {
   if constexpr (kTestsMany<Leaves>) {
     leaves.template test_many<AnyHit>(form, counting, blocks, count, rays, ray, data, best, hit);
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+  } else if constexpr (Two && kTestsTwo<Leaves>) {
+    test_two_by_two<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks),
+                                                          count, rays, ray, data, best, hit);
+#endif
   } else if constexpr (Leaves::kBlockByBlock) {
     test_block_by_block<AnyHit, typename Leaves::Intersector>(reinterpret_cast<const typename Leaves::Block*>(blocks),
                                                               count, rays, ray, data, best, hit);

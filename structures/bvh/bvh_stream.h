@@ -267,7 +267,7 @@ class Stream {
         g.t[i] = g.best[i].t * beyond;
       }
     };
-    test_leaf<AnyHit>(
+    test_leaf<AnyHit, true>(
         leaves_, form_, counting_, blocks, count, rays, [&](int i) -> const Ray& { return ray(g, unsigned(i)); },
         [&](int i) -> decltype(auto) { return data(g, unsigned(i)); }, [&](int i) -> NearestHit& { return g.best[i]; },
         hit);
