@@ -7,8 +7,8 @@
 
 namespace arboretum {
 
-/// Edit distance with adjacent transpositions (restricted Damerau-Levenshtein).
-[[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
+/// Edit distance with adjacent transpositions (restricted Damerau-Levenshtein); upper and lower case are one.
+[[nodiscard]] std::size_t edit_distance(std::string_view left, std::string_view right);
 /// The candidate with the smallest edit distance to `name`; empty when there are no candidates.
 [[nodiscard]] std::string nearest_name(std::string_view name, std::span<const std::string> candidates);
 /// The nearest candidate, if it looks like a misspelling: at most a third of the longer word differs, or the first

@@ -254,6 +254,15 @@ void refuse_empty_values(const CLI::App& command) {
           fmt::format("{}: {} has an empty value; give one, or leave it out", command.get_name(), option->get_name()));
 }
 
+/// Of these CLI11 says no more than numbers.
+void refuse_doubled_options(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands())
+    for (const CLI::Option* option : command->get_options({}))
+      if (option->get_items_expected_max() == 1 && option->count() > 1)
+        throw UserError(fmt::format("{}: {} is given {} times; keep one", command->get_name(), option->get_name(),
+                                    option->count()));
+}
+
 /// The command line without --resume, which would repeat nothing of what was measured.
 std::string repeatable(std::vector<std::string> words) {
   std::erase_if(words, [](const std::string& word) { return word == "--resume" || word.starts_with("--resume="); });
@@ -282,6 +291,7 @@ ExitStatus dispatch(std::vector<std::string> words) {
     fmt::print("{}\n", version.what());
     return ExitStatus::kDone;
   } catch (const CLI::ParseError& e) {
+    refuse_doubled_options(app);
     std::string line = e.what();
     std::ranges::replace(line, '\n', ' ');
     throw UserError(fmt::format("{}: {}; see `arboretum {} --help`", words.front(), line, words.front()));

@@ -53,6 +53,16 @@ ExitStatus print_list(const Experiment& experiment, const Plan& plan) {
   return ExitStatus::kDone;
 }
 
+/// Says on stderr why the plan has no cell.
+ExitStatus nothing_to_measure(const Plan& plan) {
+  flush_output();
+  fmt::print(stderr, "arboretum: nothing to measure: {} skipped,{} {} excluded, {} filtered out\n",
+             counted(plan.skipped.size(), "combination"),
+             plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded,
+             plan.filtered);
+  return ExitStatus::kNothingMeasured;
+}
+
 /// `done`: cells that the folder of a run that is to be gone on with holds.
 ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan, const std::set<std::string>& done) {
   for (const Cell& cell : plan.cells) fmt::print("{}\n", cell.name());
@@ -70,7 +80,7 @@ ExitStatus print_dry_run(const Experiment& experiment, const Plan& plan, const s
       format_duration(seconds_left(experiment, plan, [&](const std::string& name) { return done.contains(name); })));
   if (!done.empty()) fmt::print("{} done before\n", counted(done.size(), "cell"));
   fmt::print("{}", skipped_lines(plan, {}));
-  return ExitStatus::kDone;
+  return plan.cells.empty() ? nothing_to_measure(plan) : ExitStatus::kDone;
 }
 
 /// A scene that does not load stops the run before anything is measured and before earlier results are touched. Each
@@ -345,12 +355,7 @@ ExitStatus command_run(RunCommand command) {
                          command.resume ? done_before(experiment, plan, shard, command) : std::set<std::string>());
   if (plan.cells.empty()) {
     fmt::print("{}", skipped_lines(plan, {}));
-    flush_output();
-    fmt::print(stderr, "arboretum: nothing to measure: {} skipped,{} {} excluded, {} filtered out\n",
-               counted(plan.skipped.size(), "combination"),
-               plan.in_other_shards ? fmt::format(" {} in other shards,", plan.in_other_shards) : "", plan.excluded,
-               plan.filtered);
-    return ExitStatus::kNothingMeasured;
+    return nothing_to_measure(plan);
   }
   return measure(experiment, std::move(plan), whole, std::move(record), registry, command);
 }

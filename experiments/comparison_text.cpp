@@ -92,6 +92,12 @@ std::string interval_words(std::size_t fewest) {
       fewest, kCoverage[fewest - 2], kFewestOfRatio);
 }
 
+/// The head of ratios: whether they are over those of the control's cells. `trace`, `build`: whether such are there.
+std::string ratio_head(const Comparison& comparison, bool trace, bool build) {
+  const bool relative = (!trace || comparison.control_of_rays) && (!build || comparison.control_of_builds);
+  return relative ? "B/A over control's" : "B/A";
+}
+
 /// Cells of one kind: what they have in common, then a row each.
 std::string cell_table(const Comparison& comparison, bool trace, bool all) {
   std::vector<const ComparedCell*> cells;
@@ -104,9 +110,9 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
   const bool some = !all && cells.size() > kMostRows;
   TableRow titles = axes.varying;
   if (titles.empty()) titles = {trace ? "cell" : "structure"};
-  for (const char* title : {trace ? "A Mray/s" : "A ms", trace ? "B Mray/s" : "B ms", trace ? "B/A" : "speed B/A"})
-    titles.emplace_back(title);
-  titles.insert(titles.end(), {interval_head(fewest_repetitions(cells)), "p", "verdict"});
+  for (const char* title : {trace ? "A Mray/s" : "A ms", trace ? "B Mray/s" : "B ms"}) titles.emplace_back(title);
+  titles.insert(titles.end(), {(trace ? "" : "speed ") + ratio_head(comparison, trace, !trace),
+                               interval_head(fewest_repetitions(cells)), "p", "verdict"});
   std::vector<TableRow> rows{titles};
   std::size_t left_out = 0;
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -134,8 +140,11 @@ std::string cell_table(const Comparison& comparison, bool trace, bool all) {
 }
 
 std::string mean_table(const Comparison& comparison) {
-  std::vector<TableRow> rows{{"geometric mean", "", "B/A", interval_head(fewest_repetitions(pointers(comparison))),
-                              "cells", "faster", "slower", "indistinguishable", "undecided"}};
+  const bool trace = std::ranges::any_of(comparison.cells, &ComparedCell::is_trace),
+             build = !std::ranges::all_of(comparison.cells, &ComparedCell::is_trace);
+  std::vector<TableRow> rows{{"geometric mean", "", ratio_head(comparison, trace, build),
+                              interval_head(fewest_repetitions(pointers(comparison))), "cells", "faster", "slower",
+                              "indistinguishable", "undecided"}};
   for (const MeanRatio& m : comparison.means) {
     rows.push_back({m.axis.empty() ? "all " + m.value : m.axis, m.axis.empty() ? "" : m.value,
                     fmt::format("{:.3f}", m.ratio.median), m.undecided == m.cells ? "-" : interval_text(m.ratio),

@@ -18,13 +18,18 @@ bool has_workload(const Experiment& experiment, const Predicate& wanted) {
          std::ranges::any_of(experiment.include, [&](const CellChoice& c) { return has(c.axes); });
 }
 
-bool traced(const Metrics& m) { return m.trace; }
-bool built(const Metrics& m) { return m.build; }
-bool of_quality(const Metrics& m) { return m.quality; }
-bool traced_or_built(const Metrics& m) { return m.trace || m.build; }
-bool traced_and_built(const Metrics& m) { return m.trace && m.build; }
-bool traced_of_quality(const Metrics& m) { return m.trace && m.quality; }
-bool checked(const Metrics& m) { return m.trace && m.accuracy; }
+/// The metrics that a plot shows.
+struct Shown {
+  bool (*are_measured)(const Metrics&);
+  std::string_view words;
+};
+constexpr Shown traced{[](const Metrics& m) { return m.trace; }, "trace"};
+constexpr Shown built{[](const Metrics& m) { return m.build; }, "build"};
+constexpr Shown of_quality{[](const Metrics& m) { return m.quality; }, "quality"};
+constexpr Shown traced_or_built{[](const Metrics& m) { return m.trace || m.build; }, "trace or build"};
+constexpr Shown traced_and_built{[](const Metrics& m) { return m.trace && m.build; }, "trace and build"};
+constexpr Shown traced_of_quality{[](const Metrics& m) { return m.trace && m.quality; }, "trace and quality"};
+constexpr Shown checked{[](const Metrics& m) { return m.trace && m.accuracy; }, "trace and accuracy"};
 
 /// What a plot shows and the experiment has not; empty: nothing.
 std::string_view no_hard_rays(const Experiment& experiment) {
@@ -45,7 +50,7 @@ std::string_view one_way_off_surfaces(const Experiment& experiment) {
 
 struct Plot {
   std::string_view name;
-  bool (*is_measured)(const Metrics&);
+  Shown metrics;
   bool only_when_named = false;  ///< few experiments have something for it to show
   std::string_view (*lack)(const Experiment&) = [](const Experiment&) { return std::string_view(); };
 };
@@ -85,7 +90,7 @@ std::span<const std::string_view> plot_names() { return kNames; }
 std::vector<std::string> default_plots(const Experiment& experiment) {
   std::vector<std::string> plots;
   for (const Plot& plot : kPlots)
-    if (plot.is_measured(experiment.metrics) && plot.lack(experiment).empty() && !plot.only_when_named)
+    if (plot.metrics.are_measured(experiment.metrics) && plot.lack(experiment).empty() && !plot.only_when_named)
       plots.emplace_back(plot.name);
   return plots;
 }
@@ -98,8 +103,8 @@ std::vector<std::string> read_plots(const YamlReader& yaml, const YAML::Node& no
     const Plot* plot = std::ranges::find(kPlots, name, &Plot::name);
     if (plot == std::end(kPlots))
       yaml.fail(value, unknown_name_message("plot", name, std::vector<std::string>(kNames.begin(), kNames.end())));
-    if (!plot->is_measured(experiment.metrics))
-      yaml.fail(value, fmt::format("plot {} has no data: a metric that it shows is not in metrics", name));
+    if (!plot->metrics.are_measured(experiment.metrics))
+      yaml.fail(value, fmt::format("plot {} has no data: it takes {} in `metrics`", name, plot->metrics.words));
     if (const std::string_view lack = plot->lack(experiment); !lack.empty() && !experiment.overridden)
       yaml.fail(value, fmt::format("plot {} has no data: it shows {}, and there are none", name, lack));
     plots.push_back(name);

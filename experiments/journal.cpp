@@ -11,12 +11,14 @@ namespace {
 Json parse(const std::string& line) { return Json::parse(line, nullptr, false); }
 
 void refuse_damaged(const Json& line, const std::filesystem::path& file, std::size_t number) {
+  const auto refuse = [&](const std::string& why) {
+    throw UserError(
+        fmt::format("{}:{}: not a line as `run` writes it: {}; take the line out, and what it told is measured again",
+                    file.string(), number, why));
+  };
+  if (!line.is_object()) refuse("no JSON object");
   for (const char* key : {"name", "configuration_hash"})
-    if (!line.contains(key) || !line.at(key).is_string())
-      throw UserError(
-          fmt::format("{}:{}: not a line as `run` writes it: no {}; take the line out, and what it told "
-                      "is measured again",
-                      file.string(), number, key));
+    if (!line.contains(key) || !line.at(key).is_string()) refuse(fmt::format("no {}", key));
 }
 
 }  // namespace
@@ -42,7 +44,6 @@ Journal::Journal(std::filesystem::path folder, std::string configuration_hash, c
       for (const std::string& text : read_lines(path)) {
         const Json line = parse(text);
         ++number;
-        if (!line.is_object()) continue;  // torn by a kill
         refuse_damaged(line, path, number);
         refuse_other_configuration(folder_, line.at("configuration_hash"), hash_);
         const auto found = wanted.find(line.at("name").get<std::string>());

@@ -119,6 +119,7 @@ std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, std::string_vie
 std::size_t YamlReader::bytes(const YAML::Node& node, std::string_view what) const {
   constexpr std::pair<std::string_view, int> kUnits[] = {{"", 0},     {"B", 0},    {"KiB", 10},
                                                          {"MiB", 20}, {"GiB", 30}, {"TiB", 40}};
+  constexpr double kLeast = 0x1p20;  // less is a unit forgotten
   const std::string s = node.IsScalar() ? node.Scalar() : "";
   double value = 0;
   const auto [end, error] = std::from_chars(s.data(), s.data() + s.size(), value);
@@ -128,9 +129,9 @@ std::size_t YamlReader::bytes(const YAML::Node& node, std::string_view what) con
     if (s.empty() || error != std::errc{} || unit != name) continue;
     const double total = value * static_cast<double>(std::size_t{1} << shift);
     if (total >= 0x1p60) fail(node, fmt::format("{} must be a size below 1048576TiB, not {}", what, s));
-    if (total >= 1.0) return static_cast<std::size_t>(total);
+    if (total >= kLeast) return static_cast<std::size_t>(total);
   }
-  fail(node, fmt::format("{} must be a size above zero such as 8GiB or 512MiB, not {}", what, shown(node)));
+  fail(node, fmt::format("{} must be a size of 1MiB and more, such as 8GiB or 512MiB, not {}", what, shown(node)));
 }
 
 }  // namespace arboretum

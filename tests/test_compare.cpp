@@ -422,6 +422,11 @@ TEST_CASE("a control is said to be of what it corrects: rays, builds or both") {
       CHECK(json["control"][kind]["cells"] == 1);
       CHECK(json["control"][kind]["ratio"]["median"].get<double>() == Approx(1.0 / 1.2).epsilon(0.03));
     }
+    for (const auto& [title, corrected] :
+         {std::pair{"A Mray/s", rays}, {"A ms", builds}, {"geometric mean", rays && builds}}) {
+      const std::string line = text.substr(text.find(title), text.find('\n', text.find(title)) - text.find(title));
+      CHECK((line.find("B/A over control's") != std::string::npos) == corrected);
+    }
     CHECK_FALSE(says("All speeds"));
     CHECK_FALSE(says("takes it out"));
   }

@@ -165,6 +165,9 @@ TEST_CASE("the journal gives back what it was told, and refuses another configur
   }
   CHECK(error_of([&] { Journal(folder.path(), "other", plan, true); }).find("another configuration") !=
         std::string::npos);
+  std::ofstream(folder.path() / "repetitions.jsonl", std::ios::app) << "{\"name\":\"damag\n";
+  CHECK_THAT(error_of([&] { Journal(folder.path(), "hash", plan, true); }),
+             Catch::Contains("repetitions.jsonl:4: not a line as `run` writes it: no JSON object; take the line out"));
   CHECK(Journal(folder.path(), "other", plan, false).done().empty());
 }
 

@@ -40,6 +40,7 @@ class CommandLine(CommandLineCase):
             (("run", self.config, "isa=ssse"), "did you mean 'sse'"),
             (("run", self.config, "isa="), "empty"),
             (("run", self.config, "structure=bvh4", "isa=sse", "structure=bvh2"), "structure is given twice"),
+            (("run", self.config, "--out", "a", "--out", "b"), "run: --out is given 2 times; keep one"),
             (("run", self.config, "threads=1", "--threads", "2"), "keep one"),
             (("run", self.config, "scene=sphere_flake:100:2", "--list"), "seed: 2 would change nothing"),
             (("verify", "sphere:100", "isa=scalar", "isa=scalar"), "isa is given twice"),
@@ -224,6 +225,7 @@ class CommandLine(CommandLineCase):
         self.assertFalse((self.folder / "results").exists())
         nothing = self.run_small("--filter", "nothing-has-this-name")
         self.assert_error(nothing, "nothing to measure", status=4)
+        self.assert_error(self.run_small("--dry-run", "--filter", "nothing-has-this-name"), "nothing to measure", status=4)
 
     def test_flags_of_google_benchmark(self):
         few = ("structure=bvh4", "isa=scalar", "workload=primary", "--skip", "^build", "--out", "out")
