@@ -336,8 +336,12 @@ def fits(height):
 
 def save(figure, folder, name):
     """Writes name.png and name.svg; the same data gives the same bytes."""
-    figure.savefig(folder / f"{name}.png", dpi=DPI, bbox_inches="tight", metadata={"Software": None})
-    figure.savefig(folder / f"{name}.svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
+    figure.set_dpi(DPI)
+    figure.draw_without_rendering()  # the layout and what is around it once for both files: they take longer than the drawing
+    figure.set_layout_engine(None)
+    around = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])
+    figure.savefig(folder / f"{name}.png", dpi=DPI, bbox_inches=around, metadata={"Software": None})
+    figure.savefig(folder / f"{name}.svg", bbox_inches=around, metadata={"Date": None, "Creator": None})
     plt.close(figure)
 
 
