@@ -33,6 +33,7 @@ MORE_MARKERS = (*MARKERS, "p", "d", "h", (4, 1, 0), (6, 1, 0))  # of larger sign
 DPI = 160
 TALLEST = 8000  # pixels of a figure
 WIDEST = 17.0  # inches of scenes beside each other
+MOST_TICKS = 5  # between powers of ten, of a logarithmic axis
 
 # Of fonts that have what DejaVu Sans lacks (Chinese, Japanese, Korean; then the rest of Unicode), those that are installed are asked for such characters.
 FALLBACK_FONTS = ("Noto Sans CJK JP", "Noto Sans CJK SC", "Noto Sans JP", "Noto Sans SC", "Source Han Sans", "IPAexGothic", "IPAGothic", "TakaoGothic",
@@ -130,7 +131,8 @@ def log_axis(axis, which, values):
     (axis.set_xlim if which == "x" else axis.set_ylim)(first, last)
     at = lambda digits: [d * 10.0**k for k in range(-3, 12) for d in digits if first <= d * 10.0**k <= last]
     fine = [t for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(first, last) if first <= t <= last]  # where values hardly differ
-    found = next((f for digits in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)) if len(f := at(digits)) > 2), fine)
+    choices = map(at, ((1,), (1, 2, 5), (1, 3), (1, 1.5, 2, 3, 4, 5, 7)))
+    found = next((f for k, f in enumerate(choices) if len(f) > 2 and (k == 0 or len(f) <= MOST_TICKS)), fine)
     ticks = axis.xaxis if which == "x" else axis.yaxis
     ticks.set_major_locator(FixedLocator(found))
     ticks.set_major_formatter("{x:g}")
@@ -166,7 +168,7 @@ REST_COLOUR = "#CCCCCC"  # of what none of a bar's parts covers
 
 def part_legend(names, rest):
     """A handle for each part, and for what none of them covers where there is a `rest`."""
-    handles = [Patch(facecolor=part_colour(n), edgecolor="white", label=n.replace("_", " ")) for n in names]
+    handles = [Patch(facecolor=part_colour(n), edgecolor="white", label=n) for n in names]
     return handles + ([Patch(facecolor=REST_COLOUR, edgecolor="white", label="none of these")] if rest else [])
 
 
@@ -272,12 +274,19 @@ def letters(width):
 def panel_title(scene, workload, width):
     """Scene, shortened already, and workload on as many lines as a panel `width` inches wide needs: broken between the two, then within a
     name before a variant."""
-    most, workload = letters(width), workload.replace("_", " ")
+    most = letters(width)
     if max(map(len, f"{scene}, {workload}".split("\n"))) <= most:
         return f"{scene}, {workload}"
     lines = f"{scene},\n{workload}".split("\n")
     broken = "\n".join(line if len(line) <= most + 1 else line.replace(":", ":\n", 1) for line in lines)
-    return "\n".join(fill(line, most + 1) for line in broken.split("\n"))
+    return "\n".join(broken_keys(line, most + 1) for line in broken.split("\n"))
+
+
+def broken_keys(text, most):
+    """`text` on lines of so many letters, where it must be broken within its keys, too: behind an underscore or an equals sign."""
+    if len(text) <= most:
+        return text
+    return fill(text.replace("_", "_ ").replace("=", "= "), most).replace("_ ", "_").replace("= ", "=")
 
 
 def panel_grid(shown, places, width, height, most_columns, least_width=None):

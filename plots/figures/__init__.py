@@ -1,6 +1,8 @@
 """One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, whose `more_caption`, where it has one, the caption goes on with, or
 raises NoData. ONLY_WHEN_NAMED: a configuration draws it only where it names it, and is told where it could not be drawn.
 
+Keys are written as a configuration has them, underscores too, so that they can be found there; what is measured, in words.
+
 A new figure is a module here, its name in ALL and in experiments/config_plots.cpp. Other modules here
 (bars, costs, names, rows, squares, trade_offs, modes, leak_lines) are what figures share.
 """

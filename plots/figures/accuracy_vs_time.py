@@ -56,7 +56,7 @@ def draw_hard(points, timed):
     for (scene, ((name, quantity), isa)), axis in axes.items():
         of_scene = [(t, value_of(h, name)) for c, t, h in points if c["scene"] == scene]
         panel(axis, shown[scene, ((name, quantity), isa)], [v for _, v in of_scene], [t for t, _ in of_scene], markers)
-        axis.set_xlabel(f"time of {points[0][0]['workload'].replace('_', ' ')} rays, ns a ray\n{timed}")
+        axis.set_xlabel(f"time of {points[0][0]['workload']} rays, ns a ray\n{timed}")
         axis.set_ylabel(quantity + ("\nhard rays" if name == "wrong_answers" else "\nhard rays answered right"))
     add_legends(figure, [c for c, _, _ in points], markers)
     return figure

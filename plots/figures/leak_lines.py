@@ -52,7 +52,7 @@ def draw_lines(results, key, value_of, label, why_none):
                 axis.xaxis.set_major_locator(FixedLocator(xs))
             axis.xaxis.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
             scale.apply(axis)
-            axis.set_title(f"{names[family]}, {workload.replace('_', ' ')}")
+            axis.set_title(f"{names[family]}, {workload}")
             axis.set_xlabel(label(family, results))
         axes[row][0].set_ylabel("leaks per million rays")
     boxes = [Line2D([], [], color="#333333", linestyle=box_line(box), linewidth=2.4 if box == "fast" else 1.3, alpha=0.55 if box == "fast" else 1.0, label=box)

@@ -31,7 +31,9 @@ def draw(results):
     for row, (scene, keys) in zip(axes, rows):
         seen = seen_points(results.folder, scene)
         for axis, key in zip(row, keys):
-            panel(axis, seen, names[scene] if len(scenes) > 1 else "", key, found[scene][key], boxes)
+            panel(axis, seen, names[scene] if len(scenes) > 1 else "", found[scene][key], boxes)
+    if len(scenes) == 1:
+        figure.suptitle(names[scenes[0]])
     legends_right(figure, [("leaks per million\nrays, with", [Line2D([], [], linestyle="", marker="o", markeredgewidth=0, markersize=size + 1.5,
                                                                      color=box_colour(box), label=f"{box} boxes")
                                            for box, size in boxes.items()])])
@@ -54,7 +56,7 @@ def by_test(cells):
     return dict(sorted(found.items()))
 
 
-def panel(axis, seen, name, key, cells, boxes):
+def panel(axis, seen, name, cells, boxes):
     """`name`: of the scene, where there are several; `cells`: {box: cell}; `boxes`: {box: size}, of all panels."""
     points = seen["points"]
     # Dots as pixels: thousands of them would make a drawing of megabytes.
@@ -70,8 +72,8 @@ def panel(axis, seen, name, key, cells, boxes):
     axis.set_xlim(min(xs) - 6, max(xs) + 6)
     axis.set_ylim(max(ys) + 6, min(ys) - 6)
     axis.set_aspect("equal")
-    head = " ".join(([name + ","] if name else []) + [word for word in key if word])
-    axis.set_title(f"{head}\n{', '.join(counts)}", fontsize=9.5)
+    traced = next(iter(cells.values()))
+    axis.set_title("\n".join([*filter(None, [name]), f"{traced['structure']} {traced['intersector']}", ", ".join(counts)]), fontsize=9.5)
 
 
 def leak_points(cell):

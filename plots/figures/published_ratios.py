@@ -86,10 +86,10 @@ def quantity_of(results, entry):
 def label_of(results, comparison):
     quantity, inverted = quantity_of(results, comparison)
     if "to" not in comparison:
-        return comparison.get("unit", quantity.replace("_", " "))
+        return comparison.get("unit", quantity)
     if any("quantity" in place for place in comparison["published"]):
         return "ratio"
-    return "speed-up" if quantity in FASTER and not inverted else f"ratio of {'time' if inverted else quantity.replace('_', ' ')}"
+    return "speed-up" if quantity in FASTER and not inverted else f"ratio of {'time' if inverted else quantity}"
 
 
 def rows_of(results, comparison):
@@ -106,7 +106,7 @@ def rows_of(results, comparison):
                 here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
                 ours = {s["name"]: found for s in series if (found := ours_of(here, s, quantity, inverted, place))}
                 if ours:
-                    name = "\n".join(n for n in (place.get("label", ""), names.get(scene), workload.replace("_", " ")) if n)
+                    name = "\n".join(n for n in (place.get("label", ""), names.get(scene), workload) if n)
                     rows.append(Row(name, published_of(place), ours))
     return rows
 

@@ -40,7 +40,7 @@ def draw(results):
         return rate.median / 1e6, rate.low / 1e6, rate.high / 1e6
 
     names = short_names(scene for scene, *_ in keys)
-    titles = {key: f"{names[key[0]]}, {key[1].replace('_', ' ')}, {key[2]}" for key in keys}
+    titles = {key: f"{names[key[0]]}, {key[1]}, {key[2]}" for key in keys}
     if squares.are_due(shown.values(), varied):
         figure, drawn = squares.square_panels([(titles[key], shown[key]) for key in keys], varied, value, digits, unit, higher_is_better=True)
         for axis, places in drawn:

@@ -106,7 +106,7 @@ def panels_of_all(points, workloads, isas, markers, y_label, said):
     for row, workload in enumerate(workloads):
         for column, isa in enumerate(isas):
             here = [p for p in points if p[0]["workload"] == workload and p[0]["isa"] == isa]
-            panel(axes[row][column], here, markers, f"{workload.replace('_', ' ')}, {isa}")
+            panel(axes[row][column], here, markers, f"{workload}, {isa}")
         axes[row][0].set_ylabel(y_label)
         axes[row][0].set_ylim(0, 1.08 * max(p[2] for p in points if p[0]["workload"] == workload))
     axes[0][0].set_xlim(0, 1.08 * max(p[1] for p in points))

@@ -44,7 +44,7 @@ def draw(results):
                 axis.set_xlabel(label)
             if column == 0:
                 axis.set_title(names[scene], loc="left")
-            axis.set_yticks(range(len(ways)), [w.replace("_", " ") for w in ways])
+            axis.set_yticks(range(len(ways)), ways)
             axis.set_ylim(len(ways) - 0.5, -0.5)
             axis.grid(axis="y", visible=False)
             for between in range(len(ways) - 1):
@@ -57,7 +57,7 @@ def draw(results):
             axes[0][column].xaxis.set_major_formatter(lambda v, _: plain(v))
     if others := [s for s in ordered((c["scene"] for c in results.traces), "scene") if s not in scenes]:
         figure.supxlabel("not shown, as no secondary rays were measured: " + fill(", ".join(others), 90), fontsize=8.5, color="#555555")
-    handles = [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="white", markersize=5, label=w.replace("_", " "))
+    handles = [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="white", markersize=5, label=w)
                for w, m in markers.items()]
     legends_right(figure, [("intersector", intersector_legend(intersectors)), ("workload", handles)])
     return figure

@@ -46,7 +46,7 @@ def draw(results):
     longest = max(map(len, rows.values()))
     wide = max([COLUMN] + [(SMALL if count == 1 else 1.0) * CHARACTER * (len(word) + 1) / count
                            for workload, count in spans_of(columns) for word in [*words_of(workload), TO.partition(" fastest")[0]]])
-    beside = 1.4 + ROW_CHARACTER * max(len(row_label(row)) for of_isa in rows.values() for row in of_isa)  # names of rows, and the key
+    beside = 1.9 + ROW_CHARACTER * max(len(row_label(row)) for of_isa in rows.values() for row in of_isa)  # names of rows, and the key
     headings = {isa: headings_of(columns, [c for c in cells if c["isa"] == isa], wide) for isa in tables}
     most = max(heading.count("\n") + 1 for of_isa in headings.values() for heading in of_isa)
     figure, axes = panels(len(tables), 1, max(5.0, beside + wide * len(columns)), 1.9 + 0.15 * most + 0.26 * longest)
@@ -113,7 +113,7 @@ def spans_of(columns):
 
 
 def words_of(workload):
-    return workload.replace("_", " ").replace(":", ": ").replace("=", "= ").split()
+    return workload.replace("_", "_ ").replace(":", ": ").replace("=", "= ").split()
 
 
 def headings_of(columns, cells, wide):
@@ -124,7 +124,7 @@ def headings_of(columns, cells, wide):
         with_embree = {compared_at(c) for c in cells if c["workload"] == workload and c["structure"] == "embree"}
         to = "" if not places else "… Embree's fastest" if with_embree == places else TO if with_embree else "… own single rays"
         most = max(4, int(count * wide / (CHARACTER * (SMALL if count == 1 else 1.0))))
-        found.append("\n".join(wrap(" ".join(words_of(workload)), most, break_long_words=False) + wrap(to, most, break_long_words=False)).replace("= ", "="))
+        found.append("\n".join(wrap(" ".join(words_of(workload)), most, break_long_words=False) + wrap(to, most, break_long_words=False)).replace("= ", "=").replace("_ ", "_"))
     return found
 
 
