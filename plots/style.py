@@ -29,6 +29,8 @@ COLOURS = {  # structures
 }
 SPARE_COLOURS = ("#77AADD", "#BBCC33", "#EE3377", "#99DDFF", "#663333", "#009988")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
+MODE_FACES = ("#FFFFFF", "#4477AA", "#CCBB44", "#228833", "#66CCEE", "#AA3377", "#222222")  # their number and that of MARKERS have no common divisor
+MOST_MODES = 20  # whose markers can be told apart
 MORE_MARKERS = (*MARKERS, "p", "d", "h", (4, 1, 0), (6, 1, 0))  # of larger signs: as many as structures; the last two cannot be half filled
 DPI = 160
 TALLEST = 8000  # pixels of a figure
@@ -231,6 +233,18 @@ def marker_map(keys, what):
     if len(keys) > len(MORE_MARKERS):
         raise TooMuch(f"{len(keys)} {what} are too many to tell apart; choose some with --filter")
     return dict(zip(keys, MORE_MARKERS))
+
+
+def mode_markers(modes):
+    """{mode: look of its marker}, of which no two are the same; empty where modes are too many to tell apart."""
+    if len(modes) > MOST_MODES:
+        return {}
+    return {mode: {"marker": MARKERS[k % len(MARKERS)], "markerfacecolor": MODE_FACES[k % len(MODE_FACES)], "markeredgewidth": 0.9, "markersize": 4.5}
+            for k, mode in enumerate(modes)}
+
+
+def mode_legend(markers):
+    return [Line2D([], [], linestyle="", color="#222222", label=mode, **{**look, "markersize": 6}) for mode, look in markers.items()]
 
 
 def marker_legend(markers):

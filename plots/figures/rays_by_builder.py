@@ -4,8 +4,8 @@ from figures import squares
 from figures.bars import draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import (MARKERS, WRONG, edge, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panels, short_names, wrong_legend,
-                   wrong_marker, wrong_text)
+from style import (WRONG, edge, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, panels, short_names, wrong_legend, wrong_marker,
+                   wrong_text)
 from tables import digits
 
 TITLE = "Rays per second by structure and builder"
@@ -28,7 +28,7 @@ def draw(results):
     best = [max(group, key=lambda c: c.estimate(metric).median) for group in groups.values()]
     varied = [a for a in undetermined_axes(best, BUILT) if a in ("builder", "threads")]
     modes = Modes([c for c in cells], without=("builder", "leaf"))
-    markers = marker_map(modes.labels, "modes") if 1 < len(modes.labels) <= len(MARKERS) else {}
+    markers = mode_markers(modes.labels) if len(modes.labels) > 1 else {}
 
     keys = [(s, w, i) for s in ordered((c["scene"] for c in cells), "scene")
             for w in ordered((c["workload"] for c in cells), "workload") for i in ordered((c["isa"] for c in cells), "isa")
@@ -61,14 +61,13 @@ def draw(results):
         draw_panel(axis, bars, value, lambda c: digits(value(c)[0]), varied)
         for place, bar in enumerate(bars):
             for cell in groups[tuple(bar[a] for a in BUILT)] if markers else ():
-                axis.plot(cell.estimate(metric).median / 1e6, place, markers[modes.label(cell)], color=edge(cell), markersize=4,
-                          markerfacecolor="white", markeredgewidth=0.8)
+                axis.plot(cell.estimate(metric).median / 1e6, place, linestyle="", color=edge(cell), **markers[modes.label(cell)])
             if is_wrong(bar):
                 axis.annotate(wrong_text(bar), (value(bar)[2], place), (5 + 6 * len(digits(value(bar)[0])) + 6, 0), textcoords="offset points", va="center",
                               fontsize=8, color=WRONG)
         axis.set_title(titles[keys[index]])
         axis.set_xlabel(unit)
-    legends = [("mode", marker_legend(markers))] if markers else []
+    legends = [("mode", mode_legend(markers))] if markers else []
     legends += interval_legend([bar.estimate(metric) for bar in best])
     legends_right(figure, legends + wrong_legend(cells, wrong_marker("some wrong; the number:\nof the bar's, per million")))
     return figure

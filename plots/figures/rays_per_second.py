@@ -5,18 +5,20 @@ from matplotlib.lines import Line2D
 from figures import trade_offs
 from figures.modes import Modes
 from results import NoData, ordered
-from style import (MARKERS, WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, marker_legend, marker_map, panel_grid, structure_legend,
+from style import (WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, panel_grid, structure_legend,
                    wrong_legend, wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
-CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}, "
-           "dots, where modes are more than markers, the medians alone. Higher is better. A red marker is a mode with wrong "
+CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}; "
+           "where there are more than 20 modes, their medians alone, told apart by the way of traversal. Higher is better. A red marker is a mode with wrong "
            "answers; the red number above a bar counts those of the mode that the bar reaches, per million rays. "
            "Those of each cell stand in the table. Of several numbers of threads the figure shows the fewest.")
 DIGIT = 0.032  # of a panel's height, that a character of a number above a bar takes
 
 LARGEST, LEAST, LINE = 7.5, 4.5, 1.2  # points of these numbers; how much wider than its size a line of them is
 AROUND = 1.0  # inches of a panel beside its axes
+BAR, MARKER = 0.2, 0.045  # inches that a bar takes at least, and each of the markers beside each other on it
+DOT = {"marker": ".", "markersize": 2.5}
 
 
 def draw(results):
@@ -29,24 +31,32 @@ def draw(results):
     workloads = ordered((c["workload"] for c in cells), "workload")
     isas, structures = ordered((c["isa"] for c in cells), "isa"), ordered((c["structure"] for c in cells), "structure")
     modes = Modes(cells)
-    markers = marker_map(modes.labels, "modes") if len(modes.labels) <= len(MARKERS) else {}
+    markers, each = mode_markers(modes.labels), len(modes.labels)
+    if not markers and len({c["traversal"] for c in cells}) > 1:
+        modes = Modes(cells, without=("builder", "leaf", "intersector", "box", "threads"))
+        markers = mode_markers(modes.labels)
+    intervals = each == len(modes.labels) and bool(markers)
 
-    width = min(7.0, max(3.2, 0.2 * len(isas) * (len(structures) + 1) + 0.8))
+    at_bars = {}
+    for cell in cells:
+        at_bars.setdefault(tuple(cell[a] for a in ("scene", "workload", "isa", "structure")), set()).add(modes.label(cell))
+    bar = max(BAR, MARKER * max(map(len, at_bars.values())) if markers else 0)
+    width = min(7.0, max(3.2, bar * len(isas) * (len(structures) + 1) + 0.8))
     figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, width, 2.9, 3 if width < 4.2 else 2)
     for (scene, workload), axis in axes.items():
         here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
         slot = 72 * (width - AROUND) / len(isas) / (len(structures) + 1)  # points that a bar has
-        panel(axis, here, metric, isas, structures, modes, markers, min(LARGEST, max(LEAST, slot / LINE)))
+        panel(axis, here, metric, isas, structures, modes, markers, intervals, min(LARGEST, max(LEAST, slot / LINE)))
         axis.set_ylabel(unit, **({"fontsize": 8.5} if threads else {}))
     legends = [("structure", structure_legend(structures))]
-    dot = Line2D([], [], linestyle="", marker=".", color="#222222", markersize=2.5, label=f"each of {len(modes.labels)}")
-    legends += [("mode", marker_legend(markers) or [dot])] if len(modes.labels) > 1 else []
-    legends += interval_legend([c.estimate(metric) for c in cells]) if markers else []
+    dot = Line2D([], [], linestyle="", color="#222222", label=f"each of {each}", **DOT)
+    legends += [("mode" if intervals or not markers else f"traversal, of {each} modes", mode_legend(markers) or [dot])] if each > 1 else []
+    legends += interval_legend([c.estimate(metric) for c in cells]) if intervals else []
     legends_right(figure, legends + wrong_legend(cells, wrong_marker("some wrong; the number:\nof the bar's, per million")))
     return figure
 
 
-def panel(axis, cells, metric, isas, structures, modes, markers, number_size):
+def panel(axis, cells, metric, isas, structures, modes, markers, intervals, number_size):
     step = 1.0 / (len(structures) + 1)
     bar = 0.86 * step
     for group, isa in enumerate(isas):
@@ -59,22 +69,16 @@ def panel(axis, cells, metric, isas, structures, modes, markers, number_size):
             axis.bar(x, best.median / 1e6, bar, color=colour(structure), alpha=0.55, hatch=hatch(structure), edgecolor="white",
                      linewidth=0.5)
             if is_wrong(fastest):
-                top = max(e.high if markers else e.median for _, e in here) / 1e6
+                top = max(e.high if intervals else e.median for _, e in here) / 1e6
                 axis.annotate(wrong_text(fastest), (x, top), (0, 5), textcoords="offset points", rotation=90, ha="center", va="bottom",
                               fontsize=number_size, color=WRONG)
-            if not markers:  # too many modes to tell apart: where they lie is still seen
-                for cell, value in here:
-                    axis.plot(x, value.median / 1e6, ".", color=edge(cell), markersize=2.5)
-                continue
+            own = {modes.label(c) for c, _ in here}
+            places = [label for label in modes.labels if label in own] if markers else [""]
             for cell, value in here:
-                label = modes.label(cell)
-                at = x
-                if len(markers) > 1:
-                    at += (modes.labels.index(label) / (len(markers) - 1) - 0.5) * 0.55 * bar
-                axis.errorbar(at, value.median / 1e6,
-                              [[(value.median - value.low) / 1e6], [(value.high - value.median) / 1e6]],
-                              fmt=markers[label], color=edge(cell), markersize=4, markerfacecolor="white",
-                              markeredgewidth=0.9, elinewidth=0.9)
+                label = modes.label(cell) if markers else ""
+                at = x + ((places.index(label) + 0.5) / len(places) - 0.5) * 0.9 * bar
+                ends = [[(value.median - value.low) / 1e6], [(value.high - value.median) / 1e6]] if intervals else None
+                axis.errorbar(at, value.median / 1e6, ends, linestyle="", color=edge(cell), elinewidth=0.9, **markers.get(label, DOT))
     axis.set_xticks(range(len(isas)), isas)
     axis.set_xlim(-0.55, len(isas) - 0.45)
     longest = max((len(wrong_text(c)) for c in cells if is_wrong(c)), default=0)

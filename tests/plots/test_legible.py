@@ -49,6 +49,21 @@ class Labels(Drawn):
         self.assertEqual([t.get_text() for t in figure.axes[0].get_yticklabels()], ["none", "error_bound"])
         self.assertEqual([t.get_text() for t in figure.legends[1].get_texts()], ["ambient_occlusion"])
 
+    def test_modes_are_told_apart_or_else_their_traversal(self):
+        def rows(traversals, intersectors):
+            return [other("primary", traversal=f"single{t}", intersector=f"i{i}", wrong_answers=0) for t in range(traversals) for i in range(intersectors)]
+
+        for many, title, labels in ((rows(style.MOST_MODES, 1), "mode", [f"single{t}" for t in range(style.MOST_MODES)]),
+                                    (rows(2, style.MOST_MODES), f"traversal, of {2 * style.MOST_MODES} modes", ["single0", "single1"]),
+                                    (rows(1, style.MOST_MODES + 1), "mode", [f"each of {style.MOST_MODES + 1}"])):
+            figure = self.draw(rays_per_second, load(Folder(many).path))
+            legend = figure.legends[1]
+            self.assertEqual((legend.get_title().get_text(), [t.get_text() for t in legend.get_texts()]), (title, labels))
+            looks = [{(line.get_marker(), line.get_markerfacecolor()) for line in lines if line.get_marker() != "_"}
+                     for lines in (legend.get_lines(), figure.axes[0].lines)]  # _: the ends of intervals
+            self.assertEqual(looks[0], looks[1])
+            self.assertEqual(len(looks[0]), len(labels))
+
     def test_a_picture_of_leaks_says_what_was_traced(self):
         figure = self.draw(leak_picture, load(Folder(hard(), files=SEEN).path))
         self.assertEqual(figure._suptitle.get_text(), "ball")

@@ -327,11 +327,6 @@ class Numbers(Drawn):
             (axis,) = self.draw(sah_cost, load(Folder(these).path)).axes
             self.assertEqual([t.get_text() for t in axis.get_yticklabels()], bars)
 
-    def test_dots_of_many_modes_are_in_the_legend(self):
-        for modes, said in ((3, ["single0", "single1", "single2"]), (11, ["each of 11"])):
-            figure = self.draw(rays_per_second, load(Folder([other("primary", traversal=f"single{k}", wrong_answers=0) for k in range(modes)]).path))
-            self.assertEqual([t.get_text() for each in figure.legends for t in each.get_texts()], ["bvh8", *said])
-
     def test_wrong_answers_are_marked(self):
         import matplotlib.pyplot as plt
         from matplotlib.colors import to_hex
