@@ -8,13 +8,14 @@ import json
 import math
 import sys
 from pathlib import Path
-from textwrap import fill
+from textwrap import fill, wrap
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from plot import fail, need_matplotlib  # noqa: E402
 
 METRICS = (("trace", "rays a second"), ("build", "build speed"))
+TOTALS = {"trace": "rays", "build": "builds"}  # what means and controls of a metric are called
 COLOURS = {"faster": "#117733", "slower": "#CC3355", "indistinguishable": "#777777", "undecided": "#BBBBBB", "mean": "#332288"}
 MOST_CELLS = 80
 SAME = 1e-6  # of the logarithm of a ratio: no difference
@@ -36,10 +37,9 @@ def rows_of(comparison, metric):
     cells = [cell for cell in comparison["cells"] if cell["metric"] == metric]
     if not cells:
         return [], ""
-    total = {"trace": "rays", "build": "builds"}[metric]
     rows = []
     for mean in comparison["geometric_means"]:
-        if mean["axis"] == "all" and mean["value"] == total:
+        if mean["axis"] == "all" and mean["value"] == TOTALS[metric]:
             ratio = mean["ratio"]
             rows.append((f"geometric mean of {mean['cells']}", ratio["median"], ratio["low"], ratio["high"], "mean"))
     names, shared = labels(cells)
@@ -58,21 +58,38 @@ def rows_of(comparison, metric):
     return rows, shared
 
 
+def heads(comparison):
+    """What A and B are, and what ratios are relative to, in lines."""
+    lines = []
+    for side in ("a", "b"):
+        told = comparison[side]
+        revision = str(told["context"].get("git_revision") or "unknown").split(" | ")  # several of merged parts
+        changed = " with changes" if "true" in str(told["context"].get("git_dirty")).lower() else ""
+        lines.append(f"{side.upper()}: {told['folder']}, revision {', '.join(r[:12] for r in revision)}{changed}")
+    for metric, control in (comparison.get("control") or {}).items():
+        lines.append(f"Ratios of {metric} are relative to {control['cells']} cells of --control '{comparison['options']['control']}', "
+                     f"whose own B over A is {control['ratio']['median']:.3f}")
+    return lines
+
+
 def draw(comparison):
     import style
     from matplotlib.lines import Line2D
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-    parts = [(title, *rows_of(comparison, metric)) for metric, title in METRICS]
-    parts = [(fill(title + (f": {shared}" if shared else ""), int(WIDTH / TITLE_LETTER)), rows) for title, rows, shared in parts if rows]
-    heights = [len(rows) + 2.5 + title.count("\n") for title, rows in parts]
-    widest = max(len(row[0]) for _, rows in parts for row in rows)
-    figure, axes = style.plt.subplots(len(parts), 1, figsize=(WIDTH + LETTER * widest, 0.19 * sum(heights) + 0.8), squeeze=False, layout="constrained",
+    controls = comparison.get("control") or {}
+    parts = [(title, *rows_of(comparison, metric), "B over A" + (", relative to the control" if TOTALS[metric] in controls else "")) for metric, title in METRICS]
+    parts = [(fill(title + (f": {shared}" if shared else ""), int(WIDTH / TITLE_LETTER)), rows, ratio) for title, rows, shared, ratio in parts if rows]
+    heights = [len(rows) + 2.5 + title.count("\n") for title, rows, _ in parts]
+    width = WIDTH + LETTER * max(len(row[0]) for _, rows, _ in parts for row in rows)
+    said = [part for line in heads(comparison) for part in wrap(line, int(width / LETTER))]
+    figure, axes = style.plt.subplots(len(parts), 1, figsize=(width, 0.19 * (sum(heights) + len(said)) + 0.8), squeeze=False, layout="constrained",
                                       gridspec_kw={"height_ratios": heights})
+    figure.suptitle("\n".join(said), x=0.01, ha="left", fontsize=9.5)
     limit = 1 + comparison["options"]["min_difference_percent"] / 100
-    drawn = [row for _, rows in parts for row in rows]  # one scale for all panels
+    drawn = [row for _, rows, _ in parts for row in rows]  # one scale for all panels
     low, high = min(1 / limit, *(row[2] for row in drawn)) / 1.02, max(limit, *(row[3] for row in drawn)) * 1.02
-    for axis, (title, rows) in zip(axes[:, 0], parts):
+    for axis, (title, rows, ratio_label) in zip(axes[:, 0], parts):
         axis.axvspan(1 / limit, limit, color="#EEEEEE", zorder=0)
         axis.axvline(1, color="#333333", linewidth=0.8, zorder=1)
         for place, (_, ratio, least, most, kind) in enumerate(rows):
@@ -90,8 +107,8 @@ def draw(comparison):
             axis.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
         axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_title(title, loc="left")
-        axis.set_xlabel("B over A: right of 1, B is faster; grey: too little to count")
-    present = [kind for kind in COLOURS if any(row[4] == kind for _, rows in parts for row in rows)]
+        axis.set_xlabel(f"{ratio_label}: right of 1, B is faster; grey: too little to count")
+    present = [kind for kind in COLOURS if any(row[4] == kind for row in drawn)]
     style.legends_right(figure, [("B against A", [Line2D([], [], linestyle="", marker="D" if kind == "mean" else "o", color=COLOURS[kind], label=kind)
                                                   for kind in present])])
     return figure

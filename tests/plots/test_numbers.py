@@ -408,7 +408,8 @@ def comparison(ratios, metric="trace", low=0.99, high=1.01):
     cells = [{**dict.fromkeys(axes, "-"), "metric": metric, "structure": f"s{k}", "ratio": r, "ratio_low": low and r * low, "ratio_high": high and r * high,
               "verdict": "slower" if r == 0.9 else "indistinguishable"} for k, r in enumerate(ratios)]
     total = {"trace": "rays", "build": "builds"}[metric]
-    return {"options": {"min_difference_percent": 3}, "cells": cells,
+    sides = {side: {"folder": f"results/{side}", "context": {"git_revision": 40 * side, "git_dirty": side == "b"}} for side in ("a", "b")}
+    return {**sides, "options": {"min_difference_percent": 3}, "cells": cells,
             "geometric_means": [{"axis": "all", "value": total, "cells": len(cells), "ratio": {"median": 1.0, "low": 0.99, "high": 1.01}}]}
 
 
@@ -455,6 +456,20 @@ class Ratios(Drawn):
         self.assertEqual(ratios.rows_of(both, "trace")[0][1][1:4], (0.5, 0.5, 0.5))
 
 
+    def test_the_figure_names_both_folders_and_the_control(self):
+        both = comparison([1.1, 1.2])
+        figure = ratios.draw(both)
+        self.addCleanup(style.plt.close, figure)
+        self.assertEqual(figure._suptitle.get_text(), f"A: results/a, revision {12 * 'a'}\nB: results/b, revision {12 * 'b'} with changes")
+        self.assertTrue(figure.axes[0].get_xlabel().startswith("B over A: "))
+        both["options"]["control"], both["control"] = "/embree/", {"rays": {"cells": 7, "ratio": {"median": 1.048, "low": 1.0, "high": 1.1}}}
+        figure = ratios.draw(both)
+        self.addCleanup(style.plt.close, figure)
+        said = " ".join(figure._suptitle.get_text().split())
+        self.assertIn("Ratios of rays are relative to 7 cells of --control '/embree/', whose own B over A is 1.048", said)
+        self.assertTrue(figure.axes[0].get_xlabel().startswith("B over A, relative to the control: "))
+
+
 class Loading(unittest.TestCase):
     def test_repetitions_are_one_cell(self):
         folder = Folder([trace(rate=r, repetition=k) for k, r in enumerate((1e6, 2e6, 9e6))] + [build()])
@@ -493,7 +508,8 @@ class Loading(unittest.TestCase):
 class RatiosOfAComparison(unittest.TestCase):
     CELL = {"scene": "bunny", "structure": "bvh8", "builder": "binned_sah", "leaf": "triangle8", "intersector": "watertight", "box": "padded", "traversal": "single",
             "isa": "avx2", "workload": "primary", "threads": 1, "metric": "trace", "ratio": 1.1, "ratio_low": 1.0, "ratio_high": 1.2, "verdict": "faster"}
-    WHOLE = {"options": {"min_difference_percent": 2}, "cells": [CELL], "geometric_means": []}
+    WHOLE = {"options": {"min_difference_percent": 2}, "cells": [CELL], "geometric_means": [],
+             "a": {"folder": "before", "context": {}}, "b": {"folder": "after", "context": {"git_revision": None}}}
 
     def ratios(self, text, target="out.svg"):
         folder = Folder(files={"comparison.json": text})
