@@ -86,10 +86,11 @@ def main():
                 raise
             except NoData as reason:
                 # `run` hides what is written here to stdout; that a figure which somebody named is not there must be seen.
-                print(f"{name}: left out, {reason}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch))
+                why = str(reason) if isinstance(reason, TooMuch) else f"{reason}; it shows {module.NEEDS}"
+                print(f"{name}: left out, {why}", file=sys.stderr if named and (getattr(module, "ONLY_WHEN_NAMED", False) or isinstance(reason, TooMuch))
                       else sys.stdout)
                 style.discard(results.folder, name)  # of a drawing before
-                drawn.append((name, module, [], str(reason)))
+                drawn.append((name, module, [], why))
                 continue
             except Exception as error:  # noqa: BLE001  of a figure: it takes no other with it
                 why = " ".join(f"{type(error).__name__}: {error}".split())

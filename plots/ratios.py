@@ -78,7 +78,8 @@ def draw(comparison):
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
     controls = comparison.get("control") or {}
-    parts = [(title, *rows_of(comparison, metric), "B over A" + (", relative to the control" if TOTALS[metric] in controls else "")) for metric, title in METRICS]
+    parts = [(title, *rows_of(comparison, metric), "B over A" + (", relative to the control" if TOTALS[metric] in controls else ""))
+             for metric, title in METRICS]
     parts = [(fill(title + (f": {shared}" if shared else ""), int(WIDTH / TITLE_LETTER)), rows, ratio) for title, rows, shared, ratio in parts if rows]
     heights = [len(rows) + 2.5 + title.count("\n") for title, rows, _ in parts]
     width = WIDTH + LETTER * max(len(row[0]) for _, rows, _ in parts for row in rows)

@@ -1,5 +1,6 @@
-"""One module a figure. Each has TITLE, CAPTION and draw(results) -> matplotlib figure, whose `more_caption`, where it has one, the caption goes on with, or
-raises NoData. ONLY_WHEN_NAMED: a configuration draws it only where it names it, and is told where it could not be drawn.
+"""One module a figure. Each has TITLE, CAPTION, NEEDS (columns of the results, and in brackets what of a configuration makes them; said where there is nothing
+to draw) and draw(results) -> matplotlib figure, whose `more_caption`, where it has one, the caption goes on with, or raises NoData. ONLY_WHEN_NAMED: a
+configuration draws it only where it names it, and is told where it could not be drawn.
 
 Keys are written as a configuration has them, underscores too, so that they can be found there; what is measured, in words.
 

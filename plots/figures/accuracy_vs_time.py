@@ -9,6 +9,7 @@ from results import HARD_PREFIX, NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_legend, marker_map, panel_grid
 
 TITLE = "Accuracy against time"
+NEEDS = "wrong_answers and rays_per_second (`metrics: [trace, accuracy]`)"
 CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hits, false hits and wrong surfaces against exact arithmetic; the error of t is "
            "that of right answers. Where the run has the workload `hard`, accuracy is that of its rays, which are aimed at what goes wrong, and time that of "
            "ordinary rays of the same cell. Where no cell of ordinary rays has a wrong answer, the figure says so and shows the error of t, which rays of any "

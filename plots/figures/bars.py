@@ -59,7 +59,7 @@ def distinct(results, shown_of, label_axes):
     """The built structures of which there is something to show, those that show the same as one, and those of `label_axes` that tell them apart."""
     cells = without_doubles([c for c in results.structures if shown_of(c)], shown_of)
     if not cells:
-        raise NoData("no structure has this figure")
+        raise NoData("no structure has that")
     return cells, telling_axes(cells, ("scene", "structure"), label_axes)
 
 

@@ -7,6 +7,7 @@ from results import ordered
 from tables import digits
 
 TITLE = "Build phases"
+NEEDS = "build_seconds and phase_seconds (`metrics: [build]`)"
 CAPTION = ("Each phase's share of the build's wall time, the median of the repetitions, in the order of the build; grey is what none of them covers. "
            "As medians do not add up, all are scaled to make up 100 %. Beside it, the time of the whole build, "
            "in nanoseconds a triangle of the mesh, the median of the repetitions. Structures that tell no phases, as embree, are left out.")

@@ -7,6 +7,7 @@ from results import is_number
 from tables import digits
 
 TITLE = "Build time"
+NEEDS = "build_seconds (`metrics: [build]`)"
 CAPTION = ("Wall time from mesh to a structure ready for rays, with {interval}; "
            "beside it, triangles a second. The parts are the build's own phases: of each, and of the rest, the median of its shares of the repetitions, "
            "all drawn to make up the median together; grey is what no phase covers. "

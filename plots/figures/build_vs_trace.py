@@ -5,6 +5,7 @@ from figures.trade_offs import MOST_NAMES, draw_panels, fastest_points, of_place
 from results import STRUCTURE_AXES
 
 TITLE = "Build time against trace time"
+NEEDS = "build_seconds and rays_per_second (`metrics: [trace, build]`)"
 CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. The grey steps join the "
            "points that no other beats in both. Numbered are those that take the least time for build and rays together, each with the number of rays from "
            "which on it does: what its build takes more than that of the number before, by what each ray takes less. Any other is best at no number of rays, "

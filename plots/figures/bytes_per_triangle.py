@@ -6,6 +6,7 @@ from results import ordered
 from tables import digits
 
 TITLE = "Bytes per triangle"
+NEEDS = "bytes_per_triangle (`metrics: [build]` or `[trace]`)"
 CAPTION = ("What tracing needs besides the mesh, a triangle of the mesh: nodes, leaves (references that are shared count as often as "
            "they are stored), and what is neither. Structures that cannot be looked into, as embree, have one part. Beside it, the "
            "most memory held while building, as a multiple of the result. Lower is better.")

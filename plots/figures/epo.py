@@ -5,6 +5,7 @@ from figures.bars import bar_panels
 from tables import digits
 
 TITLE = "End-point overlap (EPO)"
+NEEDS = "epo (`metrics: [quality]`)"
 CAPTION = ("Surface that lies in boxes of other subtrees, weighed by the cost of visiting them (Aila, Karras, Laine 2013): the work of "
            "rays that end on a surface, which SAH does not see. Beside it, the leaf-count variability (LCV): the standard "
            "deviation of the number of leaves that a random line meets. Lower is better." + costs.CAPTION)

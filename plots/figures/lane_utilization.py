@@ -9,6 +9,7 @@ from results import NoData, TooMuch, ordered
 from style import MARKERS, colour, legends_right, marker_legend, marker_map, panel_grid, structure_legend
 
 TITLE = "Lane utilisation by depth"
+NEEDS = "lane_utilization_by_depth (`metrics: [trace]`)"
 CAPTION = ("Of the SIMD lanes of ray/box tests at nodes of a depth, those that hold a ray and a box: a packet has a child's rays in lanes, a ray that goes "
            "alone a node's children; registers without a ray are passed over and not counted. Depths of less than one visit in a thousand rays are left "
            "out. Counted in a pass of its own, untimed. "

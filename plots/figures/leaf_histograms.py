@@ -14,6 +14,7 @@ from results import ordered
 from style import legends_right
 
 TITLE = "Leaves by depth and by triangles"
+NEEDS = "depth_histogram and leaf_histogram (`metrics: [quality]`)"
 CAPTION = ("Two histograms of a structure's leaves: how deep they lie (the root's depth is 0) and how many triangles they hold (references: one that lies in "
            "two leaves counts in both; 32 stands for more, too). A square's colour is the share of the leaves. The orange line is the mean, which is written "
            "beside the first; beside the second is the leaf fill, the share of the lanes of leaf blocks that hold a triangle. Structures whose trees are the "

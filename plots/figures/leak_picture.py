@@ -8,6 +8,7 @@ from results import CAMERA_EDGES, NoData, axis_sort_key, ordered
 from style import box_colour, boxes_in_order, legends_right, panels, short_names
 
 TITLE = "Where the leaks are"
+NEEDS = "leak_points (`metrics: [trace, accuracy]`, `workload: [camera_edges]`)"
 CAPTION = ("Rays from the camera at points of edges and at vertices (workload camera_edges): grey where they are aimed, as far as the camera sees it, in "
            "colour where a ray passes through the surface unnoticed. What leaks with padded boxes too, the triangle test loses; what leaks with fast boxes "
            "alone, the boxes lose. The first two scenes are shown. A panel shows at most 4000 leaks a box test; the numbers count all, per million rays.")

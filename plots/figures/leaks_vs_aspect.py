@@ -3,6 +3,7 @@
 from figures.leak_lines import CAPTION as LINES, draw_lines
 
 TITLE = "Leaks against the shape of triangles"
+NEEDS = "cracks and triangle_aspect_median (`metrics: [trace, accuracy]`, `workload: [hard_edge]`, a scene with `stretch: [...]`)"
 CAPTION = ("The scene is stretched along one axis; a triangle's aspect is its longest edge over the height on it, the median of the mesh's "
            "triangles. A leak is a ray that passes through a closed surface, away from its silhouette and border, and is answered by a miss or by "
            "something behind." + LINES)

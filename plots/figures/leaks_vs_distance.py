@@ -3,6 +3,7 @@
 from figures.leak_lines import CAPTION as LINES, draw_lines, without
 
 TITLE = "Leaks against distance from the origin"
+NEEDS = "cracks and offset (`metrics: [trace, accuracy]`, `workload: [hard_edge]`, a scene with `offset: [...]`)"
 CAPTION = ("A leak is a ray that passes through a closed surface, away from its silhouette and border, and is answered by a miss or by something "
            "behind. The rays are aimed at edges and vertices. Far out the grid of float32 is coarse against the scene, which loses its finer "
            "triangles by it; what is left of it is still closed." + LINES)

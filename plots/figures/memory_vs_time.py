@@ -5,6 +5,7 @@ from results import estimate
 from tables import digits
 
 TITLE = "Memory against time"
+NEEDS = "bytes_per_triangle and rays_per_second (`metrics: [trace]`)"
 CAPTION = ("A point is a structure as built, its rays traced in its fastest mode; lower left is better, both scales are logarithmic. Memory is what tracing "
            "needs besides the mesh, a triangle of the mesh. The grey steps join the points that no other beats in both. Numbered are those of them that are a "
            "tenth faster than the number before (or more, where there would be more than ten), and the fastest; behind their names bytes a triangle and "

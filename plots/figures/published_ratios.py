@@ -14,6 +14,7 @@ from style import WRONG, colour, hatch, is_wrong, legends_right, log_axis, panel
 from tables import STRUCTURE_COLUMNS
 
 TITLE = "Beside published figures"
+NEEDS = "cells that plots/published has numbers for, of the configurations in configs/papers"
 CAPTION = ("Bars: ratios of the medians of this run, or the median itself where a panel sets no two things side by side, with what their intervals leave, each "
            "{interval}. Diamonds, of a span one at each end, of several bars with dashes across them: the published figures, from other machines and mostly "
            "other scenes (the sources stand below the figure); a panel without them shows a claim that was published in words. The line is 1: no difference. A "

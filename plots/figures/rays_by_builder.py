@@ -9,6 +9,7 @@ from style import (WRONG, edge, interval_legend, is_wrong, legends_right, mode_l
 from tables import digits
 
 TITLE = "Rays per second by structure and builder"
+NEEDS = "rays_per_second of several builders of a structure (`metrics: [trace]`, `builder: [...]`)"
 CAPTION = ("A bar reaches the fastest mode of a structure as built, with {interval}; markers "
            "show its other modes. Higher is better. A red marker is a mode with wrong answers; the red number behind a bar's own counts those of the mode "
            "that the bar reaches, per million rays. Those of each cell stand in the table.")

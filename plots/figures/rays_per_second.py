@@ -9,6 +9,7 @@ from style import (WRONG, colour, edge, hatch, interval_legend, is_wrong, legend
                    wrong_legend, wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
+NEEDS = "rays_per_second (`metrics: [trace]`)"
 CAPTION = ("Bars reach the fastest mode of a structure; markers show every mode with {interval}; "
            "where there are more than 20 modes, their medians alone, told apart by the way of traversal. Higher is better. A red marker is a mode with wrong "
            "answers; the red number above a bar counts those of the mode that the bar reaches, per million rays. "

@@ -6,6 +6,7 @@ from figures.sah_vs_time import NO_TREE
 from tables import SAH_STEP
 
 TITLE = "SAH cost"
+NEEDS = "sah_cost (`metrics: [quality]`)"
 CAPTION = ("Expected cost of a ray through the root's box. Lower is better. Structures that "
            "cannot be looked into, as embree, have none; brute_force, which has no tree and whose cost is many times that of all others, is left out where "
            "there are others." + costs.CAPTION + " " + SAH_STEP +

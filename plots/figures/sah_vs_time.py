@@ -10,6 +10,7 @@ from style import (WRONG, colour, is_wrong, legends_right, marker_legend, marker
 from tables import SAH_STEP
 
 TITLE = "SAH cost against measured time"
+NEEDS = "sah_cost and rays_per_second (`metrics: [trace, quality]`)"
 CAPTION = ("A point is a structure as built, by one builder, on a scene, with its fastest leaf traced in its fastest mode; of "
            "several numbers of threads the figure shows the fewest. A line is the least-squares fit through the points of one scene in a panel, R² its share "
            "of the variance explained (where scenes share a panel, in the legend's order; of more than three the least and the most); with EPO: that of the "

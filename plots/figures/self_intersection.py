@@ -8,6 +8,7 @@ from results import NoData, ordered
 from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_map, panels, plain, short_names
 
 TITLE = "Leaving a surface"
+NEEDS = "self_hits_per_million (`metrics: [trace]`, `workload: [diffuse]` or other secondary rays, `rays: {self_intersection: [...]}`)"
 CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass "
            "through what they should meet, against the exact answer of the ray that starts at the hit point itself, its own primitive left out. A ray that "
            "meets its own surface ends there, and is quick. Zero stands on the left line.")

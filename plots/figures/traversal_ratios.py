@@ -12,6 +12,7 @@ from results import NoData, ordered
 from style import panels, short_names
 
 TITLE = "Ways of traversal"
+NEEDS = "rays_per_second of several ways of traversal, `single` or Embree's among them (`metrics: [trace]`, `traversal: [...]`)"
 CAPTION = ("Rays a second as a multiple of the fastest way of Embree on the same scene, workload and instruction set with as many threads (where the sweep has "
            "no Embree: of the structure's own single rays: below a workload's name stands which). Medians; blue is faster, orange slower. The last column of a "
            "workload is the geometric mean of its scenes. Framed red: ways with wrong answers. Where an instruction set would have more than 60 rows, a row is "
@@ -124,7 +125,8 @@ def headings_of(columns, cells, wide):
         with_embree = {compared_at(c) for c in cells if c["workload"] == workload and c["structure"] == "embree"}
         to = "" if not places else "… Embree's fastest" if with_embree == places else TO if with_embree else "… own single rays"
         most = max(4, int(count * wide / (CHARACTER * (SMALL if count == 1 else 1.0))))
-        found.append("\n".join(wrap(" ".join(words_of(workload)), most, break_long_words=False) + wrap(to, most, break_long_words=False)).replace("= ", "=").replace("_ ", "_"))
+        lines = [line for text in (" ".join(words_of(workload)), to) for line in wrap(text, most, break_long_words=False)]
+        found.append("\n".join(lines).replace("= ", "=").replace("_ ", "_"))
     return found
 
 

@@ -8,6 +8,7 @@ from results import Cell, NoData, ordered, telling_axes
 from style import legends_right, letters, log_axis, panel_title, short_names
 
 TITLE = "Visits and tests of a ray"
+NEEDS = "nodes_per_ray, leaves_per_ray, boxes_per_ray and triangles_per_ray (`metrics: [trace]`)"
 CAPTION = ("Nodes and leaves that a ray visits, and tests of a ray against child boxes and triangles, counted in a pass of its own, untimed; the numbers "
            "beside the points are the same, in the legend's order. Fewer are better, but not each costs the same: a node's boxes, or a block's triangles, are "
            "tested together, and a visit by rays together (packets, streams) is one of each of them. A grid's nodes are the cells that the ray crosses. Of "
