@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 from string import Template
 
+import machine
 import tables
 from results import interval_words
 
@@ -34,7 +35,7 @@ def write(results, drawn):
     parts.append('<h2 id="skipped">Skipped cells</h2>' + tables.skipped_list(results.skipped, results.complete))
     if results.context.get("scenes"):
         parts.append('<h2 id="scenes">Scenes</h2>' + tables.facts_table(scene_facts(results.context["scenes"])))
-    parts.append('<h2 id="machine">Machine and build</h2>' + tables.facts_table(facts({k: v for k, v in results.context.items() if k != "scenes"})))
+    parts.append('<h2 id="machine">Machine and build</h2>' + tables.facts_table(machine.facts(results.context)) + raw(results.context))
     parts.append('<h2 id="again">How to reproduce</h2>' + reproduce(results))
     template = Template((Path(__file__).parent / "report_template.html").read_text(encoding="utf-8"))
     page = template.substitute(title=escape(f"{results.name}: Arboretum report"), body="\n".join(parts))
@@ -95,20 +96,10 @@ def caption(results, module):
     return module.CAPTION.replace("{interval}", interval_words(results.repetitions()))
 
 
-def facts(context):
-    """The context, flattened to lines that a person reads; long texts come with the reproduction."""
-    found = []
-    for key, value in context.items():
-        if key in ("experiment", "warnings", "plots", "executable", "library_build_type", "command", "load_avg"):
-            continue
-        if key == "memory_bytes" and isinstance(value, int):
-            key, value = "memory", f"{value / 2**30:.1f} GiB"
-        if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
-            value = "; ".join(", ".join(f"{k} {v}" for k, v in item.items()) for item in value)
-        elif isinstance(value, (dict, list)):
-            value = json.dumps(value)
-        found.append((key.replace("_", " "), value))
-    return found
+def raw(context):
+    """The context as it stands in results.json, but for the scenes, which have a section of their own."""
+    text = json.dumps({key: value for key, value in context.items() if key != "scenes"}, indent=2, ensure_ascii=False)
+    return f"<details><summary>As <code>results.json</code> has it</summary><pre>{escape(text)}</pre></details>"
 
 
 def scene_facts(scenes):

@@ -1,15 +1,20 @@
 """Tests of plots/: what figures say can be read, and says what was measured."""
 
+import html
+import importlib
 import json
 import sys
 import unittest
 
 sys.dont_write_bytecode = True
 
-from made_results import SEEN, Drawn, Folder, hard, other, results_of  # noqa: E402
+from made_results import SEEN, Drawn, Folder, build, hard, other, whole  # noqa: E402
 
+import machine  # noqa: E402
+import report  # noqa: E402
 import style  # noqa: E402
-from figures import leak_picture, rays_per_second, self_intersection, traversal_ratios  # noqa: E402
+import tables  # noqa: E402
+from figures import ALL, epo, leak_picture, rays_per_second, self_intersection, traversal_ratios  # noqa: E402
 from results import load  # noqa: E402
 
 
@@ -71,6 +76,43 @@ class Labels(Drawn):
         seen = {**SEEN, "camera_edges-city.json": SEEN["camera_edges-ball.json"]}
         figure = self.draw(leak_picture, load(Folder([other("camera_edges", s, leak_points=[[3, 4]], cracks=1) for s in ("ball", "city")], files=seen).path))
         self.assertEqual([a.get_title().split("\n")[:2] for a in figure.axes], [["ball", "bvh8 watertight"], ["city", "bvh8 watertight"]])
+
+
+class Words(Drawn):
+    def test_a_figure_without_data_says_what_it_shows_and_what_makes_it(self):
+        folder = Folder([other("primary")], {"plots": ["build_time", "leaks_vs_distance"]})
+        said = folder.plot("--only", ",".join(ALL), "--no-report").stdout
+        for name, column, metrics in (("build_time", "build_seconds", "metrics: [build]"), ("epo", "epo", "metrics: [quality]"), ("leaks_vs_distance", "cracks", "offset: [")):
+            self.assertRegex(said, rf"(?m)^{name}: left out, .*; it shows .*\b{column}\b.*{metrics.replace('[', '.')}")
+        self.assertEqual(folder.plot().returncode, 0)
+        self.assertIn("it shows build_seconds (`metrics: [build]`).</p>", (folder.path / "report.html").read_text())
+        for name in ALL:
+            self.assertTrue(importlib.import_module(f"figures.{name}").NEEDS, name)
+
+    def test_machine_and_build_have_labels_and_units(self):
+        context = {"memory_bytes": 25276510208, "mhz_per_cpu": 2100, "load": "2.35 1.58 1.83 3/97 784", "cpu_scaling_enabled": False, "isa": ["sse", "avx2"], "num_cpus": 2,
+                   "caches": [{"type": "Data", "level": 1, "size": 49152, "num_sharing": 1}, {"type": "Unified", "level": 3, "size": 3 << 20, "num_sharing": 8}],
+                   "git_dirty": "false | true", "merged_from": [{"shard": "1/2", "cpu": "<one>"}], "a_new_key": 3}
+        found = dict(machine.facts(context))
+        self.assertEqual(found, {"memory": "23.5 GiB", "clock, MHz": "2100", "load averages when begun: 1, 5, 15 minutes": "2.35, 1.58, 1.83", "frequency scaling": "no",
+                                 "instruction sets": "sse, avx2", "caches": "L1 data 48 KiB, L3 3 MiB for 8 hardware threads", "changes that no revision holds": "false | true",
+                                 "merged from": "shard 1/2, CPU <one>", "a_new_key": "3"})
+        self.assertEqual([machine.size(n) for n in (1, 1023, 1024, 3 << 20, 3 << 29, 1 << 45)], ["1 bytes", "1023 bytes", "1 KiB", "3 MiB", "1.5 GiB", "32768.0 GiB"])
+        for odd in ("8 GiB | 16 GiB", None, {"a": [1]}):
+            self.assertTrue(machine.facts(dict.fromkeys(context, odd)))
+        page = report.write(load(Folder(whole(), context).path), []).read_text()
+        raw = page.partition("has it</summary><pre>")[2].partition("</pre>")[0]
+        self.assertEqual(json.loads(html.unescape(raw)), context)
+
+    def test_rounding_noise_is_nothing(self):
+        results = load(Folder([build("kdtree", epo=2.8e-20, lcv=3.0), build("octree", epo=1.2345e-5, lcv=3.0)]).path)
+        (axis,) = self.draw(epo, results).axes
+        self.assertEqual([t.get_text() for t in axis.texts], ["0  (LCV 3.00)", "0.0000123  (LCV 3.00)"])
+        self.assertIn('data-v="0.0">0</td>', tables.structure_table(results))
+
+    def test_figures_do_not_dazzle_on_a_dark_page(self):
+        page = report.write(load(Folder(whole()).path), []).read_text()
+        self.assertRegex(page, r"prefers-color-scheme: dark\) \{ figure img \{ filter: brightness")
 
 
 if __name__ == "__main__":
