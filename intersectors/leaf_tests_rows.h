@@ -57,11 +57,21 @@ constexpr bool reads_any_of(TypeList<Blocks...>) {
   return (kCanRead<Intersector, Blocks> || ...);
 }
 
+template <class Block, class... Compiled>
+constexpr bool has_form_of(TypeList<Compiled...>) {
+  return ((Compiled::kForm == Block::kForm) || ...);
+}
+template <class Intersector, class... Blocks>
+constexpr bool has_every_form(TypeList<Blocks...>) {
+  return ((!kCanRead<Intersector, Blocks> || has_form_of<Blocks>(BlocksOf<Intersector>{})) && ...);
+}
+
 template <class Intersector>
 void add_leaf_tests(std::vector<LeafTests>& list) {
-  static_assert(reads_any_of<Intersector>(BlocksOf<Intersector>{}),
-                "It reads none of the blocks that it is compiled for: without kEveryLeaf those are of vertices and "
-                "indices alone.");
+  static_assert(reads_any_of<Intersector>(AllBlocks{}), "It reads none of the blocks that there are.");
+  static_assert(has_every_form<Intersector>(AllBlocks{}),
+                "It reads a form of blocks that it is not compiled for: without kEveryLeaf it may read vertices and "
+                "indices alone, with it a form that is new stands in BlocksOf as well.");
   for_each_type(BlocksOf<Intersector>{}, [&]<class Block>(std::type_identity<Block>) {
     if constexpr (kCanRead<Intersector, Block>) {
       using T = CalledTests<Intersector, Block>;

@@ -2,13 +2,31 @@
 
 #include <algorithm>
 
+#include "core/error.h"
+#include "core/names.h"
 #include "structures/builders/builder_parameters.h"
 #include "structures/registry.h"
 
 namespace arboretum {
 
+void check_names_read(const StructureInfo& info, const StructureBuilders& builders) {
+  if (!builders.reads) return;
+  std::vector<std::string> names;
+  for (const auto& parameter : builder_parameter_table()) names.emplace_back(parameter.name);
+  for (const OwnParameter& parameter : builders.own) names.emplace_back(parameter.name);
+  for (std::string_view builder : info.builders)
+    for (std::string_view name : builders.reads(builder))
+      if (std::ranges::find(names, name) == names.end())
+        throw UserError(std::string(info.name) + ": its builder " + std::string(builder) + " says that it reads an " +
+                        unknown_name_message("parameter", name, names));
+}
+
 const StructureBuilders* builders_of_structure(std::string_view structure) {
-  static const std::vector<StructureBuilders> declared = registered_builders();  // in the order of all_structures()
+  static const std::vector<StructureBuilders> declared = [] {
+    std::vector<StructureBuilders> list = registered_builders();  // in the order of all_structures()
+    for (std::size_t i = 0; i < list.size(); ++i) check_names_read(all_structures()[i].info, list[i]);
+    return list;
+  }();
   const StructureEntry* entry = find_structure(structure);
   return entry ? &declared[std::size_t(entry - all_structures().data())] : nullptr;
 }

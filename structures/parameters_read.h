@@ -18,8 +18,14 @@
 namespace arboretum {
 
 struct StructureBuilders;
+struct StructureInfo;
 
-/// What the structure declares; nullptr where there is no such structure.
+/// Throws UserError for a name that a builder of the structure says it reads, and that no parameter has, be it of
+/// BuilderParameters or the structure's own: it would never be read.
+void check_names_read(const StructureInfo& info, const StructureBuilders& builders);
+
+/// What the structure declares; nullptr where there is no such structure. Throws UserError as above, whichever
+/// structure of the executable it is.
 [[nodiscard]] const StructureBuilders* builders_of_structure(std::string_view structure);
 
 /// Names of the parameters that a build of `structure` with `builder` reads, each once; where the structure takes one

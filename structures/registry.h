@@ -49,9 +49,23 @@ template <class Set>
   std::visit([&]<class T>(T Set::*member) { set.*member = std::get<T>(value); }, parameter.member);
 }
 
+/// The class has a member `parameters`.
+template <class Structure>
+concept HasParameters = requires {
+  sizeof(Structure::parameters);
+};
+/// Its <name>_parameters.h says what they are.
+template <class Structure>
+concept SaysParameters = requires {
+  own_parameters(std::type_identity<Structure>{});
+};
+
 template <class Structure>
 [[nodiscard]] StructureBuilders builders_entry() {
   using Type = std::type_identity<Structure>;
+  static_assert(!HasParameters<Structure> || SaysParameters<Structure>,
+                "The class has a member `parameters`, but no own_parameters() says what they are: declare it in "
+                "<name>_parameters.h beside <name>.h (docs/add-a-structure.md).");
   StructureBuilders entry;
   if constexpr (requires(std::string_view builder) { builder_parameters(Type{}, builder); }) {
     entry.reads = [](std::string_view builder) -> std::vector<std::string_view> {
@@ -60,7 +74,7 @@ template <class Structure>
   }
   if constexpr (requires(std::string_view builder) { builder_summary(Type{}, builder); })
     entry.summary = [](std::string_view builder) -> std::string_view { return builder_summary(Type{}, builder); };
-  if constexpr (requires { own_parameters(Type{}); }) {
+  if constexpr (SaysParameters<Structure>) {
     using Set = decltype(Structure::parameters);
     for (const Parameter<Set>& p : own_parameters(Type{}))
       entry.own.push_back({p.name, p.summary, value_of(Set{}, p), p.limits, p.choices, p.words});

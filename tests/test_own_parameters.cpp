@@ -36,15 +36,20 @@ const StructureInfo& info_of(std::string_view name) {
   return info;
 }
 
-/// Kind 0 has parameters of its own; kind 1 does not say what it reads.
-template <int Kind>
-class Toy final : public Accel {
- public:
+struct WithParameters {
   Parameters parameters;
+};
+struct Without {};
+
+/// Kind 0 has parameters of its own; kind 1 has none, and does not say what it reads.
+template <int Kind>
+class Toy final : public Accel, public std::conditional_t<Kind == 0, WithParameters, Without> {
+ public:
   [[nodiscard]] static const StructureInfo& static_info() { return info_of(Kind == 0 ? "toy" : "mute"); }
   [[nodiscard]] const StructureInfo& info() const noexcept override { return static_info(); }
   void build(const TriangleMesh&, const BuildSettings& settings, BuildReport&) override {
-    seen = {settings.builder, parameters};
+    seen = {settings.builder, {}};
+    if constexpr (Kind == 0) seen.parameters = this->parameters;
   }
   [[nodiscard]] bool visit(StructureVisitor&) const override { return true; }
   [[nodiscard]] std::size_t bytes() const noexcept override { return 0; }
@@ -180,10 +185,29 @@ TEST_CASE("who reads an own parameter, and what is said of builders") {
   CHECK_FALSE(registry.reads("toy_share", "mute", "fancy", ""));  // it does not say, but cannot know it
   CHECK(registry.reads("bins", "mute", "fancy", ""));
   CHECK(registry.readers_of("toy_share") == "fancy (toy)");
+  CHECK(registry.readers_of("bins") == "fancy (toy); mute");
   CHECK(summary_of(Axis::builder, "fancy", registry) == "with all that there is");
   CHECK(summary_of(Axis::builder, "plain", registry).empty());
   CHECK(summary_of(Axis::builder, "auto", registry) == "the first that the structure takes");
   CHECK_THAT(builder_summary("two_level", "ploc_reinsertion"), Catch::StartsWith("bottom-up") && Catch::Contains("; "));
+}
+
+TEST_CASE("parameters that nobody could read are refused: a set that is not declared, a name that there is not") {
+  static_assert(HasParameters<toy::Toy<0>> && SaysParameters<toy::Toy<0>>);
+  static_assert(HasParameters<toy::WithParameters> && !SaysParameters<toy::WithParameters>);  // would not compile
+  static_assert(!HasParameters<toy::Toy<1>> && !SaysParameters<toy::Toy<1>>);
+
+  StructureBuilders builders = *builders_of_structure("toy");
+  const auto refused = [&] { return error_of([&] { check_names_read(toy::info_of("toy"), builders); }); };
+  CHECK(refused().empty());
+  builders.reads = [](std::string_view builder) -> std::vector<std::string_view> {
+    if (builder == "fancy") return {"toy_steps", "bins", "toy_step"};
+    return {"toy_steps"};
+  };
+  CHECK_THAT(refused(), Catch::StartsWith("toy: its builder fancy says that it reads an unknown parameter 'toy_step'; "
+                                          "did you mean 'toy_steps'?"));
+  builders.reads = [](std::string_view) -> std::vector<std::string_view> { return {"binz"}; };
+  CHECK_THAT(refused(), Catch::StartsWith("toy: its builder plain says") && Catch::Contains("did you mean 'bins'?"));
 }
 
 TEST_CASE("a saved structure is found by its values") {
