@@ -89,6 +89,23 @@ def step_library():
                                           "find_package(arboretum REQUIRED COMPONENTS forest)\n")
     error = configure(wrong, wrong / "build", f"-DCMAKE_PREFIX_PATH={PREFIX}", expect=1).stderr
     check("forest" in error, f"an unknown component passes, or is not named: {error}")
+
+    # A build tree of the program alone: its tests are not built. Where they are asked for they are missing, else left out.
+    half = WORK / "half built"
+    half.mkdir(exist_ok=True)
+    for path in (*BUILD.glob("arboretum*.cmake"), BUILD / "ArboretumStructures.cmake"):
+        shutil.copy(path, half)
+    targets = half / "arboretum-tests-targets.cmake"
+    targets.write_text(targets.read_text().replace("libarboretum_catch_main", "libnot_there"))
+    (half / "share").unlink(missing_ok=True)
+    (half / "share").symlink_to(BUILD / "share")
+    for words, status in (("OPTIONAL_COMPONENTS", 0), ("COMPONENTS", 1)):
+        (wrong / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(half LANGUAGES CXX)\n"
+                                              f"find_package(arboretum REQUIRED {words} tests)\nif(TARGET arboretum::tests OR arboretum_tests_FOUND)\n"
+                                              "  message(FATAL_ERROR \"tests are there\")\nendif()\n")
+        result = configure(wrong, wrong / "build", f"-Darboretum_DIR={half}", expect=status)
+        told = " ".join((result.stdout + result.stderr).split())
+        check("libnot_there.a is not built yet" in told and "tests are there" not in told, f"{words} tests of a half-built tree: {told}")
     for function in ("arboretum_executable", "arboretum_kernel_tests"):
         (wrong / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(wrong LANGUAGES CXX)\n"
                                               f"find_package(arboretum REQUIRED)\n{function}(mine STRUCTURE sorted_boxes)\n")
