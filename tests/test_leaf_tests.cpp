@@ -1,5 +1,6 @@
 // The table of leaf tests: which intersector has which blocks on which instruction set, and what kernels do with it.
 #include <algorithm>
+#include <cctype>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,23 @@
 
 using namespace arboretum;
 using namespace arboretum::test;
+
+namespace {
+
+/// The row of kReads, below, that an intersector has as it is compiled.
+std::string row_of(std::string_view intersector) {
+  std::string forms;
+  bool every_width = false;
+  for (const LeafTests& t : leaf_tests()) {
+    if (t.intersector != intersector) continue;
+    const char form = std::isdigit(t.leaf.back()) ? 'e' : t.leaf.back();
+    if (forms.find(form) == std::string::npos) forms += form;
+    every_width |= form != 'v' && t.leaf != "triangle4i";
+  }
+  return "{\"" + std::string(intersector) + "\", \"" + forms + "\", " + (every_width ? "true" : "false") + "},";
+}
+
+}  // namespace
 
 TEST_CASE(
     "the table of leaf tests has every intersector with all blocks that it reads, once, on every instruction set, and "
@@ -28,6 +46,10 @@ TEST_CASE(
       {"wald_projection", "p", true},    {"moller_trumbore_double", "vi", false},
       {"pluecker_double", "vi", false},  {"watertight_refined", "vi", false},
   };
+  for (const IntersectorPromise& promise : kIntersectorPromises) {
+    INFO("a row of kReads, as it is compiled: " << row_of(promise.intersector));
+    CHECK(std::ranges::count(kReads, promise.intersector, &Reads::intersector) == 1);
+  }
   REQUIRE(std::size(kReads) == std::size(kIntersectorPromises));
   for (Isa isa : kAllIsas) {
     if (!cpu_supports(isa)) continue;
