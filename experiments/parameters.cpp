@@ -116,6 +116,13 @@ std::string value_text(const OwnParameter& parameter, const BuilderParameters& s
   return text_of(value == set.own.end() ? parameter.initial : value->second);
 }
 
+template <class Set>
+void reset(Set& set, std::span<const Parameter<Set>> table, std::string_view name) {
+  const Set defaults;
+  for (const Parameter<Set>& p : table)
+    if (p.name == name) std::visit([&](auto member) { set.*member = defaults.*member; }, p.member);
+}
+
 }  // namespace
 
 std::vector<std::string> parameter_names() {
@@ -155,21 +162,26 @@ std::string set_parameter(Parameters& all, std::string_view name, const std::str
   });
 }
 
-bool is_of_traversal(std::string_view name) {
-  return std::ranges::find(traversal_setting_table(), name, &Parameter<TraversalSettings>::name) !=
-         traversal_setting_table().end();
+std::span<const std::string_view> traversals_reading(std::string_view name) {
+  for (const auto& p : traversal_setting_table())
+    if (p.name == name) return p.traversals;
+  return {};
 }
 
+bool is_of_traversal(std::string_view name) { return !traversals_reading(name).empty(); }
+
 bool concerns(std::string_view name, std::string_view traversal) {
-  return name == "hybrid_threshold" ? traversal.starts_with("hybrid")
-                                    : name == "rays_in_flight" && traversal == "queued";
+  const std::span<const std::string_view> readers = traversals_reading(name);
+  return std::ranges::find(readers, traversal) != readers.end();
 }
 
 void reset_parameter(BuilderParameters& parameters, std::string_view name) {
   parameters.own.erase(std::string(name));
-  const BuilderParameters defaults;
-  for (const auto& p : builder_parameter_table())
-    if (p.name == name) std::visit([&](auto member) { parameters.*member = defaults.*member; }, p.member);
+  reset(parameters, builder_parameter_table(), name);
+}
+
+void reset_parameter(TraversalSettings& settings, std::string_view name) {
+  reset(settings, traversal_setting_table(), name);
 }
 
 void drop_label(std::string& label, std::string_view name) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,14 +29,16 @@ struct Parameters {
 [[nodiscard]] std::string parameter_text(const Parameters& parameters, std::string_view name);
 /// Sets one parameter. Returns why not ("an integer from 4 to 64"), or empty when it is set.
 [[nodiscard]] std::string set_parameter(Parameters& parameters, std::string_view name, const std::string& value);
-/// Whether it is of the ways of traversal, and means something to that one; builders read theirs as they concern them.
+/// The ways of traversal that read it; none for a builder's parameter, whose readers the registry knows.
+[[nodiscard]] std::span<const std::string_view> traversals_reading(std::string_view name);
 [[nodiscard]] bool is_of_traversal(std::string_view name);
 [[nodiscard]] bool concerns(std::string_view name, std::string_view traversal);
 /// What a value may be, in words: "an integer from 4 to 64"; and what a parameter means, in one line.
 [[nodiscard]] std::string parameter_values(std::string_view name);
 [[nodiscard]] std::string_view parameter_summary(std::string_view name);
-/// Sets a builder's parameter to its default.
+/// Sets a parameter to its default, where it is one of these.
 void reset_parameter(BuilderParameters& parameters, std::string_view name);
+void reset_parameter(TraversalSettings& settings, std::string_view name);
 /// Takes ":name=value" out of a label.
 void drop_label(std::string& label, std::string_view name);
 

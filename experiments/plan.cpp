@@ -150,15 +150,13 @@ class Planner {
     return known->second;
   }
 
-  /// Those that concern the cell's way of traversal: to the others they mean nothing.
-  static void keep_settings(Cell& cell) {
-    const auto keep = [&](std::string_view name, unsigned& setting) {
-      if (concerns(name, cell.traversal)) return;
-      setting = TraversalSettings::kOwn;
+  /// Those that the cell's way of traversal reads: as of builders.
+  void keep_settings(Cell& cell) const {
+    for (const auto& [name, values] : experiment_.parameters) {
+      if (concerns(name, cell.traversal)) continue;
+      reset_parameter(cell.settings, name);
       drop_label(cell.setting_label, name);
-    };
-    keep("hybrid_threshold", cell.settings.hybrid_threshold);
-    keep("rays_in_flight", cell.settings.rays_in_flight);
+    }
   }
 
   /// Why this machine lacks what the cell needs; empty where it has it.
@@ -350,7 +348,7 @@ class Planner {
       if (std::ranges::any_of(traversals_, [&key = name](const std::string& t) { return concerns(key, t); })) continue;
       throw UserError(
           fmt::format("{}: {} has no effect: no cell's traversal is {}; add one to the axis, or take it out", where,
-                      name, name == "rays_in_flight" ? "queued" : "a hybrid"));
+                      name, fmt::join(traversals_reading(name), " or ")));
     }
   }
 

@@ -79,16 +79,21 @@ constexpr Parameter<B> kBuilderTable[] = {
      .words = kCollapses},
 };
 
+constexpr std::array<std::string_view, 3> kHybrids{"hybrid4", "hybrid8", "hybrid16"};
+constexpr std::array<std::string_view, 1> kQueued{"queued"};
+
 using S = TraversalSettings;
 constexpr Parameter<S> kTraversalTable[] = {
     {.name = "hybrid_threshold",
      .summary = "so many rays of a packet in a node, or fewer, go on alone; 0: none ever",
      .member = &S::hybrid_threshold,
-     .limits = {0, S::kWidestHybrid}},
+     .limits = {0, S::kWidestHybrid},
+     .traversals = kHybrids},
     {.name = "rays_in_flight",
      .summary = "rays on their way at once",
      .member = &S::rays_in_flight,
-     .limits = {1, S::kMostInFlight}},
+     .limits = {1, S::kMostInFlight},
+     .traversals = kQueued},
 };
 
 constexpr std::size_t kBuilderMembers = 17, kTraversalMembers = 2;
@@ -100,6 +105,8 @@ constexpr std::size_t kBuilderMembers = 17, kTraversalMembers = 2;
 static_assert(std::size(kBuilderTable) == kBuilderMembers - 1 && std::size(kTraversalTable) == kTraversalMembers,
               "each member has a row, but for `own`");
 static_assert(B::kOwn == S::kOwn);
+static_assert(std::ranges::none_of(kTraversalTable, [](const Parameter<S>& p) { return p.traversals.empty(); }),
+              "each names the ways of traversal that read it");
 
 template <class T>
 requires std::is_arithmetic_v<T> std::string shown(T value) {

@@ -35,10 +35,11 @@ struct Parameter {
   std::span<const unsigned> choices{};                    ///< of a number that may have no other values
   std::span<const std::string_view> words{};              ///< of a word; none: any, which is looked at where it is read
   bool has_own = std::is_same_v<Set, TraversalSettings>;  ///< kOwn is a value, too, and the default
+  std::span<const std::string_view> traversals{};         ///< of TraversalSettings: the ways that read it
 };
 
 /// In the order of the members. A new member needs a row in parameter_limits.cpp, which does not compile without, and
-/// whoever reads it has to say so (parameters_read.h; of a way of traversal concerns() in experiments/parameters.cpp).
+/// whoever reads it has to say so (parameters_read.h; of a way of traversal its row).
 [[nodiscard]] std::span<const Parameter<BuilderParameters>> builder_parameter_table() noexcept;
 [[nodiscard]] std::span<const Parameter<TraversalSettings>> traversal_setting_table() noexcept;
 

@@ -2,9 +2,11 @@
 // that do what they say; and what auto chooses.
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "experiments/config.h"
 #include "experiments/effective.h"
+#include "experiments/parameters.h"
 #include "experiments/plan.h"
 #include "experiments/result.h"
 #include "tests/catch.h"
@@ -285,6 +287,22 @@ TEST_CASE("auto on SSE leaves streams for rays in flight where rays share little
   }
 }
 
+TEST_CASE("settings of a way of traversal name those that read them") {
+  std::set<std::string_view> ways;
+  for (const KernelRow& row : kernel_table()) ways.insert(row.traversal);
+  for (std::string_view way : ways) {
+    INFO(way);
+    CHECK(concerns("hybrid_threshold", way) == way.starts_with("hybrid"));
+    CHECK(concerns("rays_in_flight", way) == (way == "queued"));
+    CHECK_FALSE(concerns("bins", way));
+  }
+  for (const std::string& name : parameter_names())
+    for (std::string_view way : traversals_reading(name)) {
+      INFO(name << " names " << way);
+      CHECK(ways.contains(way));
+    }
+}
+
 TEST_CASE(
     "settings of a way of traversal: in the plan, in the cell's name and in effective.yaml where they mean something, "
     "refused elsewhere") {
@@ -332,7 +350,8 @@ TEST_CASE(
             .find(":3: hybrid_threshold must be auto or an integer from 0 to 16, not '17'") != std::string::npos);
   CHECK(message("traversal: [queued]", "rays_in_flight: 0")
             .find("rays_in_flight must be auto or an integer from 1 to 64") != std::string::npos);
-  CHECK(message("traversal: [single]", "hybrid_threshold: 2").find(":3: hybrid_threshold has no effect") !=
+  CHECK(message("traversal: [single]", "hybrid_threshold: 2")
+            .find(":3: hybrid_threshold has no effect: no cell's traversal is hybrid4 or hybrid8 or hybrid16; add") !=
         std::string::npos);
   CHECK(message("traversal: [queued8]", "rays_in_flight: 2").find(":3: rays_in_flight has no effect") !=
         std::string::npos);
