@@ -76,15 +76,16 @@ Json axis_entries(Axis axis, const Registry& registry) {
   return entries;
 }
 
-/// Of builders and of ways of traversal.
-Json parameter_entries(const Registry& registry) {
+/// Of builders and of ways of traversal; `most`: names of readers in a row.
+Json parameter_entries(const Registry& registry, std::size_t most) {
   Json entries = Json::array();
   for (const std::string& name : parameter_names()) {
     Json entry = {{"name", name},
                   {"summary", parameter_summary(name)},
                   {"values", parameter_values(name)},
                   {"default", default_parameter(name)}};
-    if (!is_of_traversal(name)) entry["readers"] = registry.readers_of(name);
+    entry["readers"] = is_of_traversal(name) ? fmt::format("{}", fmt::join(traversals_reading(name), ", "))
+                                             : registry.readers_of(name, most);
     entries.push_back(std::move(entry));
   }
   return entries;
@@ -177,7 +178,8 @@ std::string remark(const Json& entry) {
     line += fmt::format(" [builders: {}{}{}]", words, again.empty() || once.empty() ? "" : "; ", fmt::join(once, " "));
   }
   if (entry.contains("values"))
-    line += fmt::format(" [{}; default: {}]", entry["values"].get<std::string>(), entry["default"].get<std::string>());
+    line += fmt::format(" [{}; default: {}; read by {}]", entry["values"].get<std::string>(),
+                        entry["default"].get<std::string>(), entry["readers"].get<std::string>());
   if (entry.contains("generator")) {
     line += !entry["generator"].get<bool>()   ? fmt::format(" ({} triangles)", entry["triangles"].get<std::size_t>())
             : entry["takes_seed"].get<bool>() ? " (generated, any triangle count and seed)"
@@ -214,7 +216,7 @@ ExitStatus command_list(const std::string& wanted, bool json) {
       document[plural(axis)] = axis_entries(axis, registry);
   }
   if (wanted.empty() || wanted == "parameters" || wanted == "parameter")
-    document["parameters"] = parameter_entries(registry);
+    document["parameters"] = parameter_entries(registry, json ? ~std::size_t{0} : 4);
   if (wanted.empty() || wanted == "scenes" || wanted == "scene") document["scenes"] = scene_entries();
   if (wanted.empty() || wanted == "effects" || wanted == "effect") document["effects"] = effect_entries();
   if (wanted.empty() || wanted == "promises" || wanted == "promise") document["promises"] = promise_entries(registry);

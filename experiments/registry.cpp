@@ -39,26 +39,37 @@ bool Registry::reads(std::string_view parameter, std::string_view name, std::str
   return parameter != "below" || entry->info.takes_below;
 }
 
-std::string Registry::readers_of(std::string_view parameter) const {
-  std::vector<std::pair<std::string, std::string>> groups;  // builders, empty for all; structures
+namespace {
+
+std::string listed(std::span<const std::string_view> names, std::size_t most) {
+  const std::size_t shown = std::min(names.size(), most);
+  const std::string words = fmt::format("{}", fmt::join(names.first(shown), ", "));
+  return shown == names.size() ? words : fmt::format("{} and {} more", words, names.size() - shown);
+}
+
+}  // namespace
+
+std::string Registry::readers_of(std::string_view parameter, std::size_t most) const {
+  using Names = std::vector<std::string_view>;
+  std::vector<std::pair<Names, Names>> groups;  // builders, empty for all; structures
   for (const StructureEntry& entry : structures) {
     if (entry.info.takes_below && parameter != "below") continue;  // it reads what the structure below it does
-    std::vector<std::string_view> builders;
+    Names builders;
     for (std::string_view builder : entry.info.builders)
       if (reads(parameter, entry.info.name, builder, "")) builders.push_back(builder);
     if (builders.empty()) continue;
-    const std::string key =
-        builders.size() == entry.info.builders.size() ? "" : fmt::format("{}", fmt::join(builders, ", "));
-    const auto group = std::ranges::find(groups, key, &std::pair<std::string, std::string>::first);
+    if (builders.size() == entry.info.builders.size()) builders.clear();
+    const auto group = std::ranges::find(groups, builders, &std::pair<Names, Names>::first);
     if (group == groups.end())
-      groups.emplace_back(key, entry.info.name);
+      groups.push_back({builders, {entry.info.name}});
     else
-      group->second += fmt::format(", {}", entry.info.name);
+      group->second.push_back(entry.info.name);
   }
   std::string words;
-  for (const auto& [builders, names] : groups) {
+  for (const auto& [builders, structures] : groups) {
     if (!words.empty()) words += "; ";
-    words += builders.empty() ? names : fmt::format("{} ({})", builders, names);
+    words += builders.empty() ? listed(structures, most)
+                              : fmt::format("{} ({})", listed(builders, most), listed(structures, most));
   }
   return words.empty() ? "nothing in this build" : words;
 }

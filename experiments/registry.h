@@ -43,8 +43,9 @@ struct Registry {
   /// Whether a structure that is there reads the builder parameter; one that does not say does.
   [[nodiscard]] bool reads(std::string_view parameter, std::string_view structure, std::string_view builder,
                            std::string_view below) const;
-  /// Who reads the builder parameter: "ploc (bvh2, bvh4); kdtree, octree", the latter with any builder.
-  [[nodiscard]] std::string readers_of(std::string_view parameter) const;
+  /// Who reads the builder parameter: "ploc (bvh2, bvh4); kdtree, octree", the latter with any builder. Of a list of
+  /// more than `most` names the first, and how many more there are.
+  [[nodiscard]] std::string readers_of(std::string_view parameter, std::size_t most = ~std::size_t{0}) const;
 };
 
 /// What this build and this machine have.
