@@ -99,6 +99,7 @@ auto remembered(Function* ask) {
 }  // namespace
 
 Registry this_registry() {
+  (void)all_own_parameters();  // what structures say wrongly of parameters is told whatever the command
   Registry registry;
   registry.structures = all_structures();
   registry.kernels = kernel_table();

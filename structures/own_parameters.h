@@ -16,7 +16,8 @@ namespace arboretum {
 /// Adds what a structure has, each name once. Throws UserError for one that has the name of another with other limits,
 /// other words or another default, for names that cannot be part of a cell's, and for a default out of its limits.
 void add_own_parameters(std::string_view structure, std::span<const OwnParameter> own, std::vector<OwnParameter>& all);
-/// Those of every structure of this executable, in the structures' order. Throws UserError as above.
+/// Those of every structure of this executable, in the structures' order. Throws UserError as above, and as
+/// check_names_read() (parameters_read.h).
 [[nodiscard]] std::span<const OwnParameter> all_own_parameters();
 /// nullptr where there is none of that name.
 [[nodiscard]] const OwnParameter* find_own_parameter(std::string_view name);
