@@ -159,7 +159,7 @@ def hatch(structure):
 PART_COLOURS = {
     "nodes": "#332288", "leaves": "#DDCC77", "other": "#AAAAAA",  # the memory's parts; leaves are a phase, too
     "references": "#009988", "sort": "#88CCEE", "splits": "#EE8866", "order": "#997700", "tree": "#BBCC33", "clusters": "#FFAABB", "embree": "#555555",
-    "layout": "#6699CC", "reinsertion": "#AA4499", "collapse": "#CC6677", "planes": "#004488", "outer grid": "#663333", "inner grids": "#EE3377",
+    "layout": "#6699CC", "reinsertion": "#AA4499", "collapse": "#CC6677", "planes": "#004488", "outer_grid": "#663333", "inner_grids": "#EE3377",
 }
 SPARE_PART_COLOURS = ("#4477AA", "#44AA99", "#117733", "#994455", "#999933", "#882255")
 part_colour = Palette(PART_COLOURS, SPARE_PART_COLOURS)  # of a phase of a build, a part of the memory

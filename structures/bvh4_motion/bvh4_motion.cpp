@@ -200,7 +200,7 @@ void Bvh4Motion::build(const TriangleMesh& mesh, const BuildSettings& settings, 
   root_ = converter.write(arena_.data(), still.root(), next, bounds);
   stack_entries_ = still.stack_entries();
   set_scene(mesh, at_half_time(converter.widened(bounds)), converter.pads().common());
-  report.phases.emplace_back("moving boxes", wall_seconds() - start);
+  report.phases.emplace_back("moving_boxes", wall_seconds() - start);
 }
 
 void Bvh4Motion::archive(Archive& archive) {

@@ -258,10 +258,10 @@ void build_cells(const TriangleMesh& mesh, const BuilderParameters& parameters, 
     if (coarsest) throw UserError("grid: the references of the fewest cells that can be pass 2^32: take a bvh8");
   }
   cells.codes.assign(cells.levels[0].size(), kEmptyLeaf);
-  phase.ends("outer grid");
+  phase.ends("outer_grid");
   if (two_level) {
     add_inner_grids(mesh, parameters, leaf_width, cells);
-    phase.ends("inner grids");
+    phase.ends("inner_grids");
   }
 }
 

@@ -316,7 +316,7 @@ class Drawing(Drawn):
             self.assertIn(f'data-v="{value!r}"', report)
 
     def test_colours_of_a_figure_are_distinct(self):
-        phases = ("top", "moving boxes", "instances", "a new phase")
+        phases = ("top", "moving_boxes", "instances", "a new phase")
         for palette, names in ((style.part_colour, phases + tuple(style.PART_COLOURS)), (style.colour, ("ab", "ba", *style.COLOURS)),
                                (style.intersector_colour, ("ab", "ba", *style.INTERSECTOR_COLOURS))):
             fresh = style.Palette(palette.own, palette.spare)
