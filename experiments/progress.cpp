@@ -34,10 +34,15 @@ Progress::Progress(std::size_t cells, std::size_t units)
 Progress::~Progress() { wipe(); }
 
 std::string Progress::time_left() const {
-  if (units_done_ == 0) return "";
+  if (units_done_ == 0 || units_done_ == units_) return "";
   const double elapsed = wall_seconds() - begin_;
   return format_duration(elapsed / static_cast<double>(units_done_) * static_cast<double>(units_ - units_done_)) +
          " left";
+}
+
+std::string Progress::with_time_left(const std::string& line) const {
+  const std::string left = time_left();
+  return left.empty() ? line : line + "  " + left;
 }
 
 void Progress::wipe() {
@@ -48,7 +53,7 @@ void Progress::wipe() {
 void Progress::say_where() {
   constexpr double kSilence = 30.0;
   if (wall_seconds() - said_ > kSilence)
-    note(fmt::format("[{}/{}] {} is under way  {}", cells_done_, cells_, cell_, time_left()));
+    note(with_time_left(fmt::format("[{}/{}] {} is under way", cells_done_, cells_, cell_)));
 }
 
 void Progress::draw() {
@@ -80,7 +85,7 @@ void Progress::step(const std::string& cell, std::size_t units) {
 
 void Progress::cell_done(const std::string& cell, const std::string& outcome) {
   ++cells_done_;
-  if (!terminal_) note(fmt::format("[{}/{}] {}  {}  {}", cells_done_, cells_, cell, outcome, time_left()));
+  if (!terminal_) note(with_time_left(fmt::format("[{}/{}] {}  {}", cells_done_, cells_, cell, outcome)));
 }
 
 }  // namespace arboretum

@@ -27,6 +27,7 @@ class Progress {
   void wipe();
   void say_where();
   [[nodiscard]] std::string time_left() const;
+  [[nodiscard]] std::string with_time_left(const std::string& line) const;
 
   bool terminal_;
   std::size_t cells_, units_, cells_done_ = 0, units_done_ = 0;
