@@ -20,8 +20,6 @@
 namespace arboretum {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
 /// Two triples of doubles side by side: what is done to one is done to the other in the same instruction.
 struct Pair3 {
   __m128d x, y, z;
