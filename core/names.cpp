@@ -12,15 +12,14 @@ namespace {
 /// No name of ours is nearly as long, nor near to one that is.
 constexpr std::size_t kLongestName = 100;
 
-/// ASCII letters in lower case.
-std::string lower(std::string_view text) {
+}  // namespace
+
+std::string in_lower_case(std::string_view text) {
   std::string low(text);
   for (char& c : low)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + ('a' - 'A'));
   return low;
 }
-
-}  // namespace
 
 std::string shortened(std::string_view text, std::size_t most) {
   if (text.size() <= most) return std::string(text);
@@ -31,7 +30,7 @@ std::string shortened(std::string_view text, std::size_t most) {
 }
 
 std::size_t edit_distance(std::string_view left, std::string_view right) {
-  const std::string a = lower(left), b = lower(right);
+  const std::string a = in_lower_case(left), b = in_lower_case(right);
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = i;
   for (std::size_t j = 0; j <= b.size(); ++j) d[0][j] = j;
@@ -58,7 +57,7 @@ std::string nearest_name(std::string_view name, std::span<const std::string> can
 
 std::string close_name(std::string_view name, std::span<const std::string> candidates) {
   const std::string nearest = nearest_name(name, candidates);
-  const bool same_start = name.size() >= 3 && lower(nearest).starts_with(lower(name.substr(0, 3)));
+  const bool same_start = name.size() >= 3 && in_lower_case(nearest).starts_with(in_lower_case(name.substr(0, 3)));
   return same_start || 3 * edit_distance(name, nearest) <= std::max(name.size(), nearest.size()) ? nearest : "";
 }
 

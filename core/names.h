@@ -7,6 +7,8 @@
 
 namespace arboretum {
 
+/// ASCII letters in lower case, whatever the locale.
+[[nodiscard]] std::string in_lower_case(std::string_view text);
 /// Edit distance with adjacent transpositions (restricted Damerau-Levenshtein); upper and lower case are one.
 [[nodiscard]] std::size_t edit_distance(std::string_view left, std::string_view right);
 /// The candidate with the smallest edit distance to `name`; empty when there are no candidates.

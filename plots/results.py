@@ -22,7 +22,6 @@ WORKLOAD_ORDER = ("primary", "shadow", "ambient_occlusion", "reflection", "diffu
 METRICS = ("trace", "build", "quality", "accuracy")
 FEWEST_OF_INTERVAL = 6  # repetitions: fewer have no interval that covers their median in 95 of 100 cases
 CONFIDENCE = 0.95
-NOISE = 1e-12  # all that is measured is 0 or above this by far
 SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
@@ -65,9 +64,9 @@ class Cell:
     _estimates: dict = field(default_factory=dict)
 
     def values(self, name):
-        """The finite numbers that the rows hold under `name`; what is but rounding noise is 0."""
+        """The finite numbers that the rows hold under `name`."""
         found = (row.get(name) for row in self.rows)
-        return [0.0 if abs(v) < NOISE else float(v) for v in found if is_number(v)]
+        return [float(v) for v in found if is_number(v)]
 
     def value(self, name):
         """The median of `name` over the rows; None where no row has it."""

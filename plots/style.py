@@ -298,9 +298,16 @@ def panel_title(scene, workload, width):
 
 def broken_keys(text, most):
     """`text` on lines of so many letters, where it must be broken within its keys, too: behind an underscore or an equals sign."""
-    if len(text) <= most:
-        return text
-    return fill(text.replace("_", "_ ").replace("=", "= "), most).replace("_ ", "_").replace("= ", "=")
+    return text if len(text) <= most else closed(fill(opened(text), most))
+
+
+def opened(text):
+    """`text` with a blank wherever a key may be broken: behind an underscore or an equals sign; closed() takes them out again."""
+    return text.replace("_", "_ ").replace("=", "= ")
+
+
+def closed(text):
+    return text.replace("_ ", "_").replace("= ", "=")
 
 
 def panel_grid(shown, places, width, height, most_columns, least_width=None):

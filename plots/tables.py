@@ -21,9 +21,11 @@ def number(value, form="{:.3g}".format):
 
 
 def digits(value):
-    """Three digits or all before the point, without an exponent."""
+    """Three digits or all before the point; without an exponent, but where zeros would hide it."""
     if value == 0:
         return "0"
+    if abs(value) < 1e-9:
+        return f"{value:.3g}"
     before = math.floor(math.log10(abs(float(f"{value:.3g}"))))  # of the rounded value: 9.999 is 10.0
     return f"{value:.{max(0, 2 - before)}f}"
 

@@ -1,6 +1,5 @@
 // load_scene: the four ways in which a scene is named, one way out.
 #include <algorithm>
-#include <cctype>
 #include <optional>
 
 #include <fmt/format.h>
@@ -19,12 +18,7 @@
 namespace arboretum {
 namespace {
 
-std::string lower_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
-  return extension;
-}
+std::string lower_extension(const std::filesystem::path& path) { return in_lower_case(path.extension().string()); }
 
 bool is_yaml(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);

@@ -18,6 +18,9 @@ namespace {
 constexpr std::size_t kLargest = 64;  ///< records that are never left out
 constexpr std::size_t kPilot = 64;    ///< records that the work is estimated from
 constexpr double kClipWork = 16.0;    ///< of a clip, in box steps
+/// Of a triangle's area: a part that is no more is what clipping rounds where the triangle only touches a box. Boxes
+/// that part space touch the triangles of their neighbours.
+constexpr double kRoundings = 0x1p-40;
 
 bool overlap(const Bounds3f& a, const Bounds3f& b) {
   return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
@@ -80,7 +83,8 @@ class Measure {
             area += areas_[primitive];
           } else {
             work += kClipWork;
-            area += clipped_area(mesh_.corners(primitive), own.bounds);
+            const double part = clipped_area(mesh_.corners(primitive), own.bounds);
+            if (part > kRoundings * areas_[primitive]) area += part;
           }
         }
       }

@@ -9,7 +9,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from figures.modes import Modes
 from figures.squares import headings_above, mark_wrong
 from results import NoData, ordered
-from style import panels, short_names
+from style import closed, opened, panels, short_names
 
 TITLE = "Ways of traversal"
 NEEDS = "rays_per_second of several ways of traversal, `single` or Embree's among them (`metrics: [trace]`, `traversal: [...]`)"
@@ -114,7 +114,7 @@ def spans_of(columns):
 
 
 def words_of(workload):
-    return workload.replace("_", "_ ").replace(":", ": ").replace("=", "= ").split()
+    return opened(workload.replace(":", ": ")).split()
 
 
 def headings_of(columns, cells, wide):
@@ -126,7 +126,7 @@ def headings_of(columns, cells, wide):
         to = "" if not places else "… Embree's fastest" if with_embree == places else TO if with_embree else "… own single rays"
         most = max(4, int(count * wide / (CHARACTER * (SMALL if count == 1 else 1.0))))
         lines = [line for text in (" ".join(words_of(workload)), to) for line in wrap(text, most, break_long_words=False)]
-        found.append("\n".join(lines).replace("= ", "=").replace("_ ", "_"))
+        found.append(closed("\n".join(lines)))
     return found
 
 

@@ -104,11 +104,11 @@ class Words(Drawn):
         raw = page.partition("has it</summary><pre>")[2].partition("</pre>")[0]
         self.assertEqual(json.loads(html.unescape(raw)), context)
 
-    def test_rounding_noise_is_nothing(self):
+    def test_tiny_numbers_are_short(self):
         results = load(Folder([build("kdtree", epo=2.8e-20, lcv=3.0), build("octree", epo=1.2345e-5, lcv=3.0)]).path)
         (axis,) = self.draw(epo, results).axes
-        self.assertEqual([t.get_text() for t in axis.texts], ["0  (LCV 3.00)", "0.0000123  (LCV 3.00)"])
-        self.assertIn('data-v="0.0">0</td>', tables.structure_table(results))
+        self.assertEqual([t.get_text() for t in axis.texts], ["2.8e-20  (LCV 3.00)", "0.0000123  (LCV 3.00)"])
+        self.assertIn('data-v="2.8e-20">2.800e-20</td>', tables.structure_table(results))
 
     def test_figures_do_not_dazzle_on_a_dark_page(self):
         page = report.write(load(Folder(whole()).path), []).read_text()
