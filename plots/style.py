@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
+from matplotlib.ticker import FixedLocator, FuncFormatter, Locator, MaxNLocator, NullLocator  # noqa: E402
 
 from results import TooMuch, TooTall, interval_name, ordered  # noqa: E402
 from tables import per_million_text  # noqa: E402
@@ -35,7 +35,7 @@ MORE_MARKERS = (*MARKERS, "p", "d", "h", (4, 1, 0), (6, 1, 0))  # of larger sign
 DPI = 160
 TALLEST = 8000  # pixels of a figure
 WIDEST = 17.0  # inches of scenes beside each other
-MOST_TICKS = 5  # between powers of ten, of a logarithmic axis
+MOST_TICKS = 6  # of a logarithmic axis
 
 # Of fonts that have what DejaVu Sans lacks (Chinese, Japanese, Korean; then the rest of Unicode), those that are installed are asked for such characters.
 FALLBACK_FONTS = ("Noto Sans CJK JP", "Noto Sans CJK SC", "Noto Sans JP", "Noto Sans SC", "Source Han Sans", "IPAexGothic", "IPAGothic", "TakaoGothic",
@@ -105,7 +105,9 @@ def intersector_legend(intersectors):
 
 
 def log_with_zero(axis, which, values):
-    """A log scale for `values` with a place for zero, which is labelled; linear where all are zero."""
+    """A log scale for `values` with a place for zero, which is labelled; linear where all are zero; without that place where none is."""
+    if min(values, default=0) > 0:
+        return log_axis(axis, which, values, 10.0)
     smallest, largest = min((v for v in values if v > 0), default=0), max(values, default=0)
     set_limits = axis.set_ylim if which == "y" else axis.set_xlim
     ticks = axis.yaxis if which == "y" else axis.xaxis
@@ -125,31 +127,59 @@ def log_with_zero(axis, which, values):
     ticks.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
 
 
-def log_axis(axis, which, values):
-    """A log scale just wide enough for `values`, with labelled ticks however little they differ."""
+def log_axis(axis, which, values, least=1.0):
+    """A log scale just wide enough for `values`, and for a factor of `least`, with labelled ticks however little they differ."""
     low, high = min(values, default=1.0), max(values, default=1.0)
+    more = max(1.0, math.sqrt(least * low / high))
     (axis.set_xscale if which == "x" else axis.set_yscale)("log")
-    first, last = 0.8 * low, 1.2 * high
-    (axis.set_xlim if which == "x" else axis.set_ylim)(first, last)
-    at = lambda digits: [d * 10.0**k for k in range(-3, 12) for d in digits if first <= d * 10.0**k <= last]
-    fine = [t for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(first, last) if first <= t <= last]  # where values hardly differ
-    choices = map(at, ((1,), (1, 2, 5), (1, 3), (1, 1.5, 2, 3, 4, 5, 7)))
-    found = next((f for k, f in enumerate(choices) if len(f) > 2 and (k == 0 or len(f) <= MOST_TICKS)), fine)
+    (axis.set_xlim if which == "x" else axis.set_ylim)(0.8 * low / more, 1.2 * high * more)
     ticks = axis.xaxis if which == "x" else axis.yaxis
-    ticks.set_major_locator(FixedLocator(found))
-    ticks.set_major_formatter("{x:g}")
+    ticks.set_major_locator(LogTicks(which))
+    ticks.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
     ticks.set_minor_locator(NullLocator())
+
+
+class LogTicks(Locator):
+    """Ticks of a logarithmic axis, as many as their labels leave room for between them at the size that the axis has when it is drawn."""
+
+    DIGITS = ((1, 2, 5), (1, 3), (1, 1.5, 2, 3, 5, 7), (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8))  # between powers of ten, about as far apart
+    DIGIT, APART, LINE = 0.64, 1.0, 1.8  # of a font's size: a digit's width; between labels; from a line to the next
+
+    def __init__(self, which):
+        self.which = which
+
+    def __call__(self):
+        return self.tick_values(*sorted(self.axis.get_view_interval()))
+
+    def tick_values(self, first, last):
+        powers = range(math.floor(math.log10(first)), math.ceil(math.log10(last)) + 1)
+        within = lambda ticks: [t for t in ticks if first <= t <= last]
+        choices = [within(10.0**k for k in powers if k % step == 0) for step in range(1, 1 + max(1, len(powers) // 2))]
+        choices += [within(float(f"{d}e{k}") for k in powers for d in digits) for digits in self.DIGITS]
+        choices.append(within(MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(first, last)))  # where values hardly differ
+        choices += [[ticks[0], ticks[-1]] for ticks in choices[-2:] if len(ticks) > 1]  # where labels are long
+        fitting = [ticks for ticks in choices if len(ticks) <= MOST_TICKS and self.fit(ticks, first, last)]
+        return max(fitting, key=lambda ticks: min(3, len(ticks)), default=choices[0][:1])  # the first of three or more; else the most
+
+    def fit(self, ticks, first, last):
+        """Whether their labels are apart."""
+        axes, size = self.axis.axes, self.axis.get_major_ticks(1)[0].label1.get_size()
+        length = (axes.bbox.width if self.which == "x" else axes.bbox.height) * 72 / axes.figure.dpi / size  # in sizes of the font
+        at = [length * math.log(tick / first) / math.log(last / first) for tick in ticks]
+        widths = [self.DIGIT * len(plain(tick)) for tick in ticks]
+        return all(b - a >= (self.LINE if self.which == "y" else (v + w) / 2 + self.APART)
+                   for a, b, v, w in zip(at, at[1:], widths, widths[1:]))
 
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def plain(value):
-    """0, 0.01, 1, 1000, 10⁵, 2·10⁵: as a person writes a power of ten or a multiple of one."""
+    """0, 0.01, 1, 1000, 10⁵, 1.5·10⁵: as a person writes a power of ten or a multiple of one."""
     if value == 0 or 1e-3 < value < 1e4:
         return f"{value:g}"
-    digit, power = f"{value:.0e}".split("e")
-    return ("" if digit == "1" else f"{digit}·") + "10" + str(int(power)).translate(SUPERSCRIPTS)
+    digits, power = f"{value:e}".split("e")
+    return ("" if float(digits) == 1 else f"{float(digits):g}·") + "10" + str(int(power)).translate(SUPERSCRIPTS)
 
 
 def hatch(structure):

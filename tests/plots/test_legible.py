@@ -35,6 +35,25 @@ class Labels(Drawn):
                 self.assert_apart(ticks)
                 style.plt.close(figure)
 
+    def test_logarithmic_axes_of_any_size_have_labels_with_room_between_them(self):
+        for width, height in ((1.3, 1.0), (2.0, 1.8), (4.0, 3.0)):
+            figure, axis = style.plt.subplots(figsize=(width + 0.6, height + 0.6))
+            figure.subplots_adjust(0.4 / (width + 0.6), 0.4 / (height + 0.6), 1 - 0.2 / (width + 0.6), 1 - 0.2 / (height + 0.6))
+            for low in (0.0013, 1, 130, 210, 96e3):
+                for span in (1, 1.3, 2, 3.3, 5, 9, 40, 1e3, 1e9):
+                    for which in "xy":
+                        style.log_axis(axis, which, [low, low * span])
+                    figure.draw_without_rendering()
+                    for ticks, edges, room in ((axis.xaxis, ("x1", "x0"), 0.6), (axis.yaxis, ("y1", "y0"), 0.3)):
+                        shown = [t.label1 for t in ticks.get_major_ticks() if t.label1.get_text()]
+                        boxes = [text.get_window_extent() for text in shown]
+                        gaps = [getattr(b, edges[1]) - getattr(a, edges[0]) for a, b in zip(boxes, boxes[1:])]
+                        words = (width, low, span, [text.get_text() for text in shown])
+                        self.assertGreater(len(set(words[-1])), 0 if min(width, height) < 1.5 else 1, words)
+                        self.assertEqual(len(set(words[-1])), len(words[-1]), words)
+                        self.assertGreater(min(gaps, default=99), room * shown[0].get_size() * figure.dpi / 72, words)
+            style.plt.close(figure)
+
     def test_heads_of_a_single_scene_are_apart_beside_long_names_of_rows(self):
         rows = [other(w, builder=f"binned_sah:bins={bins}", intersector=i, box="padded", traversal=t) for w in ("primary", "ambient_occlusion", "diffuse")
                 for bins in (16, 32) for i in ("moller_trumbore_double", "watertight") for t in ("single", "stream_incoherent")]
