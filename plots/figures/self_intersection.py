@@ -5,13 +5,15 @@ from textwrap import fill
 from matplotlib.lines import Line2D
 
 from results import NoData, ordered
-from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_map, panels, plain, short_names
+from style import intersector_colour, intersector_legend, legends_right, log_axis, log_with_zero, marker_map, panels, short_names
 
 TITLE = "Leaving a surface"
 NEEDS = "self_hits_per_million (`metrics: [trace]`, `workload: [diffuse]` or other secondary rays, `rays: {self_intersection: [...]}`)"
 CAPTION = ("Secondary rays that meet the primitive that they start on again (any hit: anything, where nothing is), that meet another too early, and that pass "
            "through what they should meet, against the exact answer of the ray that starts at the hit point itself, its own primitive left out. A ray that "
-           "meets its own surface ends there, and is quick. Zero stands on the left line.")
+           "meets its own surface ends there, and is quick. Zero stands on the left line; what no cell has is named in the legend instead.")
+SIZE = 4.0  # points that a marker takes, its edge too
+LEAST, BETWEEN = 0.3, 0.2  # inches: of a way at least; between the markers of one way and the next
 WAYS = ("none", "epsilon", "integer_offset", "error_bound", "exclusion")
 FAULTS = (("self_hits_per_million", "own surface met,\nper million"), ("near_hits_per_million", "neighbour met too early,\nper million"),
           ("leaks_per_million", "passed through,\nper million"))
@@ -26,9 +28,13 @@ def draw(results):
     workloads = ordered({base(c) for c in cells}, "workload")
     intersectors = sorted({c["intersector"] for c in cells})
     markers = marker_map(workloads, "workloads")
-    columns = [f for f in FAULTS if any(c.value(f[0]) is not None for c in cells)] + [(None, f"time, ns a ray\n({results.clock()})")]
-    figure, axes = panels(len(scenes), len(columns), 2.7, 0.9 + 0.4 * len(ways), sharey=True, sharex="col")
-    slots = [(i, w) for i in intersectors for w in workloads]
+    counted = [f for f in FAULTS if any(c.value(f[0]) is not None for c in cells)]
+    faults = [f for f in counted if any(c.value(f[0]) for c in cells)] or counted[:1]
+    columns = faults + [(None, f"time, ns a ray\n({results.clock()})")]
+    traced = {(c["intersector"], base(c)) for c in cells}
+    slots = [slot for i in intersectors for w in workloads if (slot := (i, w)) in traced]
+    way = max(LEAST, BETWEEN + SIZE / 72 * len(slots))  # inches, in which no marker lies on another
+    figure, axes = panels(len(scenes), len(columns), 2.7, 0.5 + 0.5 / len(scenes) + way * len(ways), sharey=True, sharex="col")
     names = short_names(scenes, 60)
     for row, scene in enumerate(scenes):
         for column, (name, label) in enumerate(columns):
@@ -38,9 +44,9 @@ def draw(results):
                 if value is None:
                     continue
                 own = intersector_colour(cell["intersector"])
-                place = ways.index(way_of(cell)) + 0.7 * ((slots.index((cell["intersector"], base(cell))) + 0.5) / len(slots) - 0.5)
-                axis.plot(value, place, linestyle="", marker=markers[base(cell)], color=own, markersize=4.5, markerfacecolor="white", markeredgewidth=1.1,
-                          clip_on=False)
+                slot = slots.index((cell["intersector"], base(cell))) - (len(slots) - 1) / 2
+                axis.plot(value, ways.index(way_of(cell)) + slot * SIZE / 72 / way, linestyle="", marker=markers[base(cell)], color=own,
+                          markersize=SIZE - 1, markerfacecolor="white", markeredgewidth=0.9, clip_on=False)
             if row == len(scenes) - 1:
                 axis.set_xlabel(label)
             if column == 0:
@@ -55,12 +61,12 @@ def draw(results):
             log_with_zero(axes[0][column], "x", [v for c in cells for v in [c.value(name)] if v is not None])
         else:
             log_axis(axes[0][column], "x", [1e9 / c.value(metric) for c in cells])
-            axes[0][column].xaxis.set_major_formatter(lambda v, _: plain(v))
     if others := [s for s in ordered((c["scene"] for c in results.traces), "scene") if s not in scenes]:
         figure.supxlabel("not shown, as no secondary rays were measured: " + fill(", ".join(others), 90), fontsize=8.5, color="#555555")
     handles = [Line2D([], [], linestyle="", marker=m, color="#333333", markerfacecolor="white", markersize=5, label=w)
                for w, m in markers.items()]
-    legends_right(figure, [("intersector", intersector_legend(intersectors)), ("workload", handles)])
+    zeros = [Line2D([], [], linestyle="", label=label.partition(",")[0]) for f in counted if f not in faults for _, label in [f]]
+    legends_right(figure, [("intersector", intersector_legend(intersectors)), ("workload", handles)] + ([("nowhere", zeros)] if zeros else []))
     return figure
 
 

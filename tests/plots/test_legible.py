@@ -54,6 +54,21 @@ class Labels(Drawn):
                         self.assertGreater(min(gaps, default=99), room * shown[0].get_size() * figure.dpi / 72, words)
             style.plt.close(figure)
 
+    def test_markers_of_ways_of_leaving_a_surface_do_not_hide_each_other(self):
+        for scenes, intersectors, workloads in ((1, 1, 1), (1, 3, 4), (3, 3, 4), (2, 10, 4)):
+            rows = [other(f"{w}:self_intersection={way}", f"scene{s}", intersector=f"i{i}", self_intersection=way, self_hits_per_million=float(way == "none"),
+                          near_hits_per_million=0.0, leaks_per_million=0.0)
+                    for s in range(scenes) for i in range(intersectors) for w in ("shadow", "ambient_occlusion", "reflection", "diffuse")[:workloads] for way in self_intersection.WAYS]
+            figure = self.draw(self_intersection, load(Folder(rows).path))
+            figure.draw_without_rendering()
+            self.assertEqual(len(figure.axes), 2 * scenes)  # of the fault that some ray has, and of time
+            self.assertEqual([t.get_text() for t in figure.legends[-1].get_texts()], ["neighbour met too early", "passed through"])
+            for axis in figure.axes:
+                at = sorted(axis.transData.transform((0, line.get_ydata()[0]))[1] for line in axis.lines if line.get_marker() != "None")
+                self.assertEqual(len(at), intersectors * workloads * len(self_intersection.WAYS))
+                size = (self_intersection.SIZE - 0.1) * figure.dpi / 72
+                self.assertGreater(min(b - a for a, b in zip(at, at[1:])), 0.97 * size)
+
     def test_heads_of_a_single_scene_are_apart_beside_long_names_of_rows(self):
         rows = [other(w, builder=f"binned_sah:bins={bins}", intersector=i, box="padded", traversal=t) for w in ("primary", "ambient_occlusion", "diffuse")
                 for bins in (16, 32) for i in ("moller_trumbore_double", "watertight") for t in ("single", "stream_incoherent")]
