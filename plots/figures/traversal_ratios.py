@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 
 from figures.modes import Modes
-from figures.squares import headings_above, mark_wrong
+from figures.squares import MOST_ROWS_BELOW, headings_above, mark_wrong
 from results import NoData, ordered
-from style import closed, opened, panels, short_names
+from style import closed, is_wrong, opened, panels, short_names
 
 TITLE = "Ways of traversal"
 NEEDS = "rays_per_second of several ways of traversal, `single` or Embree's among them (`metrics: [trace]`, `traversal: [...]`)"
@@ -23,8 +23,9 @@ COLOURS = LinearSegmentedColormap.from_list("ratio", ["#B35806", "#F1A340", "#FE
 MEAN = "mean"
 TO = "… Embree's fastest, or own single rays"  # the longest of what stands below a workload's name
 LONGEST_SCENE = 30  # characters of a name below or above its column
-# inches: of a column at least; of a character of a workload's name above its columns, of a row's name beside it
-COLUMN, CHARACTER, ROW_CHARACTER = 0.52, 0.078, 0.062
+# inches: of a column at least, of a row; of a character of a workload's name above its columns, of a row's name beside it, of a slanted name of a scene
+COLUMN, ROW, CHARACTER, ROW_CHARACTER, SLANTED = 0.52, 0.26, 0.078, 0.062, 0.034
+AROUND, LINE, FRAMED = 0.75, 0.17, 0.45  # inches above and below a panel: at least, of a line above its columns, of what is said of frames
 SMALL = 0.8  # of that size: above a single column
 KEY = ((0.5, "half or less"), (0.7, "0.7"), (1.0, "1"), (1.4, "1.4"), (2.0, "twice or more"))
 ONLY_WHEN_NAMED = True
@@ -44,13 +45,13 @@ def draw(results):
         tables = tables_of(cells, modes, metric)
     columns = columns_of(cells)
     rows = {isa: row_names(table, modes) for isa, table in tables.items()}
-    longest = max(map(len, rows.values()))
     wide = max([COLUMN] + [(SMALL if count == 1 else 1.0) * CHARACTER * (len(word) + 1) / count
                            for workload, count in spans_of(columns) for word in [*words_of(workload), TO.partition(" fastest")[0]]])
     beside = 1.9 + ROW_CHARACTER * max(len(row_label(row)) for of_isa in rows.values() for row in of_isa)  # names of rows, and the key
     headings = {isa: headings_of(columns, [c for c in cells if c["isa"] == isa], wide) for isa in tables}
-    most = max(heading.count("\n") + 1 for of_isa in headings.values() for heading in of_isa)
-    figure, axes = panels(len(tables), 1, max(5.0, beside + wide * len(columns)), 1.9 + 0.15 * most + 0.26 * longest)
+    around = {isa: around_panel(columns, headings[isa], len(rows[isa]), any(is_wrong(c) for c in cells if c["isa"] == isa)) for isa in tables}
+    height = sum(around[isa] + ROW * len(rows[isa]) for isa in tables) / len(tables)
+    figure, axes = panels(len(tables), 1, max(5.0, beside + wide * len(columns)), height, gridspec_kw={"height_ratios": [len(rows[isa]) for isa in tables]})
     for (isa, table), axis in zip(tables.items(), axes.flat):
         image = panel(axis, table, rows[isa], columns, headings[isa], isa + (": fastest builder, leaf and tests of each" if fastest_alone else ""))
         fastest = fastest_cells([c for c in cells if c["isa"] == isa], modes, metric)
@@ -130,6 +131,18 @@ def headings_of(columns, cells, wide):
     return found
 
 
+def around_panel(columns, headings, rows, framed):
+    """Inches above and below a panel of so many rows: headings, the scenes' names, and what is said of squares that are `framed`."""
+    names = scene_names(columns)
+    return (AROUND + LINE * max(heading.count("\n") + 1 for heading in headings) + SLANTED * max(map(len, names)) * (2 if rows > MOST_ROWS_BELOW else 1)
+            + (FRAMED if framed else 0.0))
+
+
+def scene_names(columns):
+    short_of = short_names([s for _, s in columns], LONGEST_SCENE)
+    return [short_of[s] for _, s in columns]
+
+
 def row_names(table, modes):
     structures = ordered((s for s, _ in table), "structure")
     return [(s, m) for s in structures for m in modes.labels if (s, m) in table]
@@ -156,8 +169,7 @@ def panel(axis, table, rows, columns, headings, title):
                 axis.text(x, y, f"{v:.2f}", ha="center", va="center", fontsize=8, color="white" if dark else "#222222",
                           fontweight="bold" if columns[x][1] == MEAN else "normal")
     axis.set_yticks(range(len(rows)), map(row_label, rows), fontsize=8.5)
-    short_of = short_names([s for _, s in columns], LONGEST_SCENE)
-    names = [short_of[s] for _, s in columns]
+    names = scene_names(columns)
     axis.set_xticks(range(len(columns)), names, rotation=30, ha="right", rotation_mode="anchor", fontsize=8)
     axis.tick_params(length=0)
     above = 8 + 2.4 * max(map(len, names)) if headings_above(axis, len(rows)) else 4  # points that the names take

@@ -69,6 +69,15 @@ class Labels(Drawn):
                 size = (self_intersection.SIZE - 0.1) * figure.dpi / 72
                 self.assertGreater(min(b - a for a, b in zip(at, at[1:])), 0.97 * size)
 
+    def test_panels_of_ratios_are_as_tall_as_their_rows(self):
+        for wrong, name in ((0, "bunny"), (1, "a_scene_with_a_name_that_is_long")):
+            rows = [other(w, name + s, isa=i, structure="bvh8", traversal=f"queued{k}" if k else "single", wrong_answers=wrong) for i, count in (("sse", 2), ("avx2", 7), ("avx512", 30))
+                    for k in range(count) for w in ("primary", "diffuse") for s in ("", "2")]
+            figure = self.draw(traversal_ratios, load(Folder(rows).path))
+            figure.draw_without_rendering()
+            heights = [a.get_window_extent().height / figure.dpi / n for a, n in zip(figure.axes, (2, 7, 30))]
+            self.assertTrue(all(abs(h - traversal_ratios.ROW) < 0.04 for h in heights), heights)
+
     def test_heads_of_a_single_scene_are_apart_beside_long_names_of_rows(self):
         rows = [other(w, builder=f"binned_sah:bins={bins}", intersector=i, box="padded", traversal=t) for w in ("primary", "ambient_occlusion", "diffuse")
                 for bins in (16, 32) for i in ("moller_trumbore_double", "watertight") for t in ("single", "stream_incoherent")]
