@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
-from matplotlib.ticker import FixedLocator, FuncFormatter, Locator, MaxNLocator, NullLocator  # noqa: E402
+from matplotlib.ticker import FixedLocator, FuncFormatter, Locator, MaxNLocator, NullFormatter, NullLocator  # noqa: E402
 
 from results import TooMuch, TooTall, interval_name, ordered  # noqa: E402
 from tables import per_million_text  # noqa: E402
@@ -27,7 +27,7 @@ COLOURS = {  # structures
     "bvh4_aos": "#AA4499", "grid": "#999933", "octree": "#117733", "brute_force": "#DDCC77", "embree": "#555555",
     "bvh4_quantised": "#EE8866", "bvh8_quantised": "#6699CC", "bih": "#997700", "two_level": "#004488", "bvh4_motion": "#994455",
 }
-SPARE_COLOURS = ("#77AADD", "#BBCC33", "#EE3377", "#99DDFF", "#663333", "#009988")
+SPARE_COLOURS = ("#FFAABB", "#BBCC33", "#DD00AA", "#8855DD", "#442200", "#66DD88")  # far from those of every structure and intersector
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 MODE_FACES = ("#FFFFFF", "#4477AA", "#CCBB44", "#228833", "#66CCEE", "#AA3377", "#222222")  # their number and that of MARKERS have no common divisor
 MOST_MODES = 20  # whose markers can be told apart
@@ -35,6 +35,7 @@ MORE_MARKERS = (*MARKERS, "p", "d", "h", (4, 1, 0), (6, 1, 0))  # of larger sign
 DPI = 160
 TALLEST = 8000  # pixels of a figure
 WIDEST = 17.0  # inches of scenes beside each other
+BETWEEN_TITLES = 0.25  # inches from the title of a panel to that of the next
 MOST_TICKS = 6  # of a logarithmic axis
 
 # Of fonts that have what DejaVu Sans lacks (Chinese, Japanese, Korean; then the rest of Unicode), those that are installed are asked for such characters.
@@ -136,7 +137,13 @@ def log_axis(axis, which, values, least=1.0):
     ticks = axis.xaxis if which == "x" else axis.yaxis
     ticks.set_major_locator(LogTicks(which))
     ticks.set_major_formatter(FuncFormatter(lambda v, _: plain(v)))
-    ticks.set_minor_locator(NullLocator())
+    ticks.set_minor_locator(BetweenPowers())
+    ticks.set_minor_formatter(NullFormatter())
+
+
+def round_ticks(most):
+    """Ticks of a linear axis with few digits, 5 and 10, not 2.5 and 7.5; `most` steps of them."""
+    return MaxNLocator(most, steps=[1, 2, 5, 10])
 
 
 class LogTicks(Locator):
@@ -159,7 +166,8 @@ class LogTicks(Locator):
         choices.append(within(MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(first, last)))  # where values hardly differ
         choices += [[ticks[0], ticks[-1]] for ticks in choices[-2:] if len(ticks) > 1]  # where labels are long
         fitting = [ticks for ticks in choices if len(ticks) <= MOST_TICKS and self.fit(ticks, first, last)]
-        return max(fitting, key=lambda ticks: min(3, len(ticks)), default=choices[0][:1])  # the first of three or more; else the most
+        far = lambda ticks: math.log(ticks[-1] / ticks[0]) > 0.5 * math.log(last / first) if ticks else False
+        return max(fitting, key=lambda ticks: (min(3, len(ticks)), far(ticks)), default=choices[0][:1])  # the first of three or more; else the most
 
     def fit(self, ticks, first, last):
         """Whether their labels are apart."""
@@ -169,6 +177,18 @@ class LogTicks(Locator):
         widths = [self.DIGIT * len(plain(tick)) for tick in ticks]
         return all(b - a >= (self.LINE if self.which == "y" else (v + w) / 2 + self.APART)
                    for a, b, v, w in zip(at, at[1:], widths, widths[1:]))
+
+
+class BetweenPowers(Locator):
+    """Ticks without labels at the multiples of powers of ten, where LogTicks has labelled nothing but those."""
+
+    def __call__(self):
+        first, last = sorted(self.axis.get_view_interval())
+        powers = [round(math.log10(tick)) for tick in self.axis.get_majorticklocs()]
+        if [10.0**k for k in powers] != list(self.axis.get_majorticklocs()) or any(b - a > 1 for a, b in zip(powers, powers[1:])):
+            return []
+        every = range(math.floor(math.log10(first)), math.ceil(math.log10(last)) + 1)
+        return [t for k in every for d in range(2, 10) if first <= (t := d * 10.0**k) <= last]
 
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -352,11 +372,12 @@ def panel_grid(shown, places, width, height, most_columns, least_width=None):
         width = min(width, WIDEST / most_columns)
         lines, columns, beside = lines_of(own, width, most_columns)
     figure, axes = panels(-(-len(lines) // beside), beside * columns, width, height)
-    found, names = {}, short_names(own, max(24, letters(width) - 4))
+    found, room = {}, width - BETWEEN_TITLES
+    names = short_names(own, max(24, letters(room) - 4))
     for i, (scene, line) in enumerate(lines):
         for k, place in enumerate(line):
             axis = found[scene, place] = axes[i // beside][i % beside * columns + k]
-            axis.set_title(panel_title(names[scene], places[place], width))
+            axis.set_title(panel_title(names[scene], places[place], room))
     for axis in set(axes.flat) - set(found.values()):
         axis.set_visible(False)
     return figure, found

@@ -14,7 +14,8 @@ CAPTION = ("A point is a cell; lower left is better. Wrong answers are missed hi
            "that of right answers. Where the run has the workload `hard`, accuracy is that of its rays, which are aimed at what goes wrong, and time that of "
            "ordinary rays of the same cell. Where no cell of ordinary rays has a wrong answer, the figure says so and shows the error of t, which rays of any "
            "hit (shadow rays) have none of: there are no panels of them. The grey steps join the cells that no other beats in both. Zero stands on the lowest "
-           "line, where there is one. Cells that differ in builder or way of traversal alone have the same sign; of several numbers of threads the figure shows the fewest.")
+           "line, where there is one. Cells that differ in builder or way of traversal alone have the same sign; of several numbers of threads the figure "
+           "shows the fewest.")
 
 MEASURES = (("wrong_answers", "wrong answers per million"), ("t_error_ulp_p99", "error of t, 99th percentile, ulp"))
 PANEL, LEAST_WIDTH = (4.2, 3.1), 2.8  # inches; of a panel where there would be more of them than a figure can hold

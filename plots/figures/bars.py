@@ -3,13 +3,14 @@
 from figures import squares
 from figures.names import bar_label
 from results import Cell, NoData, axis_sort_key, ordered, telling_axes
-from style import REST_COLOUR, colour, hatch, interval_legend, legends_right, panels, part_colour, part_legend, short_names, structure_legend
+from style import (REST_COLOUR, colour, hatch, interval_legend, legends_right, letters, panels, part_colour, part_legend, round_ticks, short_names,
+                   structure_legend)
 from tables import digits
 
 
-# Inches: of a panel at least; of its bars; of a character beside them.
-LEAST_WIDTH, BAR_WIDTH, CHARACTER = 5.6, 2.6, 0.068
-LEAST_REST = 0.002  # of a bar's length, that is seen
+# Inches: of a panel at least; of its bars; of a character beside them; of a bar's thickness; above and below the bars.
+LEAST_WIDTH, BAR_WIDTH, CHARACTER, BAR, AROUND = 5.6, 2.6, 0.068, 0.26, 0.9
+LEAST_REST = 0.005  # of a bar's length, that is seen
 
 
 def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None, estimate_of=None):
@@ -29,22 +30,30 @@ def bar_panels(results, value_of, axis_label, note_of, label_axes, parts_of=None
         return squares.square_panels([(names[scene], [c for c in every if c["scene"] == scene]) for scene in scenes], varied, value_of, digits, axis_label,
                                      higher_is_better=False)[0]
 
-    columns = min(2, len(scenes))
-    rows = -(-len(scenes) // columns)
-    tallest = max(len(b) for b in bars.values())
     texts = max(len(bar_label(c, varied)) + len(note_of(c)) for c in cells)
-    figure, axes = panels(rows, columns, max(LEAST_WIDTH, BAR_WIDTH + CHARACTER * texts), 0.9 + 0.26 * tallest)
-    figure.get_layout_engine().set(w_pad=0.15)
-    for index, axis in enumerate(axes.flat):
-        if index >= len(scenes):
-            axis.set_visible(False)
-            continue
-        draw_panel(axis, bars[scenes[index]], value_of, note_of, varied, parts_of)
-        axis.set_title(names[scenes[index]])
+    width = max(LEAST_WIDTH, BAR_WIDTH + CHARACTER * texts)
+    names = short_names(scenes, letters(0.6 * width))
+    figure, axes = bar_axes(bars, width)
+    for scene, axis in axes.items():
+        draw_panel(axis, bars[scene], value_of, note_of, varied, parts_of)
+        axis.set_title(names[scene])
         axis.set_xlabel(axis_label)
     legends = parts_legend("part", [(parts_of(cell), value_of(cell)[0], cell) for cell in cells]) if parts_of else []
     legends_right(figure, legends + (interval_legend(map(estimate_of, cells)) if estimate_of else []))
     return figure
+
+
+def bar_axes(bars, width):
+    """The figure and {place: axis}, two beside each other, for the bars of each of `bars`, {place: cells}: a row as tall as the most bars in it, and
+    a bar as thick in each panel."""
+    places, columns = list(bars), min(2, len(bars))
+    most = [max(len(bars[place]) for place in places[i:i + columns]) for i in range(0, len(places), columns)]
+    figure, axes = panels(len(most), columns, width, AROUND + BAR * sum(most) / len(most), gridspec_kw={"height_ratios": [n + 0.2 for n in most]})
+    figure.get_layout_engine().set(w_pad=0.15)
+    for index, axis in enumerate(axes.flat):
+        axis.set_visible(index < len(places))
+        axis.set_ylim(most[index // columns] - 0.4, -0.6)
+    return figure, dict(zip(places, axes.flat))
 
 
 def parts_legend(title, bars):
@@ -120,7 +129,7 @@ def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
             left += value
         axis.annotate(note_of(cell), (high, place), (5, 0), textcoords="offset points", va="center", fontsize=8.5)
     axis.set_yticks(range(len(cells)), [bar_label(c, varied) for c in cells])
-    axis.set_ylim(len(cells) - 0.4, -0.6)
+    axis.xaxis.set_major_locator(round_ticks(6))
     axis.set_xlim(0, 1.02 * max(value_of(c)[2] for c in cells) or 1.0)
     axis.grid(axis="y", visible=False)
 

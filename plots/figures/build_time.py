@@ -21,7 +21,7 @@ def draw(results):
 
     def note(cell):
         milliseconds, triangles = value(cell)[0], cell.value("triangles")
-        return f"{digits(milliseconds)} ms" + (f", {1e-3 * triangles / milliseconds:.2f} Mtri/s" if triangles and milliseconds > 0 else "")
+        return f"{digits(milliseconds)} ms" + (f", {digits(1e-3 * triangles / milliseconds)} Mtri/s" if triangles and milliseconds > 0 else "")
 
     return bar_panels(results, value, "build time, ms", note, ("builder", "threads", "isa", "leaf"), phases, lambda cell: cell.estimate("build_seconds"))
 

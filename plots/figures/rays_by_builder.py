@@ -1,10 +1,10 @@
 """Throughput by structure and builder: one panel a scene, workload and instruction set, a bar for each structure as built."""
 
 from figures import squares
-from figures.bars import draw_panel, scene_bars
+from figures.bars import LEAST_WIDTH, bar_axes, draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import (WRONG, edge, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, panels, short_names, wrong_legend, wrong_marker,
+from style import (WRONG, edge, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, short_names, wrong_legend, wrong_marker,
                    wrong_text)
 from tables import digits
 
@@ -50,15 +50,9 @@ def draw(results):
             figure.more_caption += " A square of a mode with wrong answers is framed red."
         legends_right(figure, wrong_legend(best))
         return figure
-    columns = min(2, len(keys))
-    figure, axes = panels(-(-len(keys) // columns), columns, 5.6, 0.9 + 0.26 * max(map(len, shown.values())))
-    figure.get_layout_engine().set(w_pad=0.15)
-
-    for index, axis in enumerate(axes.flat):
-        if index >= len(keys):
-            axis.set_visible(False)
-            continue
-        bars = shown[keys[index]]
+    figure, axes = bar_axes(shown, LEAST_WIDTH)
+    for key, axis in axes.items():
+        bars = shown[key]
         draw_panel(axis, bars, value, lambda c: digits(value(c)[0]), varied)
         for place, bar in enumerate(bars):
             for cell in groups[tuple(bar[a] for a in BUILT)] if markers else ():
@@ -66,7 +60,7 @@ def draw(results):
             if is_wrong(bar):
                 axis.annotate(wrong_text(bar), (value(bar)[2], place), (5 + 6 * len(digits(value(bar)[0])) + 6, 0), textcoords="offset points", va="center",
                               fontsize=8, color=WRONG)
-        axis.set_title(titles[keys[index]])
+        axis.set_title(titles[key])
         axis.set_xlabel(unit)
     legends = [("mode", mode_legend(markers))] if markers else []
     legends += interval_legend([bar.estimate(metric) for bar in best])

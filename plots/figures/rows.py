@@ -7,10 +7,11 @@ from figures import squares
 from figures.bars import look, parts_legend
 from figures.names import label
 from results import axis_sort_key, ordered
-from style import legends_right, panels, part_colour, short_names
+from style import legends_right, letters, panels, part_colour, short_names
 
 # Inches: of a row; above and below a panel's rows; of a character of a label; that scenes side by side may take.
-ROW, AROUND, CHARACTER, WIDEST = 0.15, 0.95, 0.062, 13.5
+ROW, AROUND, CHARACTER, WIDEST = 0.15, 0.75, 0.062, 13.5
+ABOVE = 0.2  # of the ticks above a panel
 TITLE_LINE = 0.18  # of each line of a title below the first
 MOST_STRETCH = 2.2  # of panels, where few scenes leave them room
 FONT = 7.5
@@ -65,10 +66,10 @@ def row_panels(groups, scenes, widths, room=0.0, titles=None, together=1):
     bands = -(-len(scenes) // max(together, int(WIDEST / one) // together * together))
     beside = -(-len(scenes) // (bands * together)) * together
     columns = beside * len(widths)
-    titles = titles or short_names(scenes)
+    titles = titles or short_names(scenes, max(24, letters(0.8 * one)))
     more = max(titles[scene].count("\n") for scene in scenes)
-    figure, axes = panels(bands, columns, (labels + one * beside) / columns, AROUND + TITLE_LINE * more + ROW * len(lines), sharey=True,
-                          gridspec_kw={"width_ratios": widths * beside})
+    height = AROUND + ABOVE * axes_above(lines) + TITLE_LINE * more + ROW * len(lines)
+    figure, axes = panels(bands, columns, (labels + one * beside) / columns, height, sharey=True, gridspec_kw={"width_ratios": widths * beside})
     found = {}
     for place in range(bands * beside):
         first = place % beside * len(widths)
@@ -84,13 +85,19 @@ def row_panels(groups, scenes, widths, room=0.0, titles=None, together=1):
     return figure, found
 
 
+def axes_above(lines):
+    """Whether the ticks of so many rows stand above them, too: where those below are far."""
+    return len(lines) > squares.MOST_ROWS_BELOW
+
+
 def prepare(axis, lines):
     """The labels of the rows, and the headings above their groups."""
     axis.set_yticks(range(len(lines)), [line.label if isinstance(line, Row) else line for line in lines], fontsize=FONT)
     for line, tick in zip(lines, axis.get_yticklabels()):
         tick.set_fontweight("normal" if isinstance(line, Row) else "bold")
     axis.set_ylim(len(lines) - 0.4, -0.6)
-    axis.tick_params(axis="x", labelsize=FONT, top=True, labeltop=True)
+    above = axes_above(lines)
+    axis.tick_params(axis="x", labelsize=FONT, top=above, labeltop=above)
     axis.tick_params(axis="y", length=0)
     axis.grid(axis="y", visible=False)
 
