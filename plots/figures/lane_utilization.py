@@ -27,7 +27,8 @@ def draw(results):
     modes = Modes(cells, without=HIDDEN)
     isas = ordered((c["isa"] for c in cells), "isa")
     cells, told = of_the_first(cells, lambda c: (c["structure"], label(modes, c, isas)))
-    labels = sorted({label(modes, c, isas) for c in cells})
+    drawn = {(c["isa"], modes.label(c)): label(modes, c, isas) for c in cells}
+    labels = [drawn[key] for m in modes.labels for i in isas if (key := (i, m)) in drawn]
     if len(labels) > len(MARKERS):
         raise TooMuch(f"{len(labels)} modes are too many to tell apart; choose some with --filter")
     markers = marker_map(labels, "modes")
@@ -72,4 +73,5 @@ def of_the_first(cells, line_of):
 
 
 def label(modes, cell, isas):
-    return modes.label(cell) + (f", {cell['isa']}" if len(isas) > 1 else "")
+    words = [modes.label(cell)] if len(modes.labels) > 1 or len(isas) < 2 else []
+    return ", ".join(words + ([cell["isa"]] if len(isas) > 1 else []))

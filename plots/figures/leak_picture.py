@@ -67,7 +67,7 @@ def panel(axis, seen, name, cells, boxes):
         if box not in cells:
             continue
         leaks = leak_points(cells[box])
-        counts.append(f"{box} {cells[box].per_million('cracks') or 0:,.0f}".replace(",", " "))
+        counts.append(f"{box} {cells[box].per_million('cracks') or 0:,.0f}")
         axis.plot([p[0] for p in leaks], [p[1] for p in leaks], "o", color=box_colour(box), markersize=size, markeredgewidth=0, rasterized=True, zorder=2)
     xs, ys = [p[0] for p in points], [p[1] for p in points]
     axis.set_xlim(min(xs) - 6, max(xs) + 6)

@@ -5,8 +5,8 @@ from matplotlib.lines import Line2D
 from figures import trade_offs
 from figures.modes import Modes
 from results import NoData, ordered
-from style import (WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, panel_grid, structure_legend,
-                   wrong_legend, wrong_marker, wrong_text)
+from style import (WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, panel_grid, round_ticks,
+                   structure_legend, wrong_legend, wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
 NEEDS = "rays_per_second (`metrics: [trace]`)"
@@ -42,12 +42,14 @@ def draw(results):
     for cell in cells:
         at_bars.setdefault(tuple(cell[a] for a in ("scene", "workload", "isa", "structure")), set()).add(modes.label(cell))
     bar = max(BAR, MARKER * max(map(len, at_bars.values())) if markers else 0)
-    width = min(7.0, max(3.2, bar * len(isas) * (len(structures) + 1) + 0.8))
+    of_isa = {isa: ordered((c["structure"] for c in cells if c["isa"] == isa), "structure") for isa in isas}
+    most = max(map(len, of_isa.values()))
+    width = min(7.0, max(3.2, bar * len(isas) * (most + 1) + 0.8))
     figure, axes = panel_grid([(c["scene"], c["workload"]) for c in cells], {w: w for w in workloads}, width, 2.9, 3 if width < 4.2 else 2)
     for (scene, workload), axis in axes.items():
         here = [c for c in cells if c["scene"] == scene and c["workload"] == workload]
-        slot = 72 * (width - AROUND) / len(isas) / (len(structures) + 1)  # points that a bar has
-        panel(axis, here, metric, isas, structures, modes, markers, intervals, min(LARGEST, max(LEAST, slot / LINE)))
+        slot = 72 * (width - AROUND) / len(isas) / (most + 1)  # points that a bar has
+        panel(axis, here, metric, of_isa, most, modes, markers, intervals, min(LARGEST, max(LEAST, slot / LINE)))
         axis.set_ylabel(unit, **({"fontsize": 8.5} if threads else {}))
     legends = [("structure", structure_legend(structures))]
     dot = Line2D([], [], linestyle="", color="#222222", label=f"each of {each}", **DOT)
@@ -57,10 +59,11 @@ def draw(results):
     return figure
 
 
-def panel(axis, cells, metric, isas, structures, modes, markers, intervals, number_size):
-    step = 1.0 / (len(structures) + 1)
+def panel(axis, cells, metric, of_isa, most, modes, markers, intervals, number_size):
+    """`of_isa`: {instruction set: structures that have bars there, in any panel}, `most` of them at most."""
+    step, isas = 1.0 / (most + 1), list(of_isa)
     bar = 0.86 * step
-    for group, isa in enumerate(isas):
+    for group, (isa, structures) in enumerate(of_isa.items()):
         for slot, structure in enumerate(structures):
             here = [(c, c.estimate(metric)) for c in cells if c["isa"] == isa and c["structure"] == structure]
             if not here:
@@ -84,4 +87,5 @@ def panel(axis, cells, metric, isas, structures, modes, markers, intervals, numb
     axis.set_xlim(-0.55, len(isas) - 0.45)
     longest = max((len(wrong_text(c)) for c in cells if is_wrong(c)), default=0)
     axis.set_ylim(0, axis.get_ylim()[1] / (1 - DIGIT * longest))
+    axis.yaxis.set_major_locator(round_ticks(9))
     axis.grid(axis="x", visible=False)

@@ -171,9 +171,12 @@ def panel(axis, table, rows, columns, headings, title):
     axis.set_yticks(range(len(rows)), map(row_label, rows), fontsize=8.5)
     names = scene_names(columns)
     axis.set_xticks(range(len(columns)), names, rotation=30, ha="right", rotation_mode="anchor", fontsize=8)
-    axis.tick_params(length=0)
+    axis.set_xticks([x - 0.5 for x in range(len(columns) + 1)], minor=True)
+    axis.set_yticks([y - 0.5 for y in range(len(rows) + 1)], minor=True)
+    axis.tick_params(which="both", length=0)
     above = 8 + 2.4 * max(map(len, names)) if headings_above(axis, len(rows)) else 4  # points that the names take
     axis.grid(visible=False)
+    axis.grid(which="minor", color="#E8E8E8", linewidth=0.8)
     for spine in axis.spines.values():
         spine.set_visible(False)
     first, tallest = 0, 0.0

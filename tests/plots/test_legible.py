@@ -3,6 +3,7 @@
 import html
 import importlib
 import json
+import math
 import sys
 import unittest
 
@@ -10,11 +11,14 @@ sys.dont_write_bytecode = True
 
 from made_results import SEEN, Drawn, Folder, build, hard, other, whole  # noqa: E402
 
+from matplotlib.colors import to_rgb  # noqa: E402
+
 import machine  # noqa: E402
 import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
-from figures import ALL, epo, leak_picture, rays_per_second, self_intersection, traversal_ratios  # noqa: E402
+from figures import (ALL, epo, lane_utilization, leak_picture, rays_by_builder, rays_per_second, sah_cost, sah_vs_time, self_intersection, squares, traversal_ratios,  # noqa: E402
+                     visits_per_ray)
 from results import load  # noqa: E402
 
 
@@ -111,6 +115,71 @@ class Labels(Drawn):
                      for lines in (legend.get_lines(), figure.axes[0].lines)]  # _: the ends of intervals
             self.assertEqual(looks[0], looks[1])
             self.assertEqual(len(looks[0]), len(labels))
+
+    def test_bars_of_structures_that_an_instruction_set_lacks_take_no_room(self):
+        rows = [other("primary", isa=i, structure=s) for i, own in (("sse", ("bvh8", "embree")), ("avx512", ("bvh16", "embree"))) for s in own]
+        (axis,) = self.draw(rays_per_second, load(Folder(rows).path)).axes
+        middles = sorted(round(p.get_x() + p.get_width() / 2, 6) for p in axis.patches)
+        self.assertEqual(middles, [round(group + at, 6) for group in (0, 1) for at in (-1 / 6, 1 / 6)])
+
+    def test_bars_are_as_thick_in_each_panel(self):
+        rows = [build(s, scene=scene) for scene, count in (("one", 1), ("two", 2), ("many", 9), ("last", 3)) for s in list(style.COLOURS)[:count]]
+        rows = [{**row, "name": row["name"].replace("bunny", row["scene"])} for row in rows]
+        traced = [other("primary", scene, builder=f"b{k}", wrong_answers=0) for scene, count in (("one", 1), ("two", 2), ("many", 9)) for k in range(count)]
+        for module, held, panels in ((epo, rows, 4), (rays_by_builder, traced, 3)):
+            figure = self.draw(module, load(Folder(held).path))
+            figure.draw_without_rendering()
+            shown = [axis for axis in figure.axes if axis.get_visible()]
+            self.assertEqual(len(shown), panels)
+            thick = [patch.get_window_extent().height * 72 / figure.dpi for axis in shown for patch in axis.patches]
+            self.assertLess(max(thick), 1.25 * min(thick))
+
+    def test_ticks_stand_above_rows_too_where_those_below_are_far(self):
+        for count in (2, squares.MOST_ROWS_BELOW, squares.MOST_ROWS_BELOW + 1):
+            rows = [other("primary", structure=f"bvh{k}", nodes_per_ray=k + 1.0, leaves_per_ray=1.0, boxes_per_ray=8.0, triangles_per_ray=4.0) for k in range(count)]
+            (axis,) = self.draw(visits_per_ray, load(Folder(rows).path)).axes
+            axis.figure.draw_without_rendering()
+            above = [t.label2 for t in axis.xaxis.get_major_ticks() if t.label2.get_visible() and t.label2.get_text()]
+            self.assertEqual(bool(above), count > squares.MOST_ROWS_BELOW)
+
+    def test_titles_beside_each_other_are_apart(self):
+        rows = [other("primary", "sphere_flake-100000", structure=s, isa=i, sah_cost=cost, rate=1e8 / cost) for i in ("sse", "avx2", "avx512")
+                for s, cost in (("bvh2", 30.0), ("bvh4", 20.0), ("bvh8", 15.0), ("bvh16", 10.0))]
+        figure = self.draw(sah_vs_time, load(Folder(rows).path))
+        figure.draw_without_rendering()
+        boxes = [axis.title.get_window_extent() for axis in figure.axes]
+        self.assertEqual(len(boxes), 3)
+        self.assertGreater(min(b.x0 - a.x1 for a, b in zip(boxes, boxes[1:])) / figure.dpi, 0.15)
+
+    def test_ticks_of_bars_have_few_digits(self):
+        for most in (1.9, 8, 19.0, 20, 24):
+            rows = [other("primary", rate=1e6 * most), build(sah_cost=most)]
+            for module in (rays_per_second, sah_cost):
+                (axis,) = self.draw(module, load(Folder(rows).path)).axes
+                axis.figure.draw_without_rendering()
+                labels = [t.get_text() for t in (axis.get_yticklabels() if module is rays_per_second else axis.get_xticklabels())]
+                self.assertFalse([label for label in labels if label.endswith(".5") and most > 5], labels)
+
+    def test_modes_of_lanes_are_in_the_order_of_instruction_sets(self):
+        def legend(**more):
+            rows = [other("primary", isa=i, lane_utilization_by_depth=[1.0, 0.5], visits_by_depth=[1.0, 0.5], **{k: v for k, v in zip(more, values)})
+                    for i in ("avx512", "sse", "avx2") for values in (zip(*more.values()) if more else [()])]
+            return [t.get_text() for t in self.draw(lane_utilization, load(Folder(rows).path)).legends[1].get_texts()]
+
+        self.assertEqual(legend(), ["sse", "avx2", "avx512"])
+        self.assertEqual(legend(traversal=("packet16", "packet4")), [f"{t}, {i}" for t in ("packet4", "packet16") for i in ("sse", "avx2", "avx512")])
+
+    def test_spare_colours_are_told_from_those_that_are_given(self):
+        def lab(colour):
+            linear = [((c + 0.055) / 1.055) ** 2.4 if c > 0.04045 else c / 12.92 for c in to_rgb(colour)]
+            x, y, z = (sum(a * b for a, b in zip(row, linear)) for row in ((0.4339, 0.3762, 0.1899), (0.2126, 0.7152, 0.0722), (0.0177, 0.1095, 0.8729)))
+            x, y, z = (c ** (1 / 3) if c > 0.008856 else 7.787 * c + 16 / 116 for c in (x, y, z))
+            return 116 * y - 16, 500 * (x - y), 200 * (y - z)
+
+        for own in (style.COLOURS, style.INTERSECTOR_COLOURS, {s: s for s in style.SPARE_COLOURS}):
+            for spare in style.SPARE_COLOURS:
+                near = {name: round(math.dist(lab(spare), lab(c))) for name, c in own.items() if c != spare}
+                self.assertGreater(min(near.values()), 24, (spare, near))
 
     def test_a_picture_of_leaks_says_what_was_traced(self):
         figure = self.draw(leak_picture, load(Folder(hard(), files=SEEN).path))
