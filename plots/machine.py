@@ -8,7 +8,7 @@ LABELS = {  # in the order of the report; behind them those that are new
     "isa": "instruction sets", "system": "operating system", "compiler": "compiler", "compiler_flags": "compiler flags", "build_type": "type of build",
     "version": "version of Arboretum", "embree": "Embree", "git_revision": "revision", "git_dirty": "changes that no revision holds",
     "configuration_hash": "hash of the configuration", "seed": "seed of random numbers", "shard": "shard", "cells": "cells measured",
-    "excluded_cells": "cells that `exclude` took away", "filtered_cells": "cells that --filter took away", "skipped_cells": "cells skipped",
+    "excluded_cells": "cells that exclude took away", "filtered_cells": "cells that --filter took away", "skipped_cells": "cells skipped",
     "missing_cells": "cells missing", "merged_from": "merged from"}
 ELSEWHERE = ("experiment", "warnings", "plots", "executable", "library_build_type", "command", "scenes",  # in other parts of the report
              "load_avg", "num_cpus")  # the same as others

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 import shlex
 from html import escape
 from pathlib import Path
@@ -77,7 +78,7 @@ def subtitle(results):
 def figure(results, name, module, pictures, reason):
     head = f'<h3 id="{escape(name)}">{escape(module.TITLE)}</h3>'
     if reason:
-        return f'{head}<p class="soft">Not drawn: {escape(reason)}.</p>'
+        return f'{head}<p class="soft">Not drawn: {prose(reason)}.</p>'
     shown = []
     for number, picture in enumerate(pictures, 1):
         path, kind = results.folder / f"{picture.name}.svg", "svg+xml"
@@ -87,8 +88,13 @@ def figure(results, name, module, pictures, reason):
         which = f"{number} of {len(pictures)}: {', '.join(picture.scenes)}. " if len(pictures) > 1 else ""
         words = which + (caption(results, module) if number == 1 else "As above.") + picture.more_caption
         shown.append(f'<figure><img alt="{escape(which + module.TITLE)}" src="data:image/{kind};base64,{data}">'
-                     f'<figcaption>{escape(words)}</figcaption></figure>')
+                     f'<figcaption>{prose(words)}</figcaption></figure>')
     return head + "\n".join(shown)
+
+
+def prose(text):
+    """The text escaped, with what stands between a pair of backticks as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def caption(results, module):
