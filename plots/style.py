@@ -34,6 +34,7 @@ MOST_MODES = 20  # whose markers can be told apart
 MORE_MARKERS = (*MARKERS, "p", "d", "h", (4, 1, 0), (6, 1, 0))  # of larger signs: as many as structures; the last two cannot be half filled
 DPI = 160
 TALLEST = 8000  # pixels of a figure
+PALE = 0.55  # alpha of a bar that markers stand on
 WIDEST = 17.0  # inches of scenes beside each other
 BETWEEN_TITLES = 0.25  # inches from the title of a panel to that of the next
 MOST_TICKS = 6  # of a logarithmic axis
@@ -362,11 +363,16 @@ def closed(text):
 
 def panel_grid(shown, places, width, height, most_columns, least_width=None):
     """A panel for each (scene, place) of `shown`, titled; `places`, {place: words of the title}, gives their order. A scene begins a row, or stands beside the
-    one before where all panels of both fit. A figure that would be too tall has more columns than `most_columns`, up to WIDEST, of panels that are as narrow as
+    one before where all panels of both fit; where lines of `most_columns` would end in a gap, it is one line if that is no wider than WIDEST.
+    A figure that would be too tall has more columns than `most_columns`, up to WIDEST, of panels that are as narrow as
     `least_width` where that is given. Gives the figure and {(scene, place): axis}."""
     shown = dict.fromkeys(shown)  # in order, each once
     own = {scene: [place for place in places if (scene, place) in shown] for scene in dict.fromkeys(scene for scene, _ in shown)}
     lines, columns, beside = lines_of(own, width, most_columns)
+    most = max(map(len, own.values()))
+    if most % columns and most * width <= WIDEST:  # one line of them without a gap, not several with one
+        most_columns = most
+        lines, columns, beside = lines_of(own, width, most_columns)
     while not fits(height * -(-len(lines) // beside)) and (most_columns + 1) * (least_width or width) <= WIDEST:
         most_columns += 1
         width = min(width, WIDEST / most_columns)

@@ -116,11 +116,12 @@ def scene_bars(cells, varied):
     return sorted(cells, key=lambda c: (order[c["structure"]], [axis_sort_key(a)(c[a]) for a in varied]))
 
 
-def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None):
+def draw_panel(axis, cells, value_of, note_of, varied, parts_of=None, alpha=1.0):
+    """`alpha`: of the bars, paler where markers are to be seen on them."""
     for place, cell in enumerate(cells):
         median, low, high = value_of(cell)
         parts = parts_of(cell) if parts_of else []
-        axis.barh(place, median, 0.74, **look(cell, parts), edgecolor="white", linewidth=0.5,
+        axis.barh(place, median, 0.74, **look(cell, parts), alpha=alpha, edgecolor="white", linewidth=0.5,
                   xerr=None if low == high else [[median - low], [high - median]],
                   error_kw={"elinewidth": 0.9, "ecolor": "#222222", "zorder": 3})
         left = 0.0

@@ -4,7 +4,7 @@ from figures import squares
 from figures.bars import LEAST_WIDTH, bar_axes, draw_panel, scene_bars
 from figures.modes import Modes
 from results import NoData, ordered, undetermined_axes
-from style import (WRONG, edge, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, short_names, wrong_legend, wrong_marker,
+from style import (PALE, WRONG, edge, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, short_names, wrong_legend, wrong_marker,
                    wrong_text)
 from tables import digits
 
@@ -53,7 +53,7 @@ def draw(results):
     figure, axes = bar_axes(shown, LEAST_WIDTH)
     for key, axis in axes.items():
         bars = shown[key]
-        draw_panel(axis, bars, value, lambda c: digits(value(c)[0]), varied)
+        draw_panel(axis, bars, value, lambda c: digits(value(c)[0]), varied, alpha=PALE if markers else 1.0)
         for place, bar in enumerate(bars):
             for cell in groups[tuple(bar[a] for a in BUILT)] if markers else ():
                 axis.plot(cell.estimate(metric).median / 1e6, place, linestyle="", color=edge(cell), **markers[modes.label(cell)])

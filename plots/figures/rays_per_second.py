@@ -5,7 +5,7 @@ from matplotlib.lines import Line2D
 from figures import trade_offs
 from figures.modes import Modes
 from results import NoData, ordered
-from style import (WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, panel_grid, round_ticks,
+from style import (PALE, WRONG, colour, edge, hatch, interval_legend, is_wrong, legends_right, mode_legend, mode_markers, panel_grid, round_ticks,
                    structure_legend, wrong_legend, wrong_marker, wrong_text)
 
 TITLE = "Rays per second"
@@ -70,7 +70,7 @@ def panel(axis, cells, metric, of_isa, most, modes, markers, intervals, number_s
                 continue
             x = group + (slot - (len(structures) - 1) / 2) * step
             fastest, best = max(here, key=lambda pair: pair[1].median)
-            axis.bar(x, best.median / 1e6, bar, color=colour(structure), alpha=0.55, hatch=hatch(structure), edgecolor="white",
+            axis.bar(x, best.median / 1e6, bar, color=colour(structure), alpha=PALE, hatch=hatch(structure), edgecolor="white",
                      linewidth=0.5)
             if is_wrong(fastest):
                 top = max(e.high if intervals else e.median for _, e in here) / 1e6

@@ -134,6 +134,20 @@ class Labels(Drawn):
             thick = [patch.get_window_extent().height * 72 / figure.dpi for axis in shown for patch in axis.patches]
             self.assertLess(max(thick), 1.25 * min(thick))
 
+    def test_markers_on_bars_stand_out_from_them(self):
+        rows = [other("primary", builder=b, intersector=i, rate=r * 1e6) for b in ("ploc", "morton") for i, r in (("exact", 3), ("watertight", 4))]
+        for module, rows in ((rays_by_builder, rows), (rays_per_second, rows), (rays_by_builder, rows[::2])):
+            (axis,) = self.draw(module, load(Folder(rows).path)).axes
+            self.assertEqual({p.get_alpha() for p in axis.patches}, {1.0 if len(rows) == 2 else style.PALE})
+
+    def test_lines_of_panels_have_no_gaps_where_all_panels_of_a_scene_fit_beside_each_other(self):
+        workloads = ("primary", "shadow", "ambient_occlusion", "reflection", "diffuse")
+        for count, columns in ((2, 2), (3, 3), (4, 2), (5, 5)):
+            figure = self.draw(rays_per_second, load(Folder([other(w, s) for w in workloads[:count] for s in ("bunny", "city")]).path))
+            self.assertTrue(all(axis.get_visible() for axis in figure.axes))
+            self.assertEqual(len({axis.get_subplotspec().colspan.start for axis in figure.axes}), columns)
+            self.assertLessEqual(figure.get_size_inches()[0], style.WIDEST)
+
     def test_ticks_stand_above_rows_too_where_those_below_are_far(self):
         for count in (2, squares.MOST_ROWS_BELOW, squares.MOST_ROWS_BELOW + 1):
             rows = [other("primary", structure=f"bvh{k}", nodes_per_ray=k + 1.0, leaves_per_ray=1.0, boxes_per_ray=8.0, triangles_per_ray=4.0) for k in range(count)]
@@ -197,7 +211,7 @@ class Words(Drawn):
         for name, column, metrics in (("build_time", "build_seconds", "metrics: [build]"), ("epo", "epo", "metrics: [quality]"), ("leaks_vs_distance", "cracks", "offset: [")):
             self.assertRegex(said, rf"(?m)^{name}: left out, .*; it shows .*\b{column}\b.*{metrics.replace('[', '.')}")
         self.assertEqual(folder.plot().returncode, 0)
-        self.assertIn("it shows build_seconds (`metrics: [build]`).</p>", (folder.path / "report.html").read_text())
+        self.assertIn("it shows build_seconds (<code>metrics: [build]</code>).</p>", (folder.path / "report.html").read_text())
         for name in ALL:
             self.assertTrue(importlib.import_module(f"figures.{name}").NEEDS, name)
 
@@ -221,6 +235,15 @@ class Words(Drawn):
         (axis,) = self.draw(epo, results).axes
         self.assertEqual([t.get_text() for t in axis.texts], ["2.8e-20  (LCV 3.00)", "0.0000123  (LCV 3.00)"])
         self.assertIn('data-v="2.8e-20">2.800e-20</td>', tables.structure_table(results))
+
+    def test_code_in_captions_is_marked_up(self):
+        self.assertEqual(report.prose("a `b_c: [<d>]` e `f`; g`"), "a <code>b_c: [&lt;d&gt;]</code> e <code>f</code>; g`")
+        folder = Folder(whole(), {"plots": ["sah_cost"], "excluded_cells": 3})
+        self.assertEqual(folder.plot().returncode, 0)
+        page = (folder.path / "report.html").read_text()
+        self.assertIn("own <code>traversal_cost</code> (a step at a node)", page)
+        self.assertIn("cells that exclude took away", page)
+        self.assertIn("#fastest td:last-child { white-space: normal", page)
 
     def test_figures_do_not_dazzle_on_a_dark_page(self):
         page = report.write(load(Folder(whole()).path), []).read_text()
