@@ -25,11 +25,12 @@ WIDTH, TITLE_LETTER = 6.5, 0.09  # inches: of what is beside the labels; that a 
 
 def labels(cells):
     """What tells the cells apart, and the rest once for all."""
+    from figures.names import label
     from results import AXES
 
     varying = [axis for axis in AXES if len({cell[axis] for cell in cells}) > 1]
-    constant = [str(cells[0][axis]) for axis in AXES if axis not in varying and cells[0][axis] not in ("-", 1)]
-    return ["  ".join(str(cell[axis]) for axis in varying if cell[axis] != "-") or cell["structure"] for cell in cells], ", ".join(constant)
+    constant = [label(axis, str(cells[0][axis])) for axis in AXES if axis not in varying and cells[0][axis] not in ("-", 1)]
+    return ["  ".join(label(axis, str(cell[axis])) for axis in varying if cell[axis] != "-") or cell["structure"] for cell in cells], ", ".join(constant)
 
 
 def rows_of(comparison, metric):
@@ -75,7 +76,7 @@ def heads(comparison):
 def draw(comparison):
     import style
     from matplotlib.lines import Line2D
-    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator
 
     controls = comparison.get("control") or {}
     parts = [(title, *rows_of(comparison, metric), "B over A" + (", relative to the control" if TOTALS[metric] in controls else ""))
@@ -102,7 +103,7 @@ def draw(comparison):
         axis.set_xlim(low, high)
         if high / low > 4:
             axis.set_xscale("log")
-            axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.xaxis.set_major_locator(style.LogTicks("x"))
             axis.xaxis.set_minor_locator(NullLocator())
         else:
             axis.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))

@@ -14,12 +14,13 @@ from made_results import SEEN, Drawn, Folder, build, hard, other, whole  # noqa:
 from matplotlib.colors import to_rgb  # noqa: E402
 
 import machine  # noqa: E402
+import ratios  # noqa: E402
 import report  # noqa: E402
 import style  # noqa: E402
 import tables  # noqa: E402
 from figures import (ALL, epo, lane_utilization, leak_picture, rays_by_builder, rays_per_second, sah_cost, sah_vs_time, self_intersection, squares, traversal_ratios,  # noqa: E402
                      visits_per_ray)
-from results import load  # noqa: E402
+from results import AXES, load  # noqa: E402
 
 
 class Labels(Drawn):
@@ -205,6 +206,14 @@ class Labels(Drawn):
 
 
 class Words(Drawn):
+    def test_a_comparison_calls_threads_so(self):
+        def cells(*threads):
+            return [{**{axis: "-" for axis in AXES}, "structure": "bvh8", "workload": w, "threads": t} for w in ("primary", "diffuse") for t in threads]
+
+        self.assertEqual(ratios.labels(cells(1, 2)), (["primary  1 thread", "primary  2 threads", "diffuse  1 thread", "diffuse  2 threads"], "bvh8"))
+        self.assertEqual(ratios.labels(cells(1)), (["primary", "diffuse"], "bvh8"))
+        self.assertEqual(ratios.labels(cells(4)), (["primary", "diffuse"], "bvh8, 4 threads"))
+
     def test_a_figure_without_data_says_what_it_shows_and_what_makes_it(self):
         folder = Folder([other("primary")], {"plots": ["build_time", "leaks_vs_distance"]})
         said = folder.plot("--only", ",".join(ALL), "--no-report").stdout
