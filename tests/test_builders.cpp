@@ -81,6 +81,73 @@ TEST_CASE("every builder: degenerate meshes") {
   }
 }
 
+TEST_CASE("embree_high: meshes that once ended the process in an assertion of Embree's") {
+  const auto& names = binary_builder_names();
+  if (std::ranges::find(names, "embree_high") == names.end()) return;
+  // Found by chance: some triangles have two equal corners, and where a plane is at 0 in a set as large as 2^40, parts
+  // of others are beyond it by less than an ulp of the set. Embree cuts them without having counted them.
+  TriangleMesh equal_corners;
+  equal_corners.vertices = {{1, 0x1p-126f, 0x1p-75f},
+                            {0x1p-126f, 0x1p-40f, 0x1p40f},
+                            {0x1.fffffep-1f, 0x1p-40f, 0x1p-149f},
+                            {1, 0x1p-40f, 0x1p-127f},
+                            {-0.0f, -0x1p40f, 0},
+                            {-0x1p-149f, 0x1p-127f, 0},
+                            {0x1p40f, 0x1.fffffep-1f, 0x1p40f},
+                            {3, -1, 0x1.fffffep-1f},
+                            {-0x1p40f, 3, 0x1.000002p0f},
+                            {-1, 0, 0x1.fffffep-1f},
+                            {0x1.fffffep-1f, -0.0f, 0},
+                            {-0x1p40f, -1, 0x1p-126f},
+                            {-1, -0x1p40f, -1},
+                            {-1, 0x1.000002p0f, -0x1p40f},
+                            {0x1p40f, 0x1.000002p0f, -0x1p-149f},
+                            {-0x1p-149f, 0x1p40f, -0x1p40f},
+                            {-0x1p-149f, -1, -0.0f},
+                            {0x1p-127f, 0x1p40f, 0x1.000002p0f},
+                            {0x1p-75f, 0x1p-75f, -0x1p40f},
+                            {-0x1p-149f, -0x1p40f, 0x1p-126f},
+                            {1, -0x1p-149f, -0x1p40f},
+                            {0x1p40f, 0x1p-40f, -0.0f},
+                            {-1, 0x1p40f, 1}};
+  equal_corners.triangles = {
+      {16, 11, 16}, {20, 12, 12}, {17, 4, 3},   {21, 15, 19}, {11, 11, 0}, {19, 1, 17},  {15, 1, 14},  {5, 2, 7},
+      {19, 22, 22}, {21, 5, 1},   {21, 13, 6},  {3, 3, 8},    {16, 19, 2}, {10, 4, 10},  {4, 11, 3},   {7, 17, 1},
+      {17, 6, 22},  {6, 14, 3},   {20, 18, 10}, {6, 9, 11},   {1, 2, 19},  {17, 17, 5},  {2, 14, 1},   {14, 14, 0},
+      {3, 22, 15},  {15, 12, 15}, {16, 19, 21}, {7, 18, 1},   {8, 17, 15}, {17, 19, 22}, {19, 2, 2},   {15, 22, 13},
+      {13, 5, 2},   {17, 13, 21}, {10, 16, 8},  {19, 11, 14}, {11, 5, 20}, {5, 3, 13},   {15, 18, 11}, {22, 3, 14},
+      {17, 9, 8},   {2, 16, 21},  {12, 12, 12}, {3, 1, 16},   {3, 19, 1},  {20, 7, 8}};
+  TriangleMesh mixed;
+  mixed.vertices = {
+      {-0x1.0e2b58p-1f, 0x1p40f, 1},  {-0x1.138c1ep-2f, 0x1p-127f, -1}, {0x1.7d1126p-1f, -0.0f, 3},
+      {0x1.356e4cp-3f, -1, 4},        {0x1.b1a276p-2f, -0x1p40f, 4},    {0x1.c63d5p-5f, -1, -3},
+      {0x1.dd522ep-6f, 0x1p40f, -3},  {0x1.1415cap-4f, 0x1p-40f, 2},    {0x1.af0d88p-3f, 0x1.fffffep-1f, 3},
+      {-0x1.073ceap-4f, 0x1p40f, 4},  {-0x1.24f1c2p-1f, -1, 0},         {-0x1.b81c76p-1f, 0x1p40f, -4},
+      {0x1.408a36p-1f, 0x1p-149f, -2}};
+  mixed.triangles = {{11, 5, 12}, {11, 2, 8}, {10, 11, 5}, {8, 3, 5},  {8, 12, 11}, {10, 12, 8}, {12, 2, 1},
+                     {3, 6, 7},   {7, 11, 0}, {0, 7, 7},   {9, 6, 0},  {10, 11, 8}, {7, 5, 0},   {2, 12, 3},
+                     {5, 2, 8},   {0, 7, 9},  {0, 9, 4},   {12, 4, 9}, {5, 6, 9},   {8, 0, 7},   {7, 11, 7},
+                     {2, 12, 7},  {11, 3, 4}, {3, 7, 5},   {1, 0, 4},  {10, 2, 5}};
+  // A large triangle around small ones that the plane through its middle meets: they took its part's room.
+  TriangleMesh around_small;
+  around_small.vertices = {{-0x1p40f, -0x1p40f, 0}, {0x1p40f, 0x1p40f, 0}, {-0x1p40f, 0x1p40f, 1}};
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    const float x = float(i) - 6;
+    around_small.vertices.insert(around_small.vertices.end(), {{-1, x, 0}, {1, x + 3, 1}, {-1, x + 1, 2}});
+  }
+  for (std::uint32_t i = 13; i-- > 0;) around_small.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  for (const TriangleMesh& mesh : {equal_corners, mixed, around_small}) {
+    for (const unsigned leaf_width : {1u, 4u, 8u}) {
+      for (const float traversal_cost : {0.001f, 0.1f, 1.0f}) {
+        INFO(mesh.size() << " triangles, leaves of " << leaf_width << ", a node costs " << traversal_cost);
+        BuilderParameters parameters;
+        parameters.traversal_cost = traversal_cost;
+        check_tree(build("embree_high", mesh, leaf_width, 1, best_isa(), parameters), mesh, leaf_width, true);
+      }
+    }
+  }
+}
+
 TEST_CASE("every builder: a million equal triangles end in a shallow tree") {
   const TriangleMesh mesh = repeated(random_triangles(1, 0.5f, 1), 1000000);
   for (const std::string_view builder : binary_builder_names()) {

@@ -10,8 +10,10 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <functional>
 #include <memory>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -22,7 +24,7 @@
 #include "core/coordinates.h"
 #include "core/error.h"
 #include "core/memory_meter.h"
-#include "structures/builders/clip.h"
+#include "structures/builders/embree_splits.h"
 #include "structures/builders/linked_tree.h"
 #include "structures/builders/phase_clock.h"
 
@@ -33,11 +35,13 @@ constexpr unsigned kMaxDepth = 128;    ///< deeper down Embree halves ranges wit
 constexpr float kLargest = 1.844e18f;  ///< Embree's own bound on coordinates
 constexpr std::size_t kGrain = 1u << 12;
 
-/// What the callbacks make, in Embree's memory. A leaf has no children.
+/// What the callbacks make, in Embree's memory. A leaf has no children; it may have no references.
 struct Node {
   Bounds3f box[2];  ///< the children's; a leaf's own in the first
   Node* child[2];
   std::uint32_t count;  ///< a leaf's references, which stand behind it
+  [[nodiscard]] bool is_leaf() const noexcept { return child[0] == nullptr; }
+  [[nodiscard]] bool is_empty() const noexcept { return is_leaf() && count == 0; }
   [[nodiscard]] std::uint32_t* ids() noexcept { return reinterpret_cast<std::uint32_t*>(this + 1); }
   [[nodiscard]] const std::uint32_t* ids() const noexcept { return reinterpret_cast<const std::uint32_t*>(this + 1); }
 };
@@ -72,28 +76,38 @@ void* create_leaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* pr
   return leaf;
 }
 
-/// What of a part of a triangle lies on either side of a plane: the triangle clipped to the side, within the part's
-/// box, as Embree clips its own triangles.
+/// What the split callback reads. Embree hands it a reference itself to be cut, and a copy while it counts parts.
+struct SplitContext {
+  SplitContext(const TriangleMesh& mesh, const MeteredVector<RTCBuildPrimitive>& references)
+      : splits(mesh), begin(references.data()), end(references.data() + references.size()) {}
+
+  EmbreeSplits splits;
+  const RTCBuildPrimitive *begin, *end;
+  [[nodiscard]] bool holds(const RTCBuildPrimitive* primitive) const noexcept {
+    return !std::less<>()(primitive, begin) && std::less<>()(primitive, end);
+  }
+};
+
 void split_primitive(const RTCBuildPrimitive* primitive, unsigned dimension, float position, RTCBounds* left,
-                     RTCBounds* right, void* mesh) {
+                     RTCBounds* right, void* context) {
+  auto& c = *static_cast<SplitContext*>(context);
   const RTCBuildPrimitive& p = *primitive;
   const Bounds3f box{{p.lower_x, p.lower_y, p.lower_z}, {p.upper_x, p.upper_y, p.upper_z}};
-  const auto corners = static_cast<const TriangleMesh*>(mesh)->corners(p.primID);
   Bounds3f low, high;
-  clip_by_plane(corners, int(dimension), position, low, high);
-  const auto side = [&](const Bounds3f& part, RTCBounds& out) {
-    const Vec3f lower = max(part.lower, box.lower), upper = min(part.upper, box.upper);
-    out = {lower.x, lower.y, lower.z, 0.0f, upper.x, upper.y, upper.z, 0.0f};
+  c.splits.split(p.primID, box, int(dimension), position, !c.holds(primitive), low, high);
+  const auto write = [](const Bounds3f& b, RTCBounds& out) {
+    out = {b.lower.x, b.lower.y, b.lower.z, 0.0f, b.upper.x, b.upper.y, b.upper.z, 0.0f};
   };
-  side(low, *left), side(high, *right);
+  write(low, *left), write(high, *right);
 }
 
-/// Embree's tree as ours.
+/// Embree's tree as ours. Where a child is an empty leaf, its sibling stands for the node.
 class Reader {
  public:
-  Reader(const Node& root, LinkedTree& out) : out_(out) {
+  Reader(const Node& top, LinkedTree& out) : out_(out) {
+    const Node& root = filled(top);
     Bounds3f box = root.box[0];
-    if (root.count == 0) box.extend(root.box[1]);
+    if (!root.is_leaf()) box.extend(root.box[1]);
     count(root);
     out_.nodes.resize(nodes_), out_.primitives.resize(references_);
     nodes_ = references_ = 0;
@@ -101,20 +115,27 @@ class Reader {
   }
 
  private:
+  static const Node& filled(const Node& top) noexcept {
+    const Node* node = &top;
+    while (!node->is_leaf() && (node->child[0]->is_empty() || node->child[1]->is_empty()))
+      node = node->child[node->child[0]->is_empty() ? 1 : 0];
+    return *node;
+  }
+
   void count(const Node& node) noexcept {
     ++nodes_, references_ += node.count;
-    if (node.count == 0) count(*node.child[0]), count(*node.child[1]);
+    if (!node.is_leaf()) count(filled(*node.child[0])), count(filled(*node.child[1]));
   }
 
   std::uint32_t copy(const Node& node, const Bounds3f& box) noexcept {
     const std::uint32_t index = nodes_++;
-    if (node.count > 0) {
+    if (node.is_leaf()) {
       std::copy_n(node.ids(), node.count, out_.primitives.begin() + references_);
       out_.nodes[index] = LinkedNode::leaf(box, references_, node.count);
       references_ += node.count;
     } else {
-      const std::uint32_t left = copy(*node.child[0], node.box[0]);
-      out_.nodes[index] = LinkedNode::inner(box, left, copy(*node.child[1], node.box[1]));
+      const std::uint32_t left = copy(filled(*node.child[0]), node.box[0]);
+      out_.nodes[index] = LinkedNode::inner(box, left, copy(filled(*node.child[1]), node.box[1]));
     }
     return index;
   }
@@ -169,8 +190,11 @@ void build(RTCBuildQuality quality, const TriangleMesh& mesh, const BuilderParam
     arguments.primitives = primitives.data(), arguments.primitiveCount = n, arguments.primitiveArrayCapacity = capacity;
     arguments.createNode = &create_node, arguments.createLeaf = &create_leaf;
     arguments.setNodeChildren = &set_children, arguments.setNodeBounds = &set_bounds;
-    if (spatial) arguments.splitPrimitive = &split_primitive;
-    arguments.userPtr = const_cast<TriangleMesh*>(&mesh);
+    std::optional<SplitContext> context;
+    if (spatial) {
+      context.emplace(mesh, primitives);
+      arguments.splitPrimitive = &split_primitive, arguments.userPtr = &*context;
+    }
     auto* root = static_cast<Node*>(rtcBuildBVH(&arguments));  // works in the caller's arena
     if (!root)
       throw std::runtime_error("embree: rtcBuildBVH failed, error " +
