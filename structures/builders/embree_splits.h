@@ -1,5 +1,6 @@
-// EmbreeSplits: the parts of triangles that Embree's spatial-split builder asks for, such that it never makes a child
-// without a reference, where it may not go on (with assertions on, as Debian builds it, it ends the process).
+// EmbreeSplits: the parts of triangles that Embree's spatial-split builder asks for, such that it makes no child
+// without a reference, where it may not go on (with assertions on, as Debian builds it, it ends the process): but for
+// rare sets (docs/structures.md).
 //
 // Embree cuts a set twice. First it cuts every reference at all planes between the bins, counts on which sides of each
 // plane there are parts, and chooses a plane; then it cuts at that plane what has something on both sides of it, as
