@@ -115,6 +115,15 @@ def step_library():
 
 def step_structure():
     configure(SOURCE / "examples/structure", WORK / "structure of the build tree", f"-Darboretum_DIR={BUILD}")
+    misspelt = WORK / "misspelt"
+    shutil.rmtree(misspelt, ignore_errors=True)
+    shutil.copytree(SOURCE / "examples/structure", misspelt)
+    said = misspelt / "sorted_boxes/sorted_boxes_parameters.h"
+    text = said.read_text()
+    for name in ("builder_parameters", "builder_summary", "own_parameters"):
+        said.write_text(text.replace(f" {name}(", f" {name}s("))
+        error = " ".join(configure(misspelt, misspelt / "build", f"-Darboretum_DIR={BUILD}", expect=1).stderr.split())
+        check(f"sorted_boxes_parameters.h: {name}s(std::type_identity<...>) would never be called" in error, f"{name}s: {error}")
     folder = WORK / "structure"
     configure(PREFIX / "share/arboretum/examples/structure", folder, f"-DCMAKE_PREFIX_PATH={PREFIX}")
     build(folder)
