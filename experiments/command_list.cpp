@@ -76,7 +76,7 @@ Json axis_entries(Axis axis, const Registry& registry) {
   return entries;
 }
 
-/// Of builders and of ways of traversal; `most`: names of readers in a row.
+/// Of builders and of ways of traversal; `most` as readers_of() takes it.
 Json parameter_entries(const Registry& registry, std::size_t most) {
   Json entries = Json::array();
   for (const std::string& name : parameter_names()) {
@@ -166,16 +166,9 @@ Json promise_entries(const Registry& registry) {
 std::string remark(const Json& entry) {
   std::string line = entry["summary"].get<std::string>();
   if (entry.contains("builders") && !entry["builders"].empty()) {
-    constexpr std::string_view kAgain = "_reinsertion";
     const std::vector<std::string> names = entry["builders"];
-    std::vector<std::string> again, once;  // followed by reinsertion as well, which is not named by itself; others
-    for (const std::string& name : names) {
-      const auto is_there = [&](const std::string& other) { return std::ranges::find(names, other) != names.end(); };
-      if (name.ends_with(kAgain) && is_there(name.substr(0, name.size() - kAgain.size()))) continue;
-      (is_there(name + std::string(kAgain)) ? again : once).push_back(name);
-    }
-    const std::string words = again.empty() ? "" : fmt::format("{}, also as …{}", fmt::join(again, " "), kAgain);
-    line += fmt::format(" [builders: {}{}{}]", words, again.empty() || once.empty() ? "" : "; ", fmt::join(once, " "));
+    line +=
+        fmt::format(" [builders: {}]", folded_builders(std::vector<std::string_view>(names.begin(), names.end()), " "));
   }
   if (entry.contains("values"))
     line += fmt::format(" [{}; default: {}; read by {}]", entry["values"].get<std::string>(),
@@ -216,7 +209,7 @@ ExitStatus command_list(const std::string& wanted, bool json) {
       document[plural(axis)] = axis_entries(axis, registry);
   }
   if (wanted.empty() || wanted == "parameters" || wanted == "parameter")
-    document["parameters"] = parameter_entries(registry, json ? ~std::size_t{0} : 4);
+    document["parameters"] = parameter_entries(registry, json ? Registry::kAll : 4);
   if (wanted.empty() || wanted == "scenes" || wanted == "scene") document["scenes"] = scene_entries();
   if (wanted.empty() || wanted == "effects" || wanted == "effect") document["effects"] = effect_entries();
   if (wanted.empty() || wanted == "promises" || wanted == "promise") document["promises"] = promise_entries(registry);

@@ -41,13 +41,28 @@ bool Registry::reads(std::string_view parameter, std::string_view name, std::str
 
 namespace {
 
-std::string listed(std::span<const std::string_view> names, std::size_t most) {
+constexpr std::string_view kReinsertion = "_reinsertion";
+
+std::string listed(std::span<const std::string_view> names, std::string_view separator, std::size_t most) {
   const std::size_t shown = std::min(names.size(), most);
-  const std::string words = fmt::format("{}", fmt::join(names.first(shown), ", "));
+  const std::string words = fmt::format("{}", fmt::join(names.first(shown), separator));
   return shown == names.size() ? words : fmt::format("{} and {} more", words, names.size() - shown);
 }
 
 }  // namespace
+
+std::string folded_builders(std::span<const std::string_view> names, std::string_view separator, std::size_t most) {
+  const auto is_there = [&](std::string_view name) { return std::ranges::find(names, name) != names.end(); };
+  std::vector<std::string_view> again, once;
+  for (std::string_view name : names) {
+    if (name.ends_with(kReinsertion) && is_there(name.substr(0, name.size() - kReinsertion.size()))) continue;
+    (is_there(std::string(name) + std::string(kReinsertion)) ? again : once).push_back(name);
+  }
+  std::string words = listed(again, separator, most);
+  if (!again.empty()) words += fmt::format(", also as …{}", kReinsertion);
+  if (!again.empty() && !once.empty()) words += "; ";
+  return words + listed(once, separator, most);
+}
 
 std::string Registry::readers_of(std::string_view parameter, std::size_t most) const {
   using Names = std::vector<std::string_view>;
@@ -58,7 +73,13 @@ std::string Registry::readers_of(std::string_view parameter, std::size_t most) c
     for (std::string_view builder : entry.info.builders)
       if (reads(parameter, entry.info.name, builder, "")) builders.push_back(builder);
     if (builders.empty()) continue;
-    if (builders.size() == entry.info.builders.size()) builders.clear();
+    if (builders.size() == entry.info.builders.size()) {
+      builders.clear();
+    } else if (most != kAll && std::ranges::all_of(entry.info.builders, [&](std::string_view builder) {
+                 return builder.ends_with(kReinsertion) == (std::ranges::find(builders, builder) != builders.end());
+               })) {
+      builders = {"…_reinsertion"};
+    }
     const auto group = std::ranges::find(groups, builders, &std::pair<Names, Names>::first);
     if (group == groups.end())
       groups.push_back({builders, {entry.info.name}});
@@ -68,8 +89,12 @@ std::string Registry::readers_of(std::string_view parameter, std::size_t most) c
   std::string words;
   for (const auto& [builders, structures] : groups) {
     if (!words.empty()) words += "; ";
-    words += builders.empty() ? listed(structures, most)
-                              : fmt::format("{} ({})", listed(builders, most), listed(structures, most));
+    const std::string where = listed(structures, ", ", most);
+    words +=
+        builders.empty()
+            ? where
+            : fmt::format("{} ({})",
+                          most == kAll ? listed(builders, ", ", most) : folded_builders(builders, ", ", most), where);
   }
   return words.empty() ? "nothing in this build" : words;
 }

@@ -44,9 +44,15 @@ struct Registry {
   [[nodiscard]] bool reads(std::string_view parameter, std::string_view structure, std::string_view builder,
                            std::string_view below) const;
   /// Who reads the builder parameter: "ploc (bvh2, bvh4); kdtree, octree", the latter with any builder. Of a list of
-  /// more than `most` names the first, and how many more there are.
-  [[nodiscard]] std::string readers_of(std::string_view parameter, std::size_t most = ~std::size_t{0}) const;
+  /// more than `most` names the first, and how many more there are; then builders are named as by folded_builders().
+  [[nodiscard]] std::string readers_of(std::string_view parameter, std::size_t most = kAll) const;
+  static constexpr std::size_t kAll = ~std::size_t{0};
 };
+
+/// Builders as a person reads them, at most `most` by name: "ploc, morton, also as …_reinsertion; in_order": what is
+/// there with reinsertion behind it, too, is named once.
+[[nodiscard]] std::string folded_builders(std::span<const std::string_view> names, std::string_view separator,
+                                          std::size_t most = Registry::kAll);
 
 /// What this build and this machine have.
 [[nodiscard]] Registry this_registry();

@@ -461,10 +461,10 @@ class CommandLine(CommandLineCase):
         self.assertNotIn("ploc_radius", read["bvh8"]["binned_sah"])
         bins = next(p for p in listed["parameters"] if p["name"] == "bins")
         self.assertEqual((bins["values"], bins["default"]), ("an integer from 4 to 64", "32"))
-        self.assertIn("binned_sah", bins["readers"])
+        self.assertIn("binned_sah, spatial_sah, binned_sah_reinsertion, spatial_sah_reinsertion (bih, bvh2, ", bins["readers"])
         self.assertEqual([p["name"] for p in listed["parameters"] if not p["readers"]], [])
         text = {line.split()[0]: line for line in self.call("list", "parameters").stdout.splitlines()}
-        for name, readers in (("bins", "bvh8 and 5 more); binned_sah (kdtree)]"), ("max_depth", "read by kdtree, octree]"), ("rays_in_flight", "read by queued]")):
+        for name, readers in (("bins", "read by binned_sah, spatial_sah, also as …_reinsertion (bih, bvh2, bvh4, bvh8 and 5 more); binned_sah (kdtree)]"), ("reinsertion_rounds", "read by …_reinsertion (bih, bvh2, bvh4, bvh8 and 5 more)]"), ("max_depth", "read by kdtree, octree]"), ("rays_in_flight", "read by queued]")):
             self.assertTrue(text[name].endswith(readers), text[name])
         self.assertEqual(next(b for b in listed["builders"] if b["name"] == "uniform")["parameters"], {"grid": ["grid_density"], "two_level": read["two_level"]["uniform"]})
 
