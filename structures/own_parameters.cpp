@@ -72,6 +72,11 @@ std::unique_ptr<Accel> create_structure(const StructureEntry& entry, const Build
       check_parameter(*known, value);
       builders->set(*accel, std::size_t(known - builders->own.begin()), value);
     } else if (!entry.info.takes_below) {
+      if (std::ranges::find(builder_parameter_table(), name, &Parameter<BuilderParameters>::name) !=
+          builder_parameter_table().end())
+        throw UserError(std::string(entry.info.name) + ": '" + name +
+                        "' is none of its own parameters, but one of all: set parameters." + name +
+                        ", not parameters.own");
       std::vector<std::string> names;
       for (const OwnParameter& parameter : builders->own) names.emplace_back(parameter.name);
       throw UserError(std::string(entry.info.name) + ": " +

@@ -101,7 +101,7 @@ std::string parameters_of(const StructureInfo& info, const BuildSettings& settin
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
-  throw UserError(file.string() + ": " + why);
+  throw UserError((file.empty() ? "a path without a name" : file.string()) + ": " + why);
 }
 
 /// What a header is wrong in, before anything behind it is looked at.

@@ -279,6 +279,7 @@ TEST_CASE("a saved tracer answers as the one that was built, and a file says wha
   TracerSettings beyond = settings;
   beyond.parameters.bins = 1000;
   CHECK_THAT(refused(sphere(40), beyond), Catch::Contains("bins: 1000 is not within 4 .. 64"));
+  CHECK_THAT(error_of([&] { built.save(""); }), Catch::StartsWith("a path without a name: cannot be written"));
   CHECK_THAT(error_of([&] { built.save(folder / "none" / "sphere.arbotree"); }), Catch::Contains("cannot be written"));
 }
 

@@ -161,6 +161,8 @@ TEST_CASE("values arrive in the build") {
   CHECK(refusal({{"toy_order", 2u}}) == "toy_order: '2' is not a word");
   CHECK_THAT(refusal({{"toy_step", 2u}}), Catch::Contains("toy: ") && Catch::Contains("did you mean 'toy_steps'"));
   CHECK_THAT(refusal({{"toy_steps", 2u}}, "mute"), Catch::Contains("mute: it has no parameters of its own"));
+  for (const char* structure : {"toy", "mute"})
+    CHECK_THAT(refusal({{"bins", 8u}}, structure), Catch::Contains("set parameters.bins, not parameters.own"));
 }
 
 TEST_CASE("a structure that stands above others hands them on") {
