@@ -32,6 +32,7 @@
 #pragma once
 
 #include "intersectors/triangle_hits.h"
+#include "simd/swizzle.h"
 
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
@@ -48,6 +49,18 @@ ARBORETUM_INLINE bool is_valid_in_lanes(const Ray& ray) {
 /// What a batch reports for a ray.
 ARBORETUM_INLINE Hit to_hit(const NearestHit& best) {
   return best.primitive != NearestHit::kNone ? Hit{best.t, best.u, best.v, std::uint32_t(best.primitive)} : Hit{};
+}
+
+/// The same of a hit that has stood in memory for a while, without a branch: where the rays of a picture begin to miss
+/// everything cannot be foretold.
+ARBORETUM_INLINE Hit stored_to_hit(const NearestHit& best) {
+  static_assert(sizeof(NearestHit) == 16 && sizeof(Hit) == 16);
+  const Hit nothing{};
+  const auto stored = vf<4>::load(&best);
+  const vm<4> missed = permute_in_fours<3, 3, 3, 3>(stored).as_int() == vi<4>(NearestHit::kNone);
+  Hit hit;
+  select(missed, vf<4>::load(&nothing), stored).store(&hit);
+  return hit;
 }
 
 /// A block as intersectors read it: itself, or the vertices that its indices name.

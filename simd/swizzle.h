@@ -126,6 +126,28 @@ ARBORETUM_INLINE vf<lanes_for(N)> load_first(const void* p) {
   }
 }
 
+/// op over the lanes of `a` that are equal modulo four.
+template <int W, class Op>
+ARBORETUM_INLINE vf<4> fold_to_four(vf<W> a, Op op) {
+  if constexpr (W == 4) {
+    return a;
+  } else {
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR
+    vf<4> all = vf<4>::load(a.lane);
+    for (int k = 4; k < W; k += 4) all = op(all, vf<4>::load(a.lane + k));
+    return all;
+#else
+#if ARBORETUM_TARGET >= ARBORETUM_TARGET_AVX2
+    if constexpr (W == 8) return op(vf<4>(_mm256_castps256_ps128(a.v)), vf<4>(_mm256_extractf128_ps(a.v, 1)));
+#endif
+#if ARBORETUM_TARGET == ARBORETUM_TARGET_AVX512
+    if constexpr (W == 16) return fold_to_four(op(lower_half(a), upper_half(a)), op);
+#endif
+    if constexpr (requires { a.lo; }) return fold_to_four(op(a.lo, a.hi), op);
+#endif
+  }
+}
+
 /// Rows to columns: lane k of row i becomes lane i of row k.
 ARBORETUM_INLINE void transpose(vf<4> (&row)[4]) {
 #if ARBORETUM_TARGET == ARBORETUM_TARGET_SCALAR

@@ -32,18 +32,23 @@ struct LaneRays {
   }
 
  private:
+  /// Of rays k to k + `last`, the last one again where that is fewer than four.
+  template <class RayAt>
+  ARBORETUM_INLINE void place_four(int k, int last, const RayAt& ray_at) {
+    vf<4> low[4], high[4];
+    for (int j = 0; j < 4; ++j) {
+      const Ray& ray = ray_at(k + (j < last ? j : last));
+      low[j] = vf<4>::load(&ray.origin), high[j] = vf<4>::load(&ray.direction);
+    }
+    transpose(low), transpose(high);
+    for (int a = 0; a < 3; ++a) low[a].store(rays.origin[a] + k), high[a].store(rays.direction[a] + k);
+    low[3].store(rays.tnear + k), high[3].store(t + k);
+  }
   template <class RayAt>
   ARBORETUM_INLINE void place(int count, const RayAt& ray_at) {
-    for (int k = 0; k < count; k += 4) {
-      vf<4> low[4], high[4];
-      for (int j = 0; j < 4; ++j) {
-        const Ray& ray = ray_at(k + j < count ? k + j : count - 1);
-        low[j] = vf<4>::load(&ray.origin), high[j] = vf<4>::load(&ray.direction);
-      }
-      transpose(low), transpose(high);
-      for (int a = 0; a < 3; ++a) low[a].store(rays.origin[a] + k), high[a].store(rays.direction[a] + k);
-      low[3].store(rays.tnear + k), high[3].store(t + k);
-    }
+    int k = 0;
+    for (; k + 4 <= count; k += 4) place_four(k, 3, ray_at);
+    if (k < count) place_four(k, count - 1 - k, ray_at);
     // A register may be wider than four rays.
     for (int i = (count + 3) & ~3; i < kMost && (i & 15) != 0; ++i) {
       for (int a = 0; a < 3; ++a) rays.origin[a][i] = rays.direction[a][i] = 0.0f;

@@ -15,19 +15,26 @@
 namespace arboretum {
 namespace ARBORETUM_ISA_NAMESPACE {
 
+/// The smallest and the largest of some values by axis, in the first three lanes.
+struct AxisBounds {
+  vf<4> low, high;
+  /// The largest |value|.
+  [[nodiscard]] ARBORETUM_INLINE vf<4> largest() const { return max_x86(-low, high); }
+};
+
 /// Origins and directions of a packet by axis: centre and half extent, rounded up.
 struct PacketInterval {
-  float origin[3], origin_half[3], direction[3], direction_half[3];
+  alignas(16) float origin[4], origin_half[4], direction[4], direction_half[4];
   float reach = 0.0f;  ///< how far the rays' origins are at most (sum over the axes) from points on their lines that
                        ///< stand in `origin` instead
 
-  void set_axis(int a, float o_low, float o_high, float d_low, float d_high) {
-    const auto half = [](float low, float high, float centre) {
-      const float up = high - centre, down = centre - low;
-      return (up > down ? up : down) * (1.0f + 0x1p-20f);
+  ARBORETUM_INLINE void set(const AxisBounds& o, const AxisBounds& d) {
+    const auto store = [](const AxisBounds& b, float* centres, float* halves) {
+      const vf<4> centre = vf<4>(0.5f) * (b.low + b.high);
+      centre.store(centres);
+      (max_x86(b.high - centre, centre - b.low) * vf<4>(1.0f + 0x1p-20f)).store(halves);
     };
-    origin[a] = 0.5f * (o_low + o_high), direction[a] = 0.5f * (d_low + d_high);
-    origin_half[a] = half(o_low, o_high, origin[a]), direction_half[a] = half(d_low, d_high, direction[a]);
+    store(o, origin, origin_half), store(d, direction, direction_half);
   }
 };
 
@@ -38,7 +45,7 @@ template <class Block>
   using F = vf<W>;
   using V = vf3<W>;
   const auto load = [](const float(&x)[3][W]) { return V{F::load(x[0]), F::load(x[1]), F::load(x[2])}; };
-  const auto all = [](const float(&x)[3]) { return V{F(x[0]), F(x[1]), F(x[2])}; };
+  const auto all = [](const float(&x)[4]) { return V{F(x[0]), F(x[1]), F(x[2])}; };
   const auto absolute = [](V a) { return V{abs(a.x), abs(a.y), abs(a.z)}; };
   const auto sum = [](V a) { return a.x + a.y + a.z; };
   const auto plus = [](V a, V b) { return V{a.x + b.x, a.y + b.y, a.z + b.z}; };

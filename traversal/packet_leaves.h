@@ -90,11 +90,13 @@ class PacketLeaves {
     if constexpr (Leaves::kRaysInLanes) packet_.clear();
     prepare(
         count, [this](int i) -> const Ray& { return rays_[i]; }, [this](int k) { prepare_lanes(k); });
+    const NearestHit none{0.0f};
+    const auto nothing = vf<4>::load(&none);  // in one store, not in three
     for (int i = 0; i < count; ++i) {
       if constexpr (requires { leaves_.best_so_far(i); }) {
         best_[i] = leaves_.best_so_far(i);
       } else {
-        best_[i] = NearestHit{lanes_.t[i]};
+        nothing.store(&best_[i]), best_[i].t = lanes_.t[i];
       }
     }
     if constexpr (!Leaves::kRaysInLanes) {
@@ -132,34 +134,66 @@ class PacketLeaves {
   }
 
  protected:
-  /// The smallest and the largest value of the lanes of `mask`.
-  void range(const float* values, Mask mask, float& low, float& high) const {
+  /// Calls each(k, only) for the registers that the rays take; `only(v, other)`: v in lanes of `mask`, else `other`.
+  template <class Each>
+  ARBORETUM_INLINE void for_each_register(Mask mask, const Each& each) const {
+    if ((~mask << (kMost - chunks_ * W)) == 0) {  // all lanes, as in most packets
+      for (int k = 0; k < chunks_ * W; k += W) each(k, [](F v, F) { return v; });
+    } else {
+      for (int c = 0; c < chunks_; ++c) {
+        const vm<W> in = vm<W>::from_bits(lanes_of(mask, c));
+        each(c * W, [in](F v, F other) { return select(in, v, other); });
+      }
+    }
+  }
+
+  /// The smallest and the largest values that four rows have in the lanes of `mask`, those of row i in lane i;
+  /// `values(i, k)`: the W lanes from k on of row i. No value is NaN. What is 0 may be of either sign.
+  template <class Values>
+  [[nodiscard]] ARBORETUM_INLINE AxisBounds bounds(Mask mask, const Values& values) const {
     const F infinity(std::numeric_limits<float>::infinity());
-    F least = infinity, most = -infinity;
-    for (int c = 0; c < chunks_; ++c) {
-      const vm<W> in = vm<W>::from_bits(lanes_of(mask, c));
-      const F v = F::load(values + c * W);
-      least = min_x86(least, select(in, v, infinity)), most = max_x86(most, select(in, v, -infinity));
-    }
-    low = reduce_min(least), high = -reduce_min(-most);
+    F low[4] = {infinity, infinity, infinity, infinity}, high[4] = {-infinity, -infinity, -infinity, -infinity};
+    for_each_register(mask, [&](int k, const auto& only) {
+      for (int i = 0; i < 4; ++i) {
+        const F v = values(i, k);
+        low[i] = min_x86(low[i], only(v, infinity)), high[i] = max_x86(high[i], only(v, -infinity));
+      }
+    });
+    const auto reduce = [](const F(&of)[4], auto op) {
+      vf<4> row[4] = {fold_to_four(of[0], op), fold_to_four(of[1], op), fold_to_four(of[2], op),
+                      fold_to_four(of[3], op)};
+      transpose(row);
+      return op(op(row[0], row[1]), op(row[2], row[3]));
+    };
+    return {reduce(low, [](auto a, auto b) { return min_x86(a, b); }),
+            reduce(high, [](auto a, auto b) { return max_x86(a, b); })};
+  }
+  /// The same for three rows, by axis, and a fourth one.
+  [[nodiscard]] ARBORETUM_INLINE AxisBounds bounds(Mask mask, const float (&rows)[3][kMost],
+                                                   const float* fourth) const {
+    const float* const row[4] = {rows[0], rows[1], rows[2], fourth};
+    return bounds(mask, [&](int i, int k) { return F::load(row[i] + k); });
   }
 
-  /// Beyond which no ray of `mask` meets anything that counts.
-  [[nodiscard]] float farthest(Mask mask) const {
+  /// The distances beyond which nothing counts for rays of a mask: the smallest, and the largest.
+  struct Span {
     float low, high;
-    range(lanes_.t, mask, low, high);
-    return high;
+  };
+  [[nodiscard]] ARBORETUM_INLINE Span span_of_t(Mask mask) const {
+    const F infinity(std::numeric_limits<float>::infinity());
+    F low = infinity, high = -infinity;
+    for_each_register(mask, [&](int k, const auto& only) {
+      const F t = F::load(lanes_.t + k);
+      low = min_x86(low, only(t, infinity)), high = max_x86(high, only(t, -infinity));
+    });
+    return {reduce_min(low), reduce_max(high)};
   }
 
-  /// Before leaves are met by rays of `group`: for each axis, the interval of their origins, or of points on their
-  /// lines that are no farther from those than `spread_.reach`.
-  void set_axis([[maybe_unused]] int axis, [[maybe_unused]] float o_low, [[maybe_unused]] float o_high,
-                [[maybe_unused]] Mask group) {
-    if constexpr (Leaves::kRaysInLanes) {
-      float d_low, d_high;
-      range(lanes_.rays.direction[axis], group, d_low, d_high);
-      spread_.set_axis(axis, o_low, o_high, d_low, d_high);
-    }
+  /// Before leaves are met by rays of `group`: the bounds of their origins, or of points on their lines that are no
+  /// farther from those than `spread_.reach`.
+  ARBORETUM_INLINE void set_spread([[maybe_unused]] const AxisBounds& origins, [[maybe_unused]] Mask group) {
+    if constexpr (Leaves::kRaysInLanes)
+      spread_.set(origins, bounds(group, lanes_.rays.direction, lanes_.rays.direction[0]));
   }
 
   static ARBORETUM_INLINE unsigned lanes_of(Mask mask, int chunk) { return unsigned(mask >> (chunk * W)) & kAll; }
@@ -204,9 +238,12 @@ class PacketLeaves {
     best_[i] = hits_.at(i, lanes_.t[i]), hits_.bring(i, prepared_data(i));
   }
 
-  /// Before leaves are met by rays of `group`: whether their origins are the same, bit for bit.
-  void look_for_common_origin([[maybe_unused]] Mask group) {
+  /// Before leaves are met by rays of `group`: whether their origins are the same, bit for bit. `perhaps`: they are but
+  /// for the signs of zeros.
+  void look_for_common_origin([[maybe_unused]] Mask group, [[maybe_unused]] bool perhaps) {
     if constexpr (kSeesFromOrigin) {
+      common_origin_ = false;
+      if (!perhaps) return;
       origin_of_ = __builtin_ctzll(group);
       Mask others = 0;
       for (int c = 0; c < chunks_; ++c) {

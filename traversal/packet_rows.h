@@ -34,7 +34,7 @@ struct PacketBatch {
                                                            std::span<Hit> hits, Counters* counters, int rays_each,
                                                            int threshold) {
     return packets<false>(accel, row, rays, counters, rays_each, threshold,
-                          [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+                          [&](std::size_t i, const NearestHit& best) { hits[i] = stored_to_hit(best); });
   }
   static __attribute__((noinline)) std::size_t any_hit(const Accel& accel, const KernelRow& row, RayBatch rays,
                                                        std::span<std::uint8_t> occluded, Counters* counters,

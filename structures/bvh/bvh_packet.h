@@ -1,10 +1,11 @@
 // Packets: up to 64 rays go through a wide BVH together, with masks of those that are still in it.
 //
 // Rays that share an octant share one traversal; a packet of mixed signs is one masked copy an octant. A node's N
-// children are first tested at once against an interval that holds all rays of the packet, then each that is left
-// against the rays, W at a time, with the very arithmetic of single rays. Children go on the stack with the mask of
-// their rays, nearest on top by the interval's entry. Where no more than `threshold` rays are in a node they go on
-// alone, with all N children in lanes, and the packet with what is left on its stack.
+// children are first tested at once against an interval that holds all rays of the packet, then each that is left, but
+// for those that the interval shows to be met by all of them, against the rays, W at a time, with the very arithmetic
+// of single rays. Children go on the stack with the mask of their rays, nearest on top by the interval's entry. Where
+// no more than `threshold` rays are in a node they go on alone, with all N children in lanes, and the packet with what
+// is left on its stack.
 //
 // A small packet of many octants goes as one (`mix`): each lane with its own near planes, without the interval test;
 // children then go on the stack by the first of their rays' entries.
@@ -15,8 +16,9 @@
 // rest), by which the interval is widened: no child is lost that a ray's test takes. Planes may be beyond M
 // (structures/box_pads.h): what they are rounded by more is relative to the distance that comes out, by which the last
 // of the three entries and the first of the three exits are moved once more (Interval); the others do not matter.
-// Without FMA r may be infinite; such a packet has no interval test. Rays with a common end instead of a common origin,
-// as those towards a point light, are bounded from there.
+// Moved the other way, an entry that is before an exit is so for every ray, whatever it rounds: that child is met by
+// all. Without FMA r may be infinite; such a packet has no interval test. Rays with a common end instead of a common
+// origin, as those towards a point light, are bounded from there.
 //
 // Every ray visits at least the leaves that it would visit alone, up to those that begin beyond its nearest hit. So
 // with padded boxes the answers are those of single rays, bit for bit.
@@ -61,10 +63,10 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   }
 
  private:
-  using typename Base::Mask;
+  using typename Base::Mask, typename Base::Span;
   using F = vf<W>;
   using Base::active_, Base::best_, Base::chunks_, Base::counting_, Base::form_, Base::lanes_, Base::leaves_,
-      Base::range, Base::rays_, Base::spread_;
+      Base::rays_, Base::spread_;
   static constexpr int N = Format::kBranching, kLanes = Format::kLanes;
   static constexpr bool kMoves = kBoxesMove<Format>;
   using Children = vf<kLanes>;
@@ -78,16 +80,12 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   /// Bounds of a group of rays by axis: of 1/d, of the origin at the near and at the far planes, and what they are
   /// widened by. `earlier` and `later`: what entries and exits are scaled by, 8 u, for planes beyond max_coordinate_.
   struct Interval {
-    float r_low[3], r_high[3], near_origin[3], far_origin[3], pad[3];
-    float tnear, earlier, later;
-    bool usable, from_end;
+    alignas(16) float r_low[4], r_high[4], near_origin[4], far_origin[4], pad[4];
+    float tnear, tfar;             ///< of all rays; tfar as they begin
+    float last_tnear, first_tfar;  ///< the largest tnear, the smallest tfar
+    float earlier, later;
+    bool usable, from_end, one_origin;
     unsigned near[3];  ///< the near planes; the far one of axis a is 4 a + 1 less that
-  };
-
-  /// Bounds along one axis.
-  struct Bounds {
-    float low, high;
-    [[nodiscard]] float largest() const { return -low > high ? -low : high; }
   };
 
   /// Packets of no more rays go through the tree as one where these are of so many octants or more: of four rays, of
@@ -114,76 +112,64 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     }
   }
 
+  /// By axis in lanes: what stands in the fourth one belongs to none.
   Interval interval_of(Mask mask) {
     Interval v;
-    v.usable = (mask & lanes_.overflowed) == 0;
-    Bounds r[3], o[3];
-    float unused;
-    range(lanes_.first, mask, v.tnear, unused);
-    if constexpr (kMoves) range(times_.of_ray, mask, times_.first, times_.last);
-    for (int a = 0; a < 3; ++a) {
-      range(lanes_.r[a], mask, r[a].low, r[a].high), range(lanes_.rays.origin[a], mask, o[a].low, o[a].high);
+    const AxisBounds r = Base::bounds(mask, lanes_.r, lanes_.first);
+    AxisBounds o = Base::bounds(mask, lanes_.rays.origin, lanes_.t);
+    if constexpr (kMoves) {
+      const AxisBounds times = Base::bounds(mask, [&](int, int k) { return F::load(times_.of_ray + k); });
+      times_.first = lane<0>(times.low), times_.last = lane<0>(times.high);
     }
-    float size[3];  // 2^-20 of it, times r, is the pad
-    for (int a = 0; a < 3; ++a) size[a] = max_coordinate_ + o[a].largest();
+    v.tnear = lane<3>(r.low), v.last_tnear = lane<3>(r.high);
+    v.first_tfar = lane<3>(o.low), v.tfar = lane<3>(o.high);
+    v.usable = (mask & lanes_.overflowed) == 0, v.from_end = false;
+    v.one_origin = ((o.low == o.high).bits() & kAxes) == kAxes;
+    vf<4> size = vf<4>(max_coordinate_) + o.largest();  // 2^-20 of it, times r, is the pad
     spread_.reach = 0.0f;
-    v.from_end = false;
     if constexpr (AnyHit) {
       if (v.usable) take_common_end(mask, v, o, size);
     }
-    for (int a = 0; a < 3; ++a) {
-      const bool negative = __builtin_signbit(r[a].low) != 0;
-      v.r_low[a] = r[a].low, v.r_high[a] = r[a].high;
-      v.near_origin[a] = negative ? o[a].low : o[a].high, v.far_origin[a] = negative ? o[a].high : o[a].low;
-      // In this order: 2^-20 of a tiny scene may be nothing.
-      v.pad[a] = 0x1p-20f * (size[a] * (negative ? -r[a].low : r[a].high)) + 2.0f * BoxPad::kLeast;
-      v.near[a] = unsigned(2 * a + negative);
-      v.usable &= v.pad[a] < std::numeric_limits<float>::infinity();
-      Base::set_axis(a, o[a].low, o[a].high, mask);
-    }
+    const vm<4> negative = sign_bits(r.low) < vi<4>(0);
+    // In this order: 2^-20 of a tiny scene may be nothing.
+    const vf<4> pad = vf<4>(0x1p-20f) * (size * select(negative, -r.low, r.high)) + vf<4>(2.0f * BoxPad::kLeast);
+    v.usable &= ((pad < vf<4>(std::numeric_limits<float>::infinity())).bits() & kAxes) == kAxes;
+    r.low.store(v.r_low), r.high.store(v.r_high), pad.store(v.pad);
+    select(negative, o.low, o.high).store(v.near_origin), select(negative, o.high, o.low).store(v.far_origin);
+    for (unsigned a = 0; a < 3; ++a) v.near[a] = 2 * a + (negative.bits() >> a & 1u);
     // Distances that count from a ray's end are negative.
     v.earlier = v.from_end ? 1.0f + kSlack : 1.0f - kSlack, v.later = v.from_end ? 1.0f - kSlack : 1.0f + kSlack;
+    Base::set_spread(o, mask);
     return v;
   }
+  static constexpr unsigned kAxes = 7;
   static constexpr float kSlack = 0x1p-21f;
-
-  /// The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together, or, where they are
-  /// subnormal, by less than 2^-126.
-  static float rounding(const Bounds& o, const Bounds& end) {
-    return 0x1p-21f * (o.largest() + end.largest()) + 0x1p-126f;
-  }
 
   /// Rays towards a light have no common origin, but their ends o + tfar d lie close together. Then the bounds of the
   /// ends take the place of the origins', and distances count from a ray's end, s = t - tfar: it meets a plane b at s =
   /// (b - end) r.
-  void take_common_end(Mask mask, Interval& v, Bounds (&o)[3], float (&size)[3]) {
-    Bounds t, end[3];
-    range(lanes_.t, mask, t.low, t.high);
-    if (!(t.high < std::numeric_limits<float>::infinity())) return;
-    float origins = 0.0f, ends = 0.0f, largest = 0.0f;
-    for (int a = 0; a < 3; ++a) {
-      alignas(64) float at[kMost];
-      for (int k = 0; k < chunks_ * W; k += W)
-        (F::load(lanes_.rays.origin[a] + k) + F::load(lanes_.t + k) * F::load(lanes_.rays.direction[a] + k))
-            .store(at + k);
-      range(at, mask, end[a].low, end[a].high);
-      const float most = o[a].largest() > end[a].largest() ? o[a].largest() : end[a].largest();
-      largest = most > largest ? most : largest;
-      origins += o[a].high - o[a].low, ends += end[a].high - end[a].low + 2.0f * rounding(o[a], end[a]);
-    }
-    if (!(ends < 0.25f * origins)) return;
+  ARBORETUM_INLINE void take_common_end(Mask mask, Interval& v, AxisBounds& o, vf<4>& size) {
+    if (!(v.tfar < std::numeric_limits<float>::infinity())) return;
+    const AxisBounds end = Base::bounds(mask, [&](int i, int k) {
+      const int a = i < 3 ? i : 0;
+      return F::load(lanes_.rays.origin[a] + k) + F::load(lanes_.t + k) * F::load(lanes_.rays.direction[a] + k);
+    });
+    const auto sum = [](vf<4> x) { return lane<0>(x) + lane<1>(x) + lane<2>(x); };
+    const vf<4> most = o.largest(), end_most = end.largest();
+    // The product and the sum of o + tfar d round by less than 2^-22 (|o| + |end|) together, or, where they are
+    // subnormal, by less than 2^-126.
+    const vf<4> wide = vf<4>(0x1p-21f) * (most + end_most) + vf<4>(0x1p-126f);
+    if (!(sum(end.high - end.low + (wide + wide)) < 0.25f * sum(o.high - o.low))) return;
     v.from_end = true;
     // What is computed from `end` is off like what is computed from `o` above. Where the direction is as good as 0
     // along an axis, r is not its reciprocal but 2^60 / |d|max, and s is off by up to tfar <= 2 largest / |d|max: the
     // width is of the largest coordinate of any axis, 2^-19 of which times that r is beyond it.
-    for (int a = 0; a < 3; ++a) {
-      const float wide = rounding(o[a], end[a]);
-      const float up = end[a].high - o[a].low, down = o[a].high - end[a].low;
-      spread_.reach += up > down ? up : down;
-      o[a] = {end[a].low - wide, end[a].high + wide};
-      size[a] = 2.0f * (max_coordinate_ + largest);
-    }
-    v.tnear = v.tnear - t.high * (1.0f + 0x1p-20f);
+    spread_.reach = sum(max_x86(end.high - o.low, o.high - end.low));
+    o = {end.low - wide, end.high + wide};
+    size = vf<4>(2.0f * (max_coordinate_ + reduce_max(xyzx(max_x86(most, end_most)))));
+    v.tnear = v.tnear - v.tfar * (1.0f + 0x1p-20f);
+    v.last_tnear = v.last_tnear - v.first_tfar * (1.0f - 0x1p-20f);
+    v.first_tfar = v.tfar = 0.0f;
   }
 
   /// Planes k of all children; where they move, as far out as they are for any ray of the packet.
@@ -195,19 +181,29 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
     }
   }
 
-  /// The children that some ray of the packet may meet, and where it enters them at the earliest.
-  ARBORETUM_INLINE unsigned children_met(const Interval& v, const std::byte* node, float tfar, Children& entry) const {
-    Children near(v.tnear), far(tfar);
+  /// The children that some ray of the packet may meet, where it enters them at the earliest, and of them those that
+  /// all rays meet for certain, of which no ray's own test says otherwise. `t`: the rays' distances that count.
+  ARBORETUM_INLINE unsigned children_met(const Interval& v, const std::byte* node, const Span& t, Children& entry,
+                                         unsigned& by_all) const {
+    Children near(v.tnear), far(t.high), last_in(v.last_tnear), first_out(t.low);
     for (int a = 0; a < 3; ++a) {
       const Children low(v.r_low[a]), high(v.r_high[a]), pad(v.pad[a]);
-      const Children n = planes(node, v.near[a]) - Children(v.near_origin[a]);
-      const Children f = planes(node, unsigned(4 * a + 1) - v.near[a]) - Children(v.far_origin[a]);
+      const Children near_origin(v.near_origin[a]), far_origin(v.far_origin[a]);
+      const Children near_planes = planes(node, v.near[a]), far_planes = planes(node, unsigned(4 * a + 1) - v.near[a]);
+      const Children n = near_planes - near_origin, f = far_planes - far_origin;
       near = max_x86(min_x86(n * low, n * high) - pad, near);
       far = min_x86(max_x86(f * low, f * high) + pad, far);
+      if constexpr (!kMoves) {
+        const Children last = near_planes - far_origin, first = far_planes - near_origin;
+        last_in = max_x86(max_x86(last * low, last * high) + pad, last_in);
+        first_out = min_x86(min_x86(first * low, first * high) - pad, first_out);
+      }
     }
-    entry = near * Children(v.earlier);
-    const unsigned bits = (entry <= far * Children(v.later)).bits();
-    return N == kLanes ? bits : bits & ((1u << N) - 1u);
+    const Children earlier(v.earlier), later(v.later);
+    entry = near * earlier;
+    const unsigned bits = (entry <= far * later).bits() & ((1u << N) - 1u);
+    by_all = kMoves ? 0 : (last_in * later <= first_out * earlier).bits() & bits;
+    return bits;
   }
 
   /// Where the W rays from k on meet plane `plane` of child i; `c`: their offsets for it.
@@ -269,12 +265,14 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
   template <bool Mixed>
   void traverse(Mask group) {
     [[maybe_unused]] Interval interval;
-    bool from_end = false;
+    Span t;  // of the distances that count
     if constexpr (!Mixed) {
-      interval = interval_of(group), from_end = interval.from_end;
-      Base::look_for_common_origin(group);
+      interval = interval_of(group);
+      Base::look_for_common_origin(group, interval.one_origin);
+      t = {interval.first_tfar, interval.tfar};
+    } else {
+      t = Base::span_of_t(group);
     }
-    float tfar = from_end ? 0.0f : Base::farthest(group);
     Entry* const stack = stack_.data();
     Entry* top = stack;
     typename Counting::Depths depths{typename Counting::Depth{}};
@@ -283,41 +281,45 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
       while (!bvh::is_leaf(e.reference)) {
         if (Base::few(e.mask)) {
           Base::go_on_alone(e.mask, [&](int i, auto& ray) { return alone(i, ray, e.reference, depths.current()); });
-          if constexpr (!AnyHit) tfar = Base::farthest(group);
+          if constexpr (!AnyHit) t = Base::span_of_t(group);
           goto pop;
         }
         const std::byte* node = base_ + bvh::offset_of(e.reference);
         const PacketNode<Format> read(node);
-        alignas(64) float t[kLanes];
-        unsigned hit;
+        alignas(64) float entries[kLanes];
+        unsigned hit, by_all = 0;
         if constexpr (Mixed) {
           hit = (1u << Format::boxes(node)) - 1u;
         } else {
           Children entry;
           if (__builtin_expect(interval.usable, 1)) {
-            hit = children_met(interval, read.planes, tfar, entry);
+            hit = children_met(interval, read.planes, t, entry, by_all);
           } else {
             entry = Children(interval.tnear);
             hit = (1u << Format::boxes(node)) - 1u;
           }
-          entry.store(t);
+          entry.store(entries);
         }
         Entry* const bottom = top;
         [[maybe_unused]] MetChildren met;
-        [[maybe_unused]] const unsigned tested = hit;
+        [[maybe_unused]] const unsigned tested = hit & ~by_all;
         for (; hit; hit &= hit - 1) {
           const int i = __builtin_ctz(hit);
-          const Mask mask =
-              Mixed ? mixed_rays_met(read.planes, i, e.mask, t[i]) : rays_met(interval.near, read.planes, i, e.mask);
+          Mask mask = e.mask;
+          if constexpr (Mixed) {
+            mask = mixed_rays_met(read.planes, i, mask, entries[i]);
+          } else if ((by_all >> i & 1u) == 0) {
+            mask = rays_met(interval.near, read.planes, i, mask);
+          }
           if (mask == 0) continue;
           met.add(mask);
           const bvh::NodeReference child = Format::children(node)[i * Format::kStride];
           prefetch_lines<kPrefetchLines>(base_ + bvh::offset_of(child));
           Entry* p = top++;
           if constexpr (!AnyHit) {
-            for (; p != bottom && p[-1].t < t[i]; --p) *p = p[-1];
+            for (; p != bottom && p[-1].t < entries[i]; --p) *p = p[-1];
           }
-          *p = {child, t[i], mask};
+          *p = {child, entries[i], mask};
         }
         if constexpr (Counting::kCounting) {
           if constexpr (!Mixed) {
@@ -331,14 +333,14 @@ class BvhPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, BoxRays> {
         depths.pop(top - stack);
       }
       Base::leaf(base_ + bvh::offset_of(e.reference), bvh::block_count(e.reference), e.mask);
-      if constexpr (!AnyHit) tfar = Base::farthest(group);
+      if constexpr (!AnyHit) t = Base::span_of_t(group);
     pop:
       for (;;) {
         if (top == stack) return;
         e = *--top;
         depths.pop(top - stack);
         if constexpr (AnyHit) e.mask &= active_;
-        if (e.mask != 0 && (AnyHit || e.t <= tfar)) break;
+        if (e.mask != 0 && (AnyHit || e.t <= t.high)) break;
       }
     }
   }

@@ -310,7 +310,7 @@ struct StreamFunctions {
     return {
         [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<Hit> hits, Counters* counters) {
           trace<Leaves, Padded, false, Counting>(
-              a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = to_hit(best); });
+              a, row, rays, counters, [&](std::size_t i, const NearestHit& best) { hits[i] = stored_to_hit(best); });
         },
         [](const Accel& a, const KernelRow& row, RayBatch rays, std::span<std::uint8_t> occluded, Counters* counters) {
           trace<Leaves, Padded, true, Counting>(a, row, rays, counters, [&](std::size_t i, const NearestHit& best) {

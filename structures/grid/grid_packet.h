@@ -132,12 +132,9 @@ class GridPackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Grid
     Order order;
     const Mask inside = clip(outer, group, order);
     if (inside == 0) return;
-    for (int a = 0; a < 3; ++a) {
-      float low, high;
-      Base::range(lanes_.rays.origin[a], inside, low, high);
-      Base::set_axis(a, low, high, inside);
-    }
-    Base::look_for_common_origin(inside);
+    const AxisBounds origins = Base::bounds(inside, lanes_.rays.origin, lanes_.rays.origin[0]);
+    Base::set_spread(origins, inside);
+    Base::look_for_common_origin(inside, all(origins.low == origins.high));
     search<0>(outer, inside, order);
   }
 

@@ -111,7 +111,7 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
 
   /// Bounds of a group of rays by axis.
   struct Interval {
-    float r0[3], r1[3], low_origin[3], high_origin[3], pad[3];
+    alignas(16) float r0[4], r1[4], low_origin[4], high_origin[4], pad[4];
     bool usable;
 
     /// No ray meets the plane before `low` or behind `high`, padded or not. The pad makes good what is rounded where
@@ -130,16 +130,16 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     Interval v;
     v.usable = chunks_ > 2 && (lanes_.overflowed & group) == 0;
     if (!v.usable && !Leaves::kRaysInLanes) return v;
-    for (int a = 0; a < 3; ++a) {
-      float o0, o1;
-      Base::range(lanes_.rays.origin[a], group, o0, o1), Base::range(lanes_.r[a], group, v.r0[a], v.r1[a]);
-      const bool down = __builtin_signbit(v.r0[a]) != 0;
-      const float r = down ? -v.r0[a] : v.r1[a], o = -o0 > o1 ? -o0 : o1;
-      v.low_origin[a] = down ? o0 : o1, v.high_origin[a] = down ? o1 : o0;
-      v.pad[a] = 0x1p-19f * ((max_coordinate_ + o) * r) + 0x1p-98f;  // in this order, as in BVHs
-      v.usable &= v.pad[a] < 0x1p100f;
-      Base::set_axis(a, o0, o1, group);
-    }
+    const AxisBounds r = Base::bounds(group, lanes_.r, lanes_.r[0]);
+    const AxisBounds o = Base::bounds(group, lanes_.rays.origin, lanes_.rays.origin[0]);
+    const vm<4> down = sign_bits(r.low) < vi<4>(0);
+    const vf<4> pad = vf<4>(0x1p-19f) * ((vf<4>(max_coordinate_) + o.largest()) * select(down, -r.low, r.high)) +
+                      vf<4>(0x1p-98f);  // in this order, as in BVHs
+    v.usable &= all(pad < vf<4>(0x1p100f));
+    r.low.store(v.r0), r.high.store(v.r1), pad.store(v.pad);
+    select(down, o.low, o.high).store(v.low_origin), select(down, o.high, o.low).store(v.high_origin);
+    Base::set_spread(o, group);
+    Base::look_for_common_origin(group, all(o.low == o.high));
     return v;
   }
 
@@ -196,7 +196,6 @@ class KdPackets : private PacketLeaves<W, Leaves, AnyHit, Counting, KdLanes> {
     unsigned far_side[3];  // byte offset within a pair of the child that rays come to last
     for (unsigned a = 0; a < 3; ++a) far_side[a] = octant >> a & 1u ? 0u : 8u;
     const Interval interval = interval_of(group);
-    Base::look_for_common_origin(group);
     Cell* const stack = stack_.data();
     Cell* top = stack;  // the cell at hand; those below wait
     typename Counting::Depths depths{typename Counting::Depth{}};

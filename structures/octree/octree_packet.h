@@ -53,13 +53,13 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
     Entry* const stack = stack_;
     Entry* top = stack;
     Entry e{{{0, 0, 0, 0}, nodes[0], 0}, group, 0.0f};
-    float last = Base::farthest(group);
+    float last = Base::span_of_t(group).high;
     Base::forget_leaves();
     for (;;) {
       if (e.cell.node.mask == 0) {
         if (const Mask rays = Base::new_to(e.cell.node.first, e.mask); rays != 0) {
           Base::leaf(e.cell.node.first, rays);
-          if constexpr (!AnyHit) last = Base::farthest(group);
+          if constexpr (!AnyHit) last = Base::span_of_t(group).high;
         }
       } else if (Base::few(e.mask)) {
         Base::go_on_alone(e.mask, [&](int i, auto& visits) {
@@ -67,7 +67,7 @@ class OctreePackets : private ListedPacketLeaves<W, Leaves, AnyHit, Counting, Bo
           return search_octree<AnyHit>(tree_, OctreeRay(of(lanes_.r), of(lanes_.near), of(lanes_.far)), e.cell,
                                        rays_[i].tnear, best_[i], last_leaf_[i], counting_, visits);
         });
-        if constexpr (!AnyHit) last = Base::farthest(group);
+        if constexpr (!AnyHit) last = Base::span_of_t(group).high;
       } else {
         Mask in[8] = {};
         float first[8];
