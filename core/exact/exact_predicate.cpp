@@ -110,13 +110,14 @@ bool ExactPredicate::surely_on_line(Vec3f point) const {
 }
 
 bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
-  const Triple<double> a = widen(corners[0]) - origin_, b = widen(corners[1]) - origin_,
-                       c = widen(corners[2]) - origin_;
-  const double size_a = size_of(a), size_b = size_of(b), size_c = size_of(c);
-  const double scale = kDoubleBound * direction_size_;
-  int sign[3] = {sign_beyond(determinant(a, b, direction_), scale * size_a * size_b),
-                 sign_beyond(determinant(b, c, direction_), scale * size_b * size_c),
-                 sign_beyond(determinant(c, a, direction_), scale * size_c * size_a)};
+  const Triple<double> at[3] = {widen(corners[0]), widen(corners[1]), widen(corners[2])};
+  // det[p, q, d] = det[p, q - p, d], whose rounding is of the edge's size, not of the corners' distance.
+  int sign[3];
+  for (int k = 0; k < 3; ++k) {
+    const Triple<double> p = at[k] - origin_, edge = at[(k + 1) % 3] - at[k];
+    sign[k] =
+        sign_beyond(determinant(p, edge, direction_), kDoubleBound * direction_size_ * size_of(p) * size_of(edge));
+  }
   const auto mixed = [&sign] {
     return std::min({sign[0], sign[1], sign[2]}) < 0 && std::max({sign[0], sign[1], sign[2]}) > 0;
   };
@@ -129,13 +130,12 @@ bool ExactPredicate::meets(const Corners& corners, Enclosure& t) {
     for (int k = 0; k < 3; ++k)
       if (sign[k] == 0 && sign[(k + 2) % 3] == 0 && surely_on_line(corners[static_cast<std::size_t>(k)]))
         zero[k] = zero[(k + 2) % 3] = true;
-    Triple<DoubleDouble> p[3];
-    for (int k = 0; k < 3; ++k) p[k] = difference(widen(corners[static_cast<std::size_t>(k)]), origin_);
     bool all_certain = true;
     for (int k = 0; k < 3; ++k) {
       if (sign[k] != 0 || zero[k]) continue;
       bool certain = false;
-      sign[k] = edge_sign_in_double_double(p[k], p[(k + 1) % 3], direction_size_, certain);
+      sign[k] = edge_sign_in_double_double(difference(at[k], origin_), difference(at[(k + 1) % 3], at[k]),
+                                           direction_size_, certain);
       all_certain = all_certain && certain;
     }
     ++counts_.in_double_double;
