@@ -12,6 +12,7 @@
 
 #include "experiments/passes.h"
 #include "scenes/catalogue.h"
+#include "structures/builders/reinsertion_name.h"
 
 namespace arboretum {
 namespace {
@@ -44,7 +45,7 @@ constexpr double kReinsertedPerSecond = 7e5;
 
 double build_seconds(const Cell& cell, double triangles) {
   return triangles / triangles_per_second(cell.builder) +
-         (cell.builder.ends_with("_reinsertion") ? triangles / kReinsertedPerSecond : 0.0);
+         (cell.builder.ends_with(kReinsertion) ? triangles / kReinsertedPerSecond : 0.0);
 }
 
 /// What several cells need once: each has its part, so that shards come out even.

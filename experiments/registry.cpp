@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "structures/builders/reinsertion_name.h"
 #include "structures/own_parameters.h"
 #include "structures/parameters_read.h"
 
@@ -40,8 +41,6 @@ bool Registry::reads(std::string_view parameter, std::string_view name, std::str
 }
 
 namespace {
-
-constexpr std::string_view kReinsertion = "_reinsertion";
 
 std::string listed(std::span<const std::string_view> names, std::string_view separator, std::size_t most) {
   const std::size_t shown = std::min(names.size(), most);

@@ -12,6 +12,7 @@
 #include "structures/builders/embree_builders.h"
 #include "structures/builders/portable_builders.h"
 #include "structures/builders/reinsertion.h"
+#include "structures/builders/reinsertion_name.h"
 #include "structures/builders/top_reinsertion.h"
 
 namespace arboretum {
@@ -97,9 +98,6 @@ constexpr Entry kBuilders[] = {
      {"traversal_cost", "intersection_cost", "duplication_budget"}},
 #endif
 };
-
-/// Every builder has a second key, this behind its own: its tree improved by reinsertion.
-constexpr std::string_view kReinsertion = "_reinsertion";
 
 struct Found {
   const Entry* entry = nullptr;  ///< null: no builder has the key
